@@ -1,0 +1,56 @@
+"""Scenes as files that plain MuJoCo opens from anywhere."""
+
+import shutil
+from pathlib import Path
+
+import mujoco
+
+from .errors import BadConfig
+from .pool import Row
+from .robots import panda
+from .sim.world import compose
+
+
+def export(row: Row, folder: Path, robot: bool) -> None:
+    """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml and its meshes.
+
+    Paths inside the files are relative, so that the folder can be moved. In scene_with_robot.xml the robot stands as
+    after a reset, in the key frame "home".
+
+    Raises:
+        BadConfig: the folder cannot be written.
+    """
+    target = folder / row["id"]
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        (target / "scene.xml").write_text(row["scene_xml"])
+        if robot:
+            (target / "scene_with_robot.xml").write_text(_with_robot(row["scene_xml"], target))
+    except OSError as error:
+        raise BadConfig(f"{target} cannot be written: {error.strerror}") from None
+
+
+def _with_robot(scene_xml: str, target: Path) -> str:
+    spec = compose(scene_xml, visual=True)
+    meshes = target / "meshes"
+    meshes.mkdir(exist_ok=True)
+    for mesh in spec.meshes:
+        if mesh.file:
+            source = panda.mesh_file(mesh)
+            shutil.copyfile(source, meshes / f"{mesh.name}{source.suffix}")
+            mesh.file = f"meshes/{mesh.name}{source.suffix}"
+    spec.modelfiledir = str(target)
+    _add_home(spec)
+    return spec.to_xml()
+
+
+def _add_home(spec: mujoco.MjSpec) -> None:
+    """A key frame with the robot as after a reset: MuJoCo's viewer then starts where episodes start."""
+    model = spec.compile()
+    qpos = model.qpos0.copy()
+    joints = [f"robot0_joint{i + 1}" for i in range(panda.JOINTS)]
+    joints += ["gripper0_right_finger_joint1", "gripper0_right_finger_joint2"]
+    for name, angle in zip(joints, [*panda.HOME, *panda.FINGERS], strict=True):
+        qpos[model.joint(name).qposadr[0]] = angle
+    spec.add_key(name="home", qpos=qpos)
+    spec.compile()

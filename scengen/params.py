@@ -1,0 +1,101 @@
+"""Physical parameters: plain dataclass fields that know their unit and bounds.
+
+The bounds are declared once, here, and used four times: by the constructor, by the check of a task
+file, by the property tests and by the printed table of parameters.
+"""
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from .errors import BadConfig, OutOfBounds, UnknownName
+
+N = TypeVar("N", int, float)
+D = TypeVar("D")
+Value = int | float
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a scenario family, nested assets included."""
+
+    name: str
+    """Dotted path, e.g. `tile.mass`."""
+    nominal: Value
+    unit: str
+    low: float
+    high: float
+    period: float | None
+    """Values that differ by this much are the same scene, e.g. 180 for the yaw of a slab [unit]."""
+    hidden: bool
+    """Whether nobody may read the value off the scene's geometry, colours or names."""
+
+    @property
+    def integer(self) -> bool:
+        return isinstance(self.nominal, int)
+
+    def check(self, where: str, value: Any) -> None:
+        """Raise unless `value` is a finite number of the right kind within the bounds."""
+        if isinstance(value, bool) or not isinstance(value, int if self.integer else (int, float)):
+            kind = "a whole number" if self.integer else "a number"
+            raise BadConfig(f"{where} = {value!r}; it must be {kind} in [{self.low:g}, {self.high:g}] {self.unit}")
+        if not (math.isfinite(value) and self.low <= value <= self.high):
+            raise OutOfBounds(where, value, self.low, self.high, self.unit)
+
+
+def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None, hidden: bool = False) -> N:
+    """Declare a parameter: its nominal value, its unit, and the bounds of its meaning.
+
+    The bounds are physical, not statistical: outside them the builder makes no sense. Which values
+    are *likely* is written in conf/task/.
+    """
+    meta = {"unit": unit, "low": low, "high": high, "period": period, "hidden": hidden}
+    return dataclasses.field(default=nominal, metadata=meta)
+
+
+def parameters(owner: Any, prefix: str = "") -> Iterator[Parameter]:
+    """Yield every parameter of an instance, with the instance's values as nominal ones."""
+    for field in dataclasses.fields(owner):
+        value = getattr(owner, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from parameters(value, f"{prefix}{field.name}.")
+        elif "unit" in field.metadata:
+            yield Parameter(prefix + field.name, value, **field.metadata)
+
+
+def values(owner: Any) -> dict[str, Value]:
+    """All parameter values by dotted name."""
+    return {p.name: p.nominal for p in parameters(owner)}
+
+
+def check_bounds(owner: Any) -> None:
+    """Raise for the first own parameter of `owner` that leaves its bounds (nested assets check themselves)."""
+    for p in parameters(owner):
+        if "." not in p.name:
+            p.check(f"{type(owner).__name__}.{p.name}", p.nominal)
+
+
+def with_values(owner: D, new: Mapping[str, Value]) -> D:
+    """Copy `owner` with some parameters replaced, e.g. `{"count": 6, "tile.mass": 0.03}`."""
+    known = values(owner)
+    flat: dict[str, Any] = {}
+    nested: dict[str, dict[str, Value]] = {}
+    for name, value in new.items():
+        if name not in known:
+            raise UnknownName(f"parameter of {type(owner).__name__}", name, known)
+        head, _, tail = name.partition(".")
+        if tail:
+            nested.setdefault(head, {})[tail] = value
+        else:
+            flat[head] = value
+    for head, inner in nested.items():
+        flat[head] = with_values(getattr(owner, head), inner)
+    return dataclasses.replace(owner, **flat)  # type: ignore[type-var]
+
+
+def canonical(owner: Any) -> str:
+    """The parameter values as JSON with sorted keys: what identities are made of."""
+    return json.dumps(values(owner), sort_keys=True)

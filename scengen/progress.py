@@ -1,0 +1,44 @@
+"""Progress of long work: a bar on a terminal, a line now and then elsewhere."""
+
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+EVERY = 15.0
+"""Seconds between two lines where there is no terminal."""
+
+
+class Bar:
+    """Shows how far some work has come."""
+
+    def __init__(self, console: Console, title: str, total: int):
+        self.console, self.title, self.total = console, title, total
+        self._last = time.monotonic()
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[note]}"),
+        )
+        self._progress = Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True)
+        self._task = self._progress.add_task(title, total=total, note="")
+
+    def __enter__(self) -> "Bar":
+        if self.console.is_terminal:
+            self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.console.is_terminal:
+            self._progress.stop()
+
+    def show(self, done: int, note: str = "") -> None:
+        """Say that `done` of the total are done."""
+        self._progress.update(self._task, completed=done, note=note)
+        if not self.console.is_terminal and (time.monotonic() - self._last > EVERY or done == self.total):
+            self._last = time.monotonic()
+            self.console.print(f"{self.title}: {done} of {self.total} {note}".rstrip(), highlight=False)

@@ -1,0 +1,165 @@
+"""robosuite's Panda on its mount, composed with MjSpec from the files of the installed robosuite package.
+
+robosuite itself is never imported: that is slow and wants GL libraries. Names, masses, poses and everything
+that robosuite sets in Python instead of XML are the same as in its compiled environments; a test compares
+them all."""
+
+import functools
+import importlib.util
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+JOINTS = 7
+"""Joints of the arm."""
+
+HOME: NDArray[np.float64] = np.array([0, np.pi / 16, 0, -np.pi / 2 - np.pi / 3, 0, np.pi - 0.2, np.pi / 4])
+"""Joint angles after a reset [rad], shape (7,): robosuite Panda.init_qpos, without its noise."""
+FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
+"""Finger positions after a reset [m], shape (2,): robosuite PandaGripper.init_qpos."""
+
+BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
+"""Base position [m], shape (3,): Panda.base_xpos_offset for a table 0.8 m long (-0.16 - 0.8 / 2), on the
+mount."""
+BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
+"""Base orientation (wxyz): robosuite leaves a single arm unturned, facing +x."""
+MOUNT: NDArray[np.float64] = np.array([0.0, 0.0, 0.01])
+"""Position of the mount in the base's frame [m], shape (3,): minus RethinkMount.top_offset."""
+
+ARMATURE = tuple(5.0 / (i + 1) for i in range(JOINTS))
+"""Rotor inertia of each joint [kg m^2]: robosuite RobotModel.__init__."""
+FRICTIONLOSS = 0.1
+"""Dry friction of each joint [N m]: robosuite RobotModel.__init__."""
+DAMPING = (0.1, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01)
+"""Viscous friction of each joint [N m s/rad]: robosuite Panda.__init__."""
+
+SHOULDER: NDArray[np.float64] = BASE + np.array([0.0, 0.0, 0.333])
+"""World point about which the arm swings [m], shape (3,): joints 1 and 2 meet there (link1 in robot.xml)."""
+REACH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088, 0.1065 + 0.097)
+"""No posture takes the grip site farther than this from `SHOULDER` [m].
+
+Triangle inequality over three rigid stretches, with the link offsets of robot.xml and panda_gripper.xml.
+Turning joint 3, 5 or 7 moves nothing along its own axis, so each of these stretches has a fixed length:
+
+* shoulder to elbow (link4): 0.316 along the axis of joint 3, then 0.0825 across it;
+* elbow to wrist (link6): 0.0825 across the axis of joint 5, then 0.384 along it;
+* wrist to grip site: 0.088 across the axis of joint 7, then 0.1065 (hand) + 0.097 (eef) along it.
+
+Joint limits are ignored, so the bound is not attained. It speaks of the grip site; the fingertips are 1 cm
+farther. """
+
+
+def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
+    """Add the robot to `scene`, named and placed as in robosuite's table environments.
+
+    Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times
+    faster. It then lacks the wrist's force and torque sensors too, which cost 4 % of a step and influence
+    nothing; sites and cameras cost nothing that can be measured, and stay."""
+    arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), _jaw(visual).copy()
+    # Arm first: what is attached to it before it is in the scene gets its prefix as well (robot0_gripper0_ ...).
+    scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist()).attach_body(
+        arm.body("base"), "robot0_", ""
+    )
+    base, wrist = scene.body("robot0_base"), scene.body("robot0_right_hand")
+    base.add_frame().attach_body(mount.body("base"), "fixed_mount0_", "")
+    wrist.add_frame().attach_body(hand.body("right_gripper"), "gripper0_right_", "")
+
+
+@functools.cache
+def _arm(visual: bool) -> mujoco.MjSpec:
+    """The seven links, as robosuite's Python leaves them."""
+    arm = _load("robots/panda/robot.xml", visual)
+    for i in range(JOINTS):
+        joint = arm.joint(f"joint{i + 1}")
+        joint.armature = ARMATURE[i]
+        joint.frictionloss = FRICTIONLOSS
+        joint.damping = DAMPING[i]
+    return arm
+
+
+@functools.cache
+def _mount(visual: bool) -> mujoco.MjSpec:
+    """The pedestal below the arm; robosuite overwrites the position in the file by `MOUNT`."""
+    mount = _load("bases/rethink_mount.xml", visual)
+    mount.body("base").pos = MOUNT
+    return mount
+
+
+@functools.cache
+def _jaw(visual: bool) -> mujoco.MjSpec:
+    """The two-finger gripper. Another hand is another function like this one, with a body "right_gripper"."""
+    jaw = _load("grippers/panda_gripper.xml", visual)
+    if not visual:
+        for sensor in list(jaw.sensors):
+            jaw.delete(sensor)
+    return jaw
+
+
+def _load(path: str, visual: bool) -> mujoco.MjSpec:
+    """Parse one of robosuite's asset files, in radians as all of them are included by robosuite."""
+    spec = mujoco.MjSpec.from_file(str(_assets() / path))
+    spec.compiler.degree = False
+    if not visual:
+        strip_visual(spec)
+    return spec
+
+
+@functools.cache
+def _assets() -> Path:
+    """The folder of MJCF files inside the installed robosuite package."""
+    found = importlib.util.find_spec("robosuite")
+    if found is None or not found.submodule_search_locations:
+        raise RuntimeError(
+            "robosuite is not installed, and the robot's files are in it: pip install robosuite==1.5.2"
+        )
+    return Path(next(iter(found.submodule_search_locations))) / "models" / "assets"
+
+
+FOLDERS = {"gripper0_": "grippers", "robot0_fixed_mount0_": "bases", "robot0_": "robots/panda"}
+"""Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""
+
+
+def mesh_file(mesh: mujoco.MjsMesh) -> Path:
+    """The file of one of the robot's meshes."""
+    folder = next(folder for prefix, folder in FOLDERS.items() if mesh.name.startswith(prefix))
+    return _assets() / folder / mesh.file
+
+
+def strip_visual(spec: mujoco.MjSpec) -> None:
+    """Delete geoms that are only looked at (group 1, no collisions), then unused meshes, materials and
+    textures.
+
+    Raises ValueError where such a geom gives its body inertia, because then the physics would change.
+    """
+    for geom in list(spec.geoms):
+        if geom.group == 1 and geom.contype == 0 and geom.conaffinity == 0:
+            if _weighs(spec, geom):
+                raise ValueError(
+                    f"visual geom {geom.name!r} gives body {geom.parent.name!r} inertia and cannot be stripped; "
+                    "set its mass to 0 or give the body explicit inertia"
+                )
+            spec.delete(geom)
+    meshes = {geom.meshname for geom in spec.geoms}
+    _delete_unused(spec, spec.meshes, meshes)
+    looks = [*spec.geoms, *spec.sites, *spec.tendons, *spec.skins, *spec.flexes]
+    _delete_unused(spec, spec.materials, {look.material for look in looks})
+    textures = {name for material in spec.materials for name in material.textures}
+    _delete_unused(spec, spec.textures, textures)
+
+
+def _weighs(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Whether the compiler would count `geom` when it computes the inertia of its body."""
+    low, high = spec.compiler.inertiagrouprange
+    inferred = geom.parent.name != "world" and not geom.parent.explicitinertial
+    massless = geom.mass == 0 or (math.isnan(geom.mass) and geom.density == 0)
+    return inferred and not massless and low <= geom.group <= high
+
+
+def _delete_unused(spec: mujoco.MjSpec, assets: list, used: set[str]) -> None:
+    """Delete from `spec` the assets whose names are not in `used`."""
+    for asset in list(assets):
+        if asset.name not in used:
+            spec.delete(asset)

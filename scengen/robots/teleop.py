@@ -1,0 +1,72 @@
+"""The paper's teleoperation filter: what stands between a plan, or a person, and the controller."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+ALPHA = 0.8
+"""Weight of the new value in the moving average: paper, appendix "Teleoperation hardware and protocol"."""
+LARGEST_CHANGE = 0.15
+"""Largest change of a channel in one control step, applied after the average: same place."""
+MOTION = 6
+"""Channels that are filtered, translation and rotation; the gripper behind them passes through."""
+
+
+class Filter:
+    """Exponential moving average of the six motion channels, then a limit on the change per step.
+
+    Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs beyond [-1,
+    1] are clipped first, so that outputs never leave it. One object filters one stream of actions."""
+
+    def __init__(self) -> None:
+        self._state = np.zeros(MOTION)
+        self._input = np.zeros(MOTION + 1)
+
+    def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
+        """The filtered action, shape (7,): float32, exactly what the controller receives and a witness
+        records."""
+        given = np.asarray(action, np.float64)
+        if given.shape != (MOTION + 1,):
+            raise ValueError(f"an action has shape ({MOTION + 1},), not {given.shape}")
+        self._input[:] = given
+        filtered = np.empty(MOTION + 1, np.float32)
+        if not _filter(self._state, self._input, filtered):
+            raise ValueError(f"an action must be finite, not {given.tolist()}")
+        return filtered
+
+    def reset(self) -> None:
+        """Forget the past: the previous action is at rest."""
+        self._state[:] = 0.0
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """The previous filtered motion, shape (6,), a copy; assign it to continue from there."""
+        return self._state.copy()
+
+    @state.setter
+    def state(self, motion: ArrayLike) -> None:
+        given = np.asarray(motion, np.float64)
+        if given.shape != (MOTION,) or not (np.abs(given) <= 1.0).all():
+            raise ValueError(f"a filter's state is {MOTION} numbers in [-1, 1], not {given.tolist()}")
+        self._state[:] = given
+
+
+@njit(nogil=True, cache=True)
+def _filter(state: NDArray[np.float64], action: NDArray[np.float64], out: NDArray[np.float32]) -> bool:
+    """Advance `state` by one action and write the result; False, and nothing done, if it is not finite."""
+    for i in range(MOTION + 1):
+        if not np.isfinite(action[i]):
+            return False
+    for i in range(MOTION):
+        smooth = ALPHA * _unit(action[i]) + (1.0 - ALPHA) * state[i]
+        change = min(max(smooth - state[i], -LARGEST_CHANGE), LARGEST_CHANGE)
+        state[i] = _unit(state[i] + change)
+        out[i] = state[i]
+    out[MOTION] = _unit(action[MOTION])
+    return True
+
+
+@njit(cache=True)
+def _unit(value: float) -> float:
+    """`value` clipped to [-1, 1]."""
+    return min(max(value, -1.0), 1.0)

@@ -1,0 +1,200 @@
+"""libmujoco called from compiled code: the only module that knows raw addresses.
+
+numba resolves `mj_step1` and friends as plain external symbols, so that a whole control period runs without
+the interpreter and without its lock, and the result is cached on disk like any other compiled function. The
+price is that an address must stay valid: keep model and data alive, and take addresses anew for every new
+MjData. The arrays of mjData have fixed addresses, except what lives in its arena (contacts, constraints),
+which moves."""
+
+import ctypes
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import llvmlite.binding as llvm
+import mujoco
+import numpy as np
+from numba import carray, njit, types
+from numba.core.types import ExternalFunction
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+
+def _library() -> Path:
+    """The shared library that the bindings have already loaded."""
+    found = sorted(Path(mujoco.__file__).parent.glob("libmujoco.so*"))
+    if not found:
+        raise RuntimeError(
+            f"mujoco {mujoco.__version__} has no libmujoco.so beside it; only its Linux wheel is supported"
+        )
+    return found[0]
+
+
+llvm.load_library_permanently(str(_library()))
+
+_MODEL_AND_DATA = types.void(types.intp, types.intp)
+"""Two pointers passed as integers: the same registers in the C ABI of x86-64 and aarch64."""
+step = ExternalFunction("mj_step", _MODEL_AND_DATA)
+step1 = ExternalFunction("mj_step1", _MODEL_AND_DATA)
+step2 = ExternalFunction("mj_step2", _MODEL_AND_DATA)
+kinematics = ExternalFunction("mj_kinematics", _MODEL_AND_DATA)
+
+
+def _pointer_to(kind: types.Type) -> Callable:
+    """An intrinsic that turns an integer address into a pointer to `kind`."""
+
+    @intrinsic
+    def cast(typingctx, address):
+        pointer = types.CPointer(kind)
+
+        def codegen(context, builder, signature, args):
+            return builder.inttoptr(args[0], context.get_value_type(pointer))
+
+        return pointer(types.intp), codegen
+
+    return cast
+
+
+_float64_pointer = _pointer_to(types.float64)
+_int32_pointer = _pointer_to(types.int32)
+_int64_pointer = _pointer_to(types.int64)
+
+
+@njit(cache=True)
+def float64s(address, shape):
+    """The C-ordered float64 array of `shape` at `address`, not a copy."""
+    return carray(_float64_pointer(address), shape)
+
+
+@njit(cache=True)
+def int32s(address, shape):
+    """The C-ordered int32 array of `shape` at `address`, not a copy."""
+    return carray(_int32_pointer(address), shape)
+
+
+@njit(cache=True)
+def int64s(address, shape):
+    """The C-ordered int64 array of `shape` at `address`, not a copy."""
+    return carray(_int64_pointer(address), shape)
+
+
+class Layout(NamedTuple):
+    """Where compiled code finds contacts [bytes]."""
+
+    ncon: int
+    """Offset in mjData of the number of contacts (int32)."""
+    contact: int
+    """Offset in mjData of the pointer to the first mjContact."""
+    stride: int
+    """Size of one mjContact."""
+    dist: int
+    """Offset in mjContact of the distance (float64, negative in penetration)."""
+    geom: int
+    """Offset in mjContact of the two geom ids (int32, shape (2,))."""
+
+
+@functools.cache
+def layout() -> Layout:
+    """The layout of this version of MuJoCo, found by experiment once per process.
+
+    Two scenes with different numbers of contacts must agree. The number of contacts is the word that the
+    bindings follow when it is changed for a moment, the pointer the one that libmujoco follows."""
+    first, second = _locate(*_sunken_balls(2)), _locate(*_sunken_balls(3))
+    if first != second:
+        raise RuntimeError(_unknown(f"two scenes disagree: {first} and {second}"))
+    return first
+
+
+def warning_counts(data: mujoco.MjData) -> tuple[int, int, int]:
+    """Address, stride [bytes] and number of the warning counters (int32), which are part of mjData itself."""
+    numbers = data.warning.number
+    return numbers.ctypes.data, numbers.strides[0], len(numbers)
+
+
+@njit(cache=True)
+def warnings(address, stride, kinds):
+    """Total of the warnings raised since the last reset, with the values of `warning_counts`."""
+    total = 0
+    for kind in range(kinds):
+        total += int32s(address + kind * stride, 1)[0]
+    return total
+
+
+def silence() -> None:
+    """Stop MuJoCo from printing warnings and writing MUJOCO_LOG.TXT, in the whole process; they stay
+    counted."""
+    # The handler takes a C string and its result is ignored: strlen does that and nothing else, without the lock.
+    handler = ctypes.cast(ctypes.CDLL(None).strlen, ctypes.c_void_p)
+    ctypes.c_void_p.in_dll(ctypes.CDLL(str(_library())), "mju_user_warning").value = handler.value
+
+
+def _unknown(detail: str) -> str:
+    return (
+        f"cannot find the contacts in mjData of mujoco {mujoco.__version__} ({detail}); install mujoco==3.5.0"
+    )
+
+
+def _sunken_balls(n: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A tiny world with n contacts of different depths: n balls pressed into a plane."""
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
+    for i in range(n):
+        ball = spec.worldbody.add_body(pos=[i, 0, 0.09 - 0.01 * i])
+        ball.add_freejoint()
+        ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
+    """The layout seen in one MjData that has at least two contacts of different force."""
+    dist, geom = data.contact.dist, data.contact.geom
+    stride = dist.strides[0]
+    # The first contact may begin with any field; its `dist` lies less than one stride after the start.
+    near = dist.ctypes.data
+    force = np.zeros(6)
+
+    def first_force() -> float:
+        mujoco.mj_contactForce(model, data, 0, force)
+        return force[0]
+
+    first = first_force()
+    mujoco.mj_contactForce(model, data, 1, force)
+    second = force[0]
+    if data.ncon < 2 or first == second or geom.strides[0] != stride:
+        raise RuntimeError(_unknown(f"the probe shows {data.ncon} contacts of {first} and {second} N"))
+
+    counts, pointers = _words(data, np.dtype(np.int32)), _words(data, np.dtype(np.uintp))
+    ncon = _followed(counts, counts == data.ncon, -1, lambda: data.ncon == len(dist) - 1)
+    contact = _followed(
+        pointers, (pointers <= near) & (pointers > near - stride), stride, lambda: first_force() == second
+    )
+    start = near - int(pointers[contact // pointers.itemsize])
+    return Layout(ncon, contact, stride, start, start + geom.ctypes.data - near)
+
+
+def _words(data: mujoco.MjData, kind: np.dtype) -> NDArray:
+    """The struct mjData itself as an array of words, not a copy; its length is that of its allocation."""
+    usable = ctypes.CDLL(None).malloc_usable_size
+    usable.argtypes, usable.restype = [ctypes.c_void_p], ctypes.c_size_t
+    size = usable(data._address) // kind.itemsize * kind.itemsize
+    return np.frombuffer((ctypes.c_char * size).from_address(data._address), kind)
+
+
+def _followed(words: NDArray, plausible: NDArray, change: int, seen: Callable[[], bool]) -> int:
+    """Offset [bytes] of the one plausible word for which `seen` holds while `change` is added to it."""
+    found = []
+    for index in np.flatnonzero(plausible):
+        before = words[index]
+        words[index] = int(before) + change
+        try:
+            if seen():
+                found.append(int(index) * words.itemsize)
+        finally:
+            words[index] = before
+    if len(found) != 1:
+        raise RuntimeError(_unknown(f"{len(found)} words of the struct behave like it"))
+    return found[0]

@@ -1,0 +1,1 @@
+"""Moves, rollouts, certificates, and their verification without any oracle."""

@@ -1,0 +1,307 @@
+"""Certificates: what was checked about a scenario, with numbers, so that others can disagree."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import beta
+
+from ..errors import ScengenError, Unstable
+from ..scenario import Plan, Planner, Scenario
+from ..sim import scene_text
+from ..sim.loop import Loop
+from ..sim.world import IDLE, World
+from .level import Level
+from .rollout import Episode, Jitter, Tape, replay, run
+
+Verdict = Literal["certified", "refuted", "unknown"]
+
+CHECKS: dict[str, Verdict] = {
+    "feasible": "refuted",
+    "compiles": "refuted",
+    "overlap": "refuted",
+    "rest": "refuted",
+    "unsolved": "refuted",
+    "idle": "refuted",
+    "shortcuts": "refuted",
+    "solved": "unknown",
+    "robust": "unknown",
+    "numerics": "unknown",
+    "necessity": "refuted",
+    "witness": "unknown",
+}
+"""The checks in the order in which they run, and the verdict when one fails.
+
+A failed check refutes the scenario where it shows, by itself, that this is no fair problem: it cannot be, it does not
+stand still, it solves itself, or it has an easy way. Where only the oracle failed the verdict is unknown."""
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of a certificate."""
+
+    name: str
+    passed: bool | None
+    """None: skipped, which certifies nothing."""
+    reason: str
+    """Why it failed or was skipped; empty when it passed."""
+    settings: Mapping[str, Any]
+    numbers: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """All checks of one scenario."""
+
+    level: str
+    checks: tuple[Check, ...]
+
+    @property
+    def failed(self) -> Check | None:
+        """The first check that did not pass."""
+        return next((c for c in self.checks if not c.passed), None)
+
+    @property
+    def verdict(self) -> Verdict:
+        return CHECKS[self.failed.name] if self.failed else "certified"
+
+    @property
+    def reason(self) -> str:
+        """What stands against the scenario, or nothing."""
+        return f"{self.failed.name}: {self.failed.reason}" if self.failed else ""
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A certificate with the files it speaks of. Texts are empty where the scene was never built."""
+
+    certificate: Certificate
+    scene_xml: str
+    tape: Tape
+    digest: str
+    """Hash of the physics state at the end of the witness."""
+
+
+def certify(scenario: Scenario, horizon: float, level: Level) -> Certified:
+    """Run every check on a scenario, cheap ones first, until one fails.
+
+    Args:
+        scenario: an instance of a family that has an `oracle`.
+        horizon: time limit for reaching the goal [s].
+        level: settings of the checks.
+    """
+    trial = _Trial(scenario, horizon, level)
+    checks: list[Check] = []
+    for name in CHECKS:
+        if checks and not checks[-1].passed:
+            checks.extend(
+                Check(rest, None, "skipped after a failed check", {}, {}) for rest in list(CHECKS)[len(checks) :]
+            )
+            break
+        checks.append(trial.check(name))
+    witness = trial.witness
+    empty = np.zeros((0, 7), np.float32)
+    return Certified(
+        Certificate(level.level, tuple(checks)),
+        trial.text,
+        witness.tape if witness else empty,
+        witness.digest if witness else "",
+    )
+
+
+class _Trial:
+    """What the checks of one scenario share: its text, its world, its witness."""
+
+    def __init__(self, scenario: Scenario, horizon: float, level: Level):
+        self.scenario, self.horizon, self.level = scenario, horizon, level
+        self.text = ""
+        self.witness: Episode | None = None
+
+    def check(self, name: str) -> Check:
+        settings, numbers, reason = getattr(self, f"_{name}")()
+        return Check(name, not reason, reason, settings, numbers)
+
+    # Each check returns its settings, its numbers, and the reason of its failure (empty when it passed).
+
+    def _feasible(self) -> "Finding":
+        refutation = self.scenario.infeasible()
+        return {}, dict(refutation.numbers) if refutation else {}, refutation.reason if refutation else ""
+
+    def _compiles(self) -> "Finding":
+        try:
+            self.text, lost = scene_text.emit(self.scenario.build())
+            if lost:
+                return {}, lost, "the emitted text has lost elements"
+            self.world = World.load(self.text)
+        except (ScengenError, ValueError) as error:
+            return {}, {}, f"the scene does not compile: {_one_line(error)}"
+        counts = {
+            "bodies": self.world.model.nbody,
+            "geoms": self.world.model.ngeom,
+            "coordinates": self.world.model.nq,
+        }
+        return {}, counts, "" if not self.world.warnings else "MuJoCo warns at the start"
+
+    def _overlap(self) -> "Finding":
+        data = self.world.data
+        depth = max((-float(c.dist) for c in data.contact[: data.ncon]), default=0.0)
+        reason = f"bodies overlap by {1000 * depth:.1f} mm" if depth > self.level.overlap else ""
+        return {"overlap": self.level.overlap}, {"deepest": depth}, reason
+
+    def _rest(self) -> "Finding":
+        """Nobody acts; the goal is watched too, at the start and at the end of the time."""
+        world, bars = self.world, self.level.rest
+        self.solved_at_start = self.scenario.success(world)
+        bodies = [b for b in world.free_bodies if b not in self.scenario.MOVING]
+        start = {b: (world.com(b), world.frame(b)) for b in bodies}
+        try:
+            for _ in range(round(bars.seconds / Loop.PERIOD)):
+                self.scenario.script(world)
+                world.step(IDLE)
+        except Unstable as error:
+            return asdict(bars), {}, str(error)
+        self.solved_after_rest = self.scenario.success(world)
+        drift = {b: float(np.linalg.norm(world.com(b) - start[b][0])) for b in bodies}
+        turn = {b: _angle(world.frame(b), start[b][1]) for b in bodies}
+        worst, most = (
+            max(drift, key=drift.__getitem__, default=""),
+            max(turn, key=turn.__getitem__, default=""),
+        )
+        numbers = {"drift": drift.get(worst, 0.0), "turn": turn.get(most, 0.0)}
+        if numbers["drift"] > bars.drift:
+            return asdict(bars), numbers, f"{worst} drifts {1000 * drift[worst]:.1f} mm while nobody acts"
+        if numbers["turn"] > bars.turn:
+            return asdict(bars), numbers, f"{most} turns {turn[most]:.1f} deg while nobody acts"
+        return asdict(bars), numbers, ""
+
+    def _unsolved(self) -> "Finding":
+        if self.solved_at_start:
+            return {}, {}, "the goal already holds at the start"
+        return {}, {}, "the goal holds after settling" if self.solved_after_rest else ""
+
+    def _idle(self) -> "Finding":
+        episode = self._run(_nothing)
+        settings = {"horizon": self.horizon}
+        return settings, _outcome(episode), "doing nothing reaches the goal" if episode.solved else ""
+
+    def _solved(self) -> "Finding":
+        episode = self._run(self.scenario.oracle)  # type: ignore[attr-defined]
+        if not episode.solved:
+            return {"horizon": self.horizon}, _outcome(episode), f"the oracle failed: {episode.reason}"
+        self.witness = episode
+        return {"horizon": self.horizon}, _outcome(episode), ""
+
+    def _shortcuts(self) -> "Finding":
+        episodes = {name: self._run(plan, until_settled=True) for name, plan in self.scenario.shortcuts().items()}
+        numbers = {name: _outcome(e) for name, e in episodes.items()}
+        easy = [name for name, e in episodes.items() if e.solved]
+        return {}, numbers, f"{easy[0]!r} reaches the goal" if easy else ""
+
+    def _robust(self) -> "Finding":
+        bars = self.level.robust
+        size = asdict(bars)
+        failures: list[str] = []
+        for k in range(bars.runs):
+            jitter = Jitter(
+                f"{self.scenario.id}/{k}",
+                bars.position,
+                bars.turn,
+                bars.mass,
+                bars.friction,
+                bars.noise,
+                k % 2 * bars.latency,
+            )
+            episode = run(
+                self.scenario,
+                jitter.disturbed(self.world),
+                self.scenario.oracle,  # type: ignore[attr-defined]
+                self.horizon,
+                self.level.settle,
+                jitter,
+            )
+            if not episode.solved:
+                failures.append(f"run {k}: {episode.reason}")
+        solved = bars.runs - len(failures)
+        bound = lower_bound(solved, bars.runs)
+        numbers = {"runs": bars.runs, "solved": solved, "bound": bound, "failures": failures}
+        reason = (
+            f"{solved} of {bars.runs} jittered runs succeed; {failures[0]}" if bound < bars.bound and failures else ""
+        )
+        if bound < bars.bound and not failures:
+            reason = f"{bars.runs} runs cannot show a bound of {bars.bound:g}; ask for more"
+        return size, numbers, reason
+
+    def _numerics(self) -> "Finding":
+        """The witness with half the time step and with twice the iterations; where it flips, the oracle must do."""
+        assert self.witness is not None
+        half, patient = World.load(self.text, substeps=2 * self.world.loop.substeps), World.load(self.text)
+        patient.model.opt.iterations *= 2
+        numbers: dict[str, Any] = {}
+        for name, world in {"half time step": half, "twice the iterations": patient}.items():
+            kept = replay(self.scenario, world, self.witness.tape, self.horizon, self.level.settle)
+            numbers[name] = {"witness": kept.outcome}
+            if not kept.solved:
+                again = run(self.scenario, world, self.scenario.oracle, self.horizon, self.level.settle)  # type: ignore[attr-defined]
+                numbers[name]["oracle"] = again.outcome
+                if not again.solved:
+                    return {}, numbers, f"at {name} both witness and oracle fail: {again.reason}"
+        return {}, numbers, ""
+
+    def _necessity(self) -> "Finding":
+        assert self.witness is not None
+        numbers = {}
+        for name, scene in self.scenario.without().items():
+            text, _ = scene_text.emit(scene)
+            episode = replay(
+                self.scenario, World.load(text), self.witness.tape, self.horizon, self.level.settle, until_settled=True
+            )
+            numbers[name] = _outcome(episode)
+            if episode.solved:
+                return {}, numbers, f"the witness succeeds with {name!r}"
+        return {}, numbers, ""
+
+    def _witness(self) -> "Finding":
+        """The tape alone, in a freshly loaded world, must end in the same bits."""
+        assert self.witness is not None
+        again = replay(self.scenario, World.load(self.text), self.witness.tape, self.horizon, self.level.settle)
+        settings = {"settle": self.level.settle}
+        numbers = {"periods": len(self.witness.tape), "seconds": self.witness.seconds}
+        if not again.solved:
+            return settings, numbers, f"the tape does not solve the scenario: {again.reason}"
+        return (
+            settings,
+            numbers,
+            "" if again.digest == self.witness.digest else "the replay ends in another state",
+        )
+
+    def _run(self, planner: Planner, until_settled: bool = False) -> Episode:
+        return run(self.scenario, self.world, planner, self.horizon, self.level.settle, until_settled=until_settled)
+
+
+Finding = tuple[Mapping[str, Any], Mapping[str, Any], str]
+
+
+def lower_bound(successes: int, runs: int) -> float:
+    """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
+    return float(beta.ppf(1 - CONFIDENCE, successes, runs - successes + 1)) if successes else 0.0
+
+
+def _nothing(world: World) -> Plan:
+    yield from ()
+
+
+def _outcome(episode: Episode) -> dict[str, Any]:
+    return {"outcome": episode.outcome, "reason": episode.reason, "seconds": episode.seconds}
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    """Angle between two orientations [deg]."""
+    return math.degrees(math.acos(min(1.0, max(-1.0, (float(np.trace(a.T @ b)) - 1.0) / 2.0))))
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,251 @@
+"""Run one plan, or one recorded tape, in one scenario."""
+
+import copy
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GaveUp, Unstable
+from ..samplers.keyed import normal, spread
+from ..scenario import Action, Planner, Scenario
+from ..sim.loop import Loop
+from ..sim.world import World
+from .moves import idle
+
+Outcome = Literal["success", "failure", "timeout", "unstable"]
+Tape = NDArray[np.float32]
+"""Shape (n, 7): one row per control period, exactly as the controller received it."""
+
+STILL = 1e-3
+"""No coordinate of scene or robot may move faster than this [m/s, rad/s] where an episode is called settled."""
+STILL_FOR = 0.5
+"""How long that must last [s]."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What came of a rollout."""
+
+    outcome: Outcome
+    reason: str
+    """Why it is no success; empty for a success."""
+    seconds: float
+    """When the goal was reached, or when the episode ended [s]."""
+    tape: Tape
+    digest: str
+    """Hash of the final physics state."""
+
+    @property
+    def solved(self) -> bool:
+        return self.outcome == "success"
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Small disturbances of a rollout. Which ones is decided by `key` alone."""
+
+    key: str
+    position: float
+    """Largest displacement of a free body in x and in y [m]."""
+    turn: float
+    """Largest turn of a free body about the vertical [deg]."""
+    mass: float
+    """Largest relative change of a free body's mass."""
+    friction: float
+    """Largest relative change of a prop's sliding friction."""
+    noise: float
+    """Standard deviation of the noise on the six motion channels of an action."""
+    latency: int
+    """Control periods by which actions arrive late."""
+
+    def disturbed(self, world: World) -> World:
+        """A world like `world`, with its bodies moved, heavier or lighter, and more or less slippery."""
+        model = copy.copy(world.model)
+        for name in world.free_bodies:
+            body = model.body(name)
+            joint = int(model.body_jntadr[body.id])
+            start = model.qpos0[model.jnt_qposadr[joint] :][:7]
+            start[:2] += (
+                spread(self.position, self.key, name, "x"),
+                spread(self.position, self.key, name, "y"),
+            )
+            turn, turned = np.zeros(4), np.zeros(4)
+            mujoco.mju_axisAngle2Quat(
+                turn, np.array([0.0, 0.0, 1.0]), np.radians(spread(self.turn, self.key, name, "turn"))
+            )
+            mujoco.mju_mulQuat(turned, turn, start[3:7])
+            start[3:7] = turned
+            heavier = 1.0 + spread(self.mass, self.key, name, "mass")
+            rougher = 1.0 + spread(self.friction, self.key, name, "friction")
+            for part in _subtree(model, body.id):
+                model.body_mass[part] *= heavier
+                model.body_inertia[part] *= heavier
+                model.geom_friction[model.geom_bodyid == part, 0] *= rougher
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return World.of(model)
+
+    def shaken(self, action: Action, period: int) -> Action:
+        """The action with noise on its six motion channels."""
+        shake = [self.noise * normal(self.key, "action", period, channel) for channel in range(6)]
+        return np.clip(action + np.array([*shake, 0.0]), -1.0, 1.0)
+
+
+def run(
+    scenario: Scenario,
+    world: World,
+    planner: Planner,
+    horizon: float,
+    settle: float = 1.0,
+    jitter: Jitter | None = None,
+    until_settled: bool = False,
+) -> Episode:
+    """Play a plan from the start of `world` until success, failure or the horizon.
+
+    A success counts only if the goal still holds after `settle` seconds without action. When the plan has ended the
+    robot is left idle.
+
+    Args:
+        horizon: time limit for reaching the goal [s].
+        until_settled: the episode may end once the plan has ended and everything is at rest, provided that the scene
+            has no events of its own.
+    """
+    world.reset()
+    stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
+    return _live(scenario, world, _Planned(world, planner, jitter), horizon, settle, stillness)
+
+
+def replay(
+    scenario: Scenario,
+    world: World,
+    tape: Tape,
+    horizon: float,
+    settle: float = 1.0,
+    until_settled: bool = False,
+) -> Episode:
+    """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
+    world.reset()
+    stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
+    return _live(scenario, world, _Recorded(world, tape), horizon, settle, stillness)
+
+
+def _uneventful(scenario: Scenario) -> bool:
+    return type(scenario).script is Scenario.script
+
+
+class _Planned:
+    """Filtered actions of a plan, with noise and latency if wanted."""
+
+    def __init__(self, world: World, planner: Planner, jitter: Jitter | None):
+        self.world, self.plan, self.jitter = world, planner(world), jitter
+        self.ended, self.note, self.periods = False, "", 0
+        self.late: deque[Action] = deque([idle(world)] * (jitter.latency if jitter else 0))
+
+    def next(self) -> NDArray[np.float32]:
+        """The next action for the controller."""
+        action = self._ask()
+        if self.jitter:
+            self.late.append(self.jitter.shaken(action, self.periods))
+            action = self.late.popleft()
+        self.periods += 1
+        return self.world.filter(action)
+
+    def stop(self) -> None:
+        """Called when the goal has been reached: the rest of the plan is not played."""
+        self.ended = True
+
+    def _ask(self) -> Action:
+        if not self.ended:
+            try:
+                return next(self.plan)
+            except StopIteration:
+                self.ended = True
+            except GaveUp as error:
+                self.ended, self.note = True, str(error)
+        return idle(self.world)
+
+
+class _Recorded:
+    """The rows of a tape, then idleness. A tape holds what its author did while the scene settled."""
+
+    note = ""
+
+    def __init__(self, world: World, tape: Tape):
+        self.world, self.rows, self.ended = world, iter(np.asarray(tape, np.float32)), False
+
+    def next(self) -> NDArray[np.float32]:
+        """The next action for the controller."""
+        row = next(self.rows, None)
+        self.ended = row is None
+        return idle(self.world).astype(np.float32) if row is None else row
+
+    def stop(self) -> None:
+        """Called when the goal has been reached; a tape goes on."""
+
+
+class _Stillness:
+    """Watches whether everything has come to rest after the actions have ended."""
+
+    def __init__(self, world: World):
+        self.world, self.periods = world, 0
+
+    def lasts(self) -> bool:
+        moving = np.abs(self.world.data.qvel).max() >= STILL
+        self.periods = 0 if moving else self.periods + 1
+        return self.periods * Loop.PERIOD >= STILL_FOR
+
+
+def _live(
+    scenario: Scenario,
+    world: World,
+    source: _Planned | _Recorded,
+    horizon: float,
+    settle: float,
+    stillness: _Stillness | None,
+) -> Episode:
+    tape: list[NDArray[np.float32]] = []
+
+    def ended(outcome: Outcome, reason: str = "", at: float | None = None) -> Episode:
+        rows = np.array(tape, np.float32).reshape(-1, 7)
+        return Episode(outcome, reason, round(world.time if at is None else at, 6), rows, world.digest)
+
+    def period() -> str | None:
+        """Live one control period. Returns the reason of a failure."""
+        action = source.next()
+        scenario.script(world)
+        world.follow(action)
+        tape.append(action)
+        return scenario.failure(world)
+
+    try:
+        held = 0.0
+        while held == 0.0 or held < scenario.HOLD - 1e-9:
+            if world.time > horizon - 1e-9:
+                return ended("timeout", source.note or f"the goal was not reached in {horizon:g} s")
+            if reason := period():
+                return ended("failure", reason)
+            held = held + Loop.PERIOD if scenario.success(world) else 0.0
+            if stillness and source.ended and not held and stillness.lasts():
+                return ended("timeout", source.note or "everything came to rest without reaching the goal")
+        reached = world.time
+        source.stop()
+        for _ in range(round(settle / Loop.PERIOD)):
+            if reason := period():
+                return ended("failure", f"after the goal was reached: {reason}")
+        if not scenario.success(world):
+            return ended("timeout", f"the goal was reached but did not hold for {settle:g} s")
+        return ended("success", at=reached)
+    except Unstable as error:
+        return ended("unstable", str(error))
+
+
+def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
+    """A body and everything that hangs on it."""
+    parts = [root]
+    for body in range(root + 1, model.nbody):
+        if int(model.body_parentid[body]) in parts:
+            parts.append(body)
+    return parts
