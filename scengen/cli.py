@@ -154,7 +154,7 @@ def show(arguments: Arguments) -> int:
         if target:
             if target.suffix != ".png":
                 raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
-            _write(target, render.encode(render.strip(row["scene_xml"], row["witness"]), "png"))
+            _write(target, render.encode(render.strip(row["scene_xml"], row["embodiment"], row["witness"]), "png"))
     if target:
         out.print(f"wrote {target}", highlight=False)
     return OK

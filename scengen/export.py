@@ -25,13 +25,13 @@ def export(row: Row, folder: Path, robot: bool) -> None:
         target.mkdir(parents=True, exist_ok=True)
         (target / "scene.xml").write_text(row["scene_xml"])
         if robot:
-            (target / "scene_with_robot.xml").write_text(_with_robot(row["scene_xml"], target))
+            (target / "scene_with_robot.xml").write_text(_with_robot(row, target))
     except OSError as error:
         raise BadConfig(f"{target} cannot be written: {error.strerror}") from None
 
 
-def _with_robot(scene_xml: str, target: Path) -> str:
-    spec = compose(scene_xml, visual=True)
+def _with_robot(row: Row, target: Path) -> str:
+    spec = compose(row["scene_xml"], row["embodiment"], visual=True)
     meshes = target / "meshes"
     meshes.mkdir(exist_ok=True)
     for mesh in spec.meshes:

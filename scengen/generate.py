@@ -110,7 +110,7 @@ def attempt(task: Task, split: str, seed: int, index: int, level: Level, keep: t
     except Infeasible as error:
         why = max(error.reasons, key=error.reasons.__getitem__)
         return Record(index, "refuted", "feasible", why, error.tries, error.reasons, None, time.process_time() - start)
-    certified = certify(draw.scenario, task.horizon, level)
+    certified = certify(draw.scenario, task.horizon, level, task.embodiment)
     certificate = certified.certificate
     failed = certificate.failed
     row = row_of(task, draw, certified) if certificate.verdict in ("certified", *keep) else None

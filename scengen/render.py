@@ -58,22 +58,22 @@ class Camera:
 
 
 @contextmanager
-def camera(scene_xml: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
+def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
     """A camera on the start of a scene, with the robot's visual meshes.
 
     Raises:
         NoPictures: OpenGL is missing.
     """
-    view = Camera(World.load(scene_xml, visual=True), width, height)
+    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height)
     try:
         yield view
     finally:
         view.close()
 
 
-def strip(scene_xml: str, tape: Tape, frames: int = 8, width: int = 320, height: int = 240) -> Picture:
+def strip(scene_xml: str, embodiment: str, tape: Tape, frames: int = 8, width: int = 320, height: int = 240) -> Picture:
     """A film strip: pictures at equal times from the start to the end of a tape, in rows of four."""
-    with camera(scene_xml, width, height) as view:
+    with camera(scene_xml, embodiment, width, height) as view:
         times = np.linspace(0, len(tape), frames).round().astype(int)
         pictures, done = [], 0
         for time in times:

@@ -11,7 +11,7 @@ import jinja2
 from rich.table import Table
 
 from . import render
-from .generate import Summary
+from .generate import STAGES, Summary
 from .ood.axis import spell
 from .pool import Pool, Row
 from .samplers.dists import Fixed
@@ -22,7 +22,8 @@ def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table
     """How many draws got through each step, and what stopped the others."""
     table = Table("step", "left", "lost", "share", title="funnel", title_justify="left")
     before = None
-    for stage, count in funnel.items():
+    for stage in ("proposed", *STAGES):
+        count = funnel[stage]
         lost = "" if before is None or before == count else str(before - count)
         table.add_row(stage, str(count), lost, f"{count / max(1, funnel['proposed']):.0%}")
         before = count
@@ -121,7 +122,15 @@ def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
                 except render.NoPictures as error:
                     remark = str(error)
             cards.append({"row": row, "picture": picture, "params": json.loads(row["params"])})
-        sections.append({"pool": pool, "manifest": pool.manifest, "cards": cards, "rest": max(0, len(pool) - images)})
+        sections.append(
+            {
+                "pool": pool,
+                "manifest": pool.manifest,
+                "steps": ("proposed", *STAGES),
+                "cards": cards,
+                "rest": max(0, len(pool) - images),
+            }
+        )
     environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "templates"), autoescape=True)
     page = environment.get_template("contact_sheet.html").render(sections=sections, remark=remark)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -131,7 +140,7 @@ def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
 
 def thumbnail(row: Row, width: int = 320, height: int = 240) -> str:
     """A picture of the start of a scenario, as a data address for HTML."""
-    with render.camera(row["scene_xml"], width, height) as view:
+    with render.camera(row["scene_xml"], row["embodiment"], width, height) as view:
         return "data:image/webp;base64," + base64.b64encode(render.encode(view.take())).decode()
 
 

@@ -21,7 +21,8 @@ BALL_RADIUS = 0.02
 
 def scene(timestep: float = 0.002) -> mujoco.MjSpec:
     """A table with a small ball 1 mm above it, whose bounce takes 2 pi / 2 / 500 = 6 ms, and a box near the
-    hand."""
+    hand.
+    """
     spec = mujoco.MjSpec()
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -237,9 +238,7 @@ def test_other_wrong_input_is_refused_with_a_remedy(shared: Loop) -> None:
         Loop(model, mujoco.MjData(model))
 
 
-def test_an_unstable_simulation_raises_the_count(
-    shared: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_instability_raises_the_count(shared: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log file beside the caller
     shared.reset()
     assert shared.tick(TAPE[0]) == 0

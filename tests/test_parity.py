@@ -4,7 +4,8 @@ Two differences are known. robosuite's controller looks at the arm once before i
 posture, and uses that stale Jacobian and inertia in the first physics step after a reset; ours does not
 (`cleared` below removes it from robosuite's side). And robosuite inverts with LAPACK where we factorise, so
 that the last bits differ; they stay the last bits until a contact has to choose, such as the number of points
-where the empty jaw meets itself."""
+where the empty jaw meets itself.
+"""
 
 import logging
 from collections.abc import Iterator

@@ -6,8 +6,8 @@ far, and joint torques pull the grip site to it. Once per control period `set_go
 `apply`, between mj_step1 and mj_step2. Formulas and their order follow robosuite, float32 rounding of the
 rotation included.
 
-Symbols: J Jacobian of the grip site, M joint-space inertia, Lambda = (J M^-1 J^T)^-1 inertia felt at the
-site."""
+Symbols: J Jacobian of the grip site, M joint-space inertia, Lambda = (J M^-1 J^T)^-1 inertia at the site.
+"""
 
 import math
 
@@ -68,8 +68,7 @@ STATE = np.dtype(
         ("posture", np.float64, (JOINTS,)),
     ]
 )
-"""What the controller remembers: goal in the base frame [m], jaw command in [-1, 1], initial joint angles
-[rad]."""
+"""What the controller remembers: goal in the base frame [m], jaw command in [-1, 1], initial angles [rad]."""
 
 WORK = np.dtype(
     [
@@ -204,7 +203,8 @@ def _rotation(x: float, y: float, z: float, out: NDArray[np.float64]) -> None:
 @njit(cache=True)
 def _move_jaw(state: np.record, command: float) -> None:
     """One period of the jaw's ramp (PandaGripper.format_action): only the sign of `command` counts; +
-    closes."""
+    closes.
+    """
     change = JAW_SPEED * np.sign(command)
     state.jaw[0] = clip(state.jaw[0] - change, -1.0, 1.0)
     state.jaw[1] = clip(state.jaw[1] + change, -1.0, 1.0)
@@ -227,7 +227,8 @@ def _jacobian(at: np.record, J: NDArray[np.float64]) -> None:
 @njit(cache=True)
 def _joint_inertia(at: np.record, M: NDArray[np.float64]) -> None:
     """The arm's block of the inertia matrix [kg m^2], shape (7, 7). A row of qM lists joint i, i - 1, ...,
-    0."""
+    0.
+    """
     for i in range(JOINTS):
         row = float64s(at.qM + 8 * at.row[i], i + 1)
         for k in range(i + 1):
@@ -250,7 +251,8 @@ def _task_inertia(work: np.record) -> None:
 @njit(cache=True)
 def _task_acceleration(at: np.record, state: np.record, work: np.record) -> None:
     """Wanted acceleration of the grip site in the world [m/s^2, rad/s^2], shape (6,): kp error - kd
-    velocity."""
+    velocity.
+    """
     grip_pos, grip_rot = float64s(at.grip_pos, 3), float64s(at.grip_rot, (3, 3))
     base_pos, base_rot = float64s(at.base_pos, 3), float64s(at.base_rot, (3, 3))
     _multiply(base_rot, state.goal_rot, work.world_rot)
@@ -296,7 +298,8 @@ def _posture_acceleration(at: np.record, state: np.record, work: np.record) -> N
 @njit(cache=True)
 def _write_torques(at: np.record, work: np.record) -> None:
     """ctrl of the arm motors [N m]: J^T wrench + M a + gravity and Coriolis forces, clipped to their
-    range."""
+    range.
+    """
     bias = float64s(at.qfrc_bias, JOINTS)
     for i in range(JOINTS):
         torque = bias[i] + dot(work.M[i], work.joint)

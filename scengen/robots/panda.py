@@ -2,7 +2,8 @@
 
 robosuite itself is never imported: that is slow and wants GL libraries. Names, masses, poses and everything
 that robosuite sets in Python instead of XML are the same as in its compiled environments; a test compares
-them all."""
+them all.
+"""
 
 import functools
 import importlib.util
@@ -22,8 +23,7 @@ FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
 """Finger positions after a reset [m], shape (2,): robosuite PandaGripper.init_qpos."""
 
 BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
-"""Base position [m], shape (3,): Panda.base_xpos_offset for a table 0.8 m long (-0.16 - 0.8 / 2), on the
-mount."""
+"""Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), on a mount."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
 """Base orientation (wxyz): robosuite leaves a single arm unturned, facing +x."""
 MOUNT: NDArray[np.float64] = np.array([0.0, 0.0, 0.01])
@@ -49,7 +49,8 @@ Turning joint 3, 5 or 7 moves nothing along its own axis, so each of these stret
 * wrist to grip site: 0.088 across the axis of joint 7, then 0.1065 (hand) + 0.097 (eef) along it.
 
 Joint limits are ignored, so the bound is not attained. It speaks of the grip site; the fingertips are 1 cm
-farther. """
+farther.
+"""
 
 
 def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
@@ -57,12 +58,12 @@ def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
 
     Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times
     faster. It then lacks the wrist's force and torque sensors too, which cost 4 % of a step and influence
-    nothing; sites and cameras cost nothing that can be measured, and stay."""
+    nothing; sites and cameras cost nothing that can be measured, and stay.
+    """
     arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), _jaw(visual).copy()
-    # Arm first: what is attached to it before it is in the scene gets its prefix as well (robot0_gripper0_ ...).
-    scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist()).attach_body(
-        arm.body("base"), "robot0_", ""
-    )
+    # Arm first: what is attached to it before it is in the scene gets its prefix too (robot0_gripper0_ ...).
+    place = scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist())
+    place.attach_body(arm.body("base"), "robot0_", "")
     base, wrist = scene.body("robot0_base"), scene.body("robot0_right_hand")
     base.add_frame().attach_body(mount.body("base"), "fixed_mount0_", "")
     wrist.add_frame().attach_body(hand.body("right_gripper"), "gripper0_right_", "")
@@ -112,13 +113,11 @@ def _assets() -> Path:
     """The folder of MJCF files inside the installed robosuite package."""
     found = importlib.util.find_spec("robosuite")
     if found is None or not found.submodule_search_locations:
-        raise RuntimeError(
-            "robosuite is not installed, and the robot's files are in it: pip install robosuite==1.5.2"
-        )
+        raise RuntimeError("robosuite, whose files are the robot, is missing: pip install robosuite==1.5.2")
     return Path(next(iter(found.submodule_search_locations))) / "models" / "assets"
 
 
-FOLDERS = {"gripper0_": "grippers", "robot0_fixed_mount0_": "bases", "robot0_": "robots/panda"}
+FOLDERS = {"gripper0_": "grippers", "fixed_mount0_": "bases", "robot0_": "robots/panda"}
 """Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""
 
 
@@ -129,8 +128,7 @@ def mesh_file(mesh: mujoco.MjsMesh) -> Path:
 
 
 def strip_visual(spec: mujoco.MjSpec) -> None:
-    """Delete geoms that are only looked at (group 1, no collisions), then unused meshes, materials and
-    textures.
+    """Delete geoms that are only looked at (group 1, no collisions) and the assets that nothing uses then.
 
     Raises ValueError where such a geom gives its body inertia, because then the physics would change.
     """
@@ -138,8 +136,8 @@ def strip_visual(spec: mujoco.MjSpec) -> None:
         if geom.group == 1 and geom.contype == 0 and geom.conaffinity == 0:
             if _weighs(spec, geom):
                 raise ValueError(
-                    f"visual geom {geom.name!r} gives body {geom.parent.name!r} inertia and cannot be stripped; "
-                    "set its mass to 0 or give the body explicit inertia"
+                    f"visual geom {geom.name!r} gives body {geom.parent.name!r} inertia and cannot be "
+                    "stripped; set its mass to 0 or give the body explicit inertia"
                 )
             spec.delete(geom)
     meshes = {geom.meshname for geom in spec.geoms}

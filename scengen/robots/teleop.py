@@ -16,7 +16,8 @@ class Filter:
     """Exponential moving average of the six motion channels, then a limit on the change per step.
 
     Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs beyond [-1,
-    1] are clipped first, so that outputs never leave it. One object filters one stream of actions."""
+    1] are clipped first, so that outputs never leave it. One object filters one stream of actions.
+    """
 
     def __init__(self) -> None:
         self._state = np.zeros(MOTION)
@@ -24,7 +25,8 @@ class Filter:
 
     def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
         """The filtered action, shape (7,): float32, exactly what the controller receives and a witness
-        records."""
+        records.
+        """
         given = np.asarray(action, np.float64)
         if given.shape != (MOTION + 1,):
             raise ValueError(f"an action has shape ({MOTION + 1},), not {given.shape}")

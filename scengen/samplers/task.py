@@ -12,6 +12,7 @@ from ..errors import BadConfig, Infeasible, UnknownName, nearest
 from ..ood.axis import Axis, Proof
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Scenario
+from ..sim.world import EMBODIMENTS, JAW
 from .dists import Dist, Fixed, parse
 from .keyed import unit
 
@@ -21,7 +22,6 @@ TRIES = 100
 """Draws of one index before the distribution is called infeasible."""
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
 OPTIONAL = ("axes", "certify", "embodiment")
-EMBODIMENTS = ("panda_jaw",)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         str(node["category"]),
         str(node["instruction"]),
         _positive(f"{name}.horizon", node["horizon"]),
-        _embodiment(name, node.get("embodiment", EMBODIMENTS[0])),
+        _embodiment(name, node.get("embodiment", JAW)),
         training,
         axes,
         node.get("certify") or {},

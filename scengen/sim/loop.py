@@ -1,5 +1,4 @@
-"""The control loop of one Panda: filtered actions in, physics and contact history out, all in compiled
-code."""
+"""The control loop of one Panda, compiled: filtered actions in, physics and history of contacts out."""
 
 import mujoco
 import numpy as np
@@ -42,7 +41,8 @@ class Loop:
 
     After every call the poses in `data` (xpos, xquat, site_xpos ...) are those of the current qpos;
     velocities, sensors and contacts in it are those of the last physics step, 2 ms before, as in robosuite.
-    It is safe to change `data` between two periods: each begins with a fresh mj_step1."""
+    It is safe to change `data` between two periods: each begins with a fresh mj_step1.
+    """
 
     PERIOD = 0.01
     """Control period [s]: the paper's 100 Hz."""
@@ -64,9 +64,7 @@ class Loop:
                 "set option.timestep to 0.002"
             )
         if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-            raise ValueError(
-                "the control loop cannot split a Runge-Kutta step; set option.integrator to Euler"
-            )
+            raise ValueError("a Runge-Kutta step cannot be controlled; set option.integrator to Euler")
         self.model, self.data = model, data
         self.home = np.array(home, dtype=np.float64)
         if self.home.shape != (JOINTS,):
@@ -84,8 +82,7 @@ class Loop:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: `home`, fingers half open, nothing touched. Bit for bit the same as a fresh
-        loop."""
+        """Back to the start: `home`, jaw half open, nothing touched. Bit for bit the same as a fresh loop."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._memory["at"]["angle"][0]] = self.home
         self.data.qpos[self._fingers] = FINGERS
@@ -134,14 +131,10 @@ class Loop:
 
     def restore(self, state: NDArray[np.float64]) -> None:
         """Return to a `state()` of this scene and continue from it bit for bit."""
-        parts = np.cumsum(
-            [
-                mujoco.mj_stateSize(self.model, INTEGRATION),
-                self._controller().size,
-                -(-self._latches.size // 8),
-            ]
-        )
         warnings = self._warnings()
+        packed = -(-self._latches.size // 8)
+        physics_size = mujoco.mj_stateSize(self.model, INTEGRATION)
+        parts = np.cumsum([physics_size, self._controller().size, packed])
         if np.shape(state) != (parts[-1] + warnings.size,):
             raise ValueError(
                 f"a state of this scene has shape ({parts[-1] + warnings.size},), not {np.shape(state)}; "
@@ -154,8 +147,8 @@ class Loop:
         # Forward dynamics may leave its own mark on the warm start; the state has the last word.
         mujoco.mj_setState(self.model, self.data, physics, INTEGRATION)
         self._controller()[:] = controller
-        packed = latches.astype(np.uint8)
-        self._latches[:] = np.unpackbits(packed, count=self._latches.size).reshape(self._latches.shape)
+        bits = np.unpackbits(latches.astype(np.uint8), count=self._latches.size)
+        self._latches[:] = bits.reshape(self._latches.shape)
         warnings[:] = counts.astype(np.int32)
 
     def _controller(self) -> NDArray[np.float64]:
@@ -190,7 +183,8 @@ def _owners(model: mujoco.MjModel) -> NDArray[np.int32]:
 @njit(nogil=True, cache=True)
 def _tick(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray) -> int:
     """One control period; the number of warnings, or -1 for an action that is not finite, then nothing is
-    done."""
+    done.
+    """
     for i in range(ACTION):
         if not np.isfinite(action[i]):
             return -1
@@ -221,7 +215,8 @@ def _replay(memory: NDArray, owner: NDArray, latches: NDArray, tape: NDArray, re
 @njit(cache=True)
 def _substep(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray, first: bool) -> None:
     """One physics step under control; the first of a period moves the goal, from the pose mj_step1
-    computed."""
+    computed.
+    """
     scene, at, state, work = memory[0].scene, memory[0].at, memory[0].state, memory[0].work
     native.step1(scene.model, scene.data)
     if first:

@@ -4,7 +4,8 @@ numba resolves `mj_step1` and friends as plain external symbols, so that a whole
 the interpreter and without its lock, and the result is cached on disk like any other compiled function. The
 price is that an address must stay valid: keep model and data alive, and take addresses anew for every new
 MjData. The arrays of mjData have fixed addresses, except what lives in its arena (contacts, constraints),
-which moves."""
+which moves.
+"""
 
 import ctypes
 import functools
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import llvmlite.binding as llvm
 import mujoco
 import numpy as np
-from numba import carray, njit, types
+from numba import carray, njit, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.types import ExternalFunction
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -25,9 +26,7 @@ def _library() -> Path:
     """The shared library that the bindings have already loaded."""
     found = sorted(Path(mujoco.__file__).parent.glob("libmujoco.so*"))
     if not found:
-        raise RuntimeError(
-            f"mujoco {mujoco.__version__} has no libmujoco.so beside it; only its Linux wheel is supported"
-        )
+        raise RuntimeError("mujoco has no libmujoco.so beside it; install its Linux wheel, mujoco==3.5.0")
     return found[0]
 
 
@@ -99,7 +98,8 @@ def layout() -> Layout:
     """The layout of this version of MuJoCo, found by experiment once per process.
 
     Two scenes with different numbers of contacts must agree. The number of contacts is the word that the
-    bindings follow when it is changed for a moment, the pointer the one that libmujoco follows."""
+    bindings follow when it is changed for a moment, the pointer the one that libmujoco follows.
+    """
     first, second = _locate(*_sunken_balls(2)), _locate(*_sunken_balls(3))
     if first != second:
         raise RuntimeError(_unknown(f"two scenes disagree: {first} and {second}"))
@@ -122,17 +122,14 @@ def warnings(address, stride, kinds):
 
 
 def silence() -> None:
-    """Stop MuJoCo from printing warnings and writing MUJOCO_LOG.TXT, in the whole process; they stay
-    counted."""
-    # The handler takes a C string and its result is ignored: strlen does that and nothing else, without the lock.
+    """Stop MuJoCo, process-wide, from printing warnings and writing MUJOCO_LOG.TXT; they stay counted."""
+    # The handler takes a C string and its result is ignored: strlen does that, and nothing else.
     handler = ctypes.cast(ctypes.CDLL(None).strlen, ctypes.c_void_p)
     ctypes.c_void_p.in_dll(ctypes.CDLL(str(_library())), "mju_user_warning").value = handler.value
 
 
 def _unknown(detail: str) -> str:
-    return (
-        f"cannot find the contacts in mjData of mujoco {mujoco.__version__} ({detail}); install mujoco==3.5.0"
-    )
+    return f"no contacts found in mjData of mujoco {mujoco.__version__} ({detail}); install mujoco==3.5.0"
 
 
 def _sunken_balls(n: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -169,9 +166,8 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
 
     counts, pointers = _words(data, np.dtype(np.int32)), _words(data, np.dtype(np.uintp))
     ncon = _followed(counts, counts == data.ncon, -1, lambda: data.ncon == len(dist) - 1)
-    contact = _followed(
-        pointers, (pointers <= near) & (pointers > near - stride), stride, lambda: first_force() == second
-    )
+    at_contacts = (pointers <= near) & (pointers > near - stride)
+    contact = _followed(pointers, at_contacts, stride, lambda: first_force() == second)
     start = near - int(pointers[contact // pointers.itemsize])
     return Layout(ncon, contact, stride, start, start + geom.ctypes.data - near)
 

@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import mujoco
@@ -25,8 +26,13 @@ IDLE: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0])
 """No motion, gripper open: what doing nothing means from the start."""
 
 
-def compose(scene_xml: str, visual: bool = False) -> mujoco.MjSpec:
-    """The scene of a pool with the Panda added; without visual geometry unless asked for.
+JAW = "panda_jaw"
+EMBODIMENTS: dict[str, Callable[[mujoco.MjSpec, bool], None]] = {JAW: panda.attach}
+"""The robots that a task may ask for, and how each is added to a scene, with or without visual geometry."""
+
+
+def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjSpec:
+    """The scene of a pool with its robot added; without visual geometry unless asked for.
 
     The text is what counts: it is parsed anew, so that exactly the scene on disk is simulated.
     """
@@ -34,7 +40,7 @@ def compose(scene_xml: str, visual: bool = False) -> mujoco.MjSpec:
     scene = mujoco.MjSpec.from_string(scene_xml)
     if not visual:
         panda.strip_visual(scene)
-    panda.attach(scene, visual=visual)
+    EMBODIMENTS[embodiment](scene, visual)
     return scene
 
 
@@ -50,15 +56,16 @@ class World:
     """The gripper command of the last action: -1 open, 1 closed."""
 
     @classmethod
-    def load(cls, scene_xml: str, visual: bool = False, substeps: int | None = None) -> "World":
+    def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> "World":
         """Compile a scene text with the robot and put everything at its start.
 
         Args:
             scene_xml: MJCF of the scene, robot not included.
+            embodiment: one of `EMBODIMENTS`.
             visual: keep visual geometry, for rendering; the physics is the same, bit by bit.
             substeps: physics steps in a control period of 10 ms, instead of the scene's own time step.
         """
-        spec = compose(scene_xml, visual)
+        spec = compose(scene_xml, embodiment, visual)
         if substeps is not None:
             spec.option.timestep = Loop.PERIOD / substeps
         return cls.of(spec.compile())
@@ -136,9 +143,7 @@ class World:
     def velocity(self, body: str) -> NDArray[np.float64]:
         """Angular [rad/s] and linear [m/s] velocity of a body's centre of mass, world axes, shape (6,)."""
         velocity = np.zeros(6)
-        mujoco.mj_objectVelocity(
-            self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, self.body(body), velocity, 0
-        )
+        mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, self.body(body), velocity, 0)
         return velocity
 
     def touching(self, a: str, b: str) -> bool:

@@ -12,7 +12,7 @@ from ..errors import ScengenError, Unstable
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.loop import Loop
-from ..sim.world import IDLE, World
+from ..sim.world import IDLE, JAW, World
 from .level import Level
 from .rollout import Episode, Jitter, Tape, replay, run
 
@@ -86,15 +86,16 @@ class Certified:
     """Hash of the physics state at the end of the witness."""
 
 
-def certify(scenario: Scenario, horizon: float, level: Level) -> Certified:
+def certify(scenario: Scenario, horizon: float, level: Level, embodiment: str = JAW) -> Certified:
     """Run every check on a scenario, cheap ones first, until one fails.
 
     Args:
         scenario: an instance of a family that has an `oracle`.
         horizon: time limit for reaching the goal [s].
         level: settings of the checks.
+        embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
     """
-    trial = _Trial(scenario, horizon, level)
+    trial = _Trial(scenario, horizon, level, embodiment)
     checks: list[Check] = []
     for name in CHECKS:
         if checks and not checks[-1].passed:
@@ -116,8 +117,8 @@ def certify(scenario: Scenario, horizon: float, level: Level) -> Certified:
 class _Trial:
     """What the checks of one scenario share: its text, its world, its witness."""
 
-    def __init__(self, scenario: Scenario, horizon: float, level: Level):
-        self.scenario, self.horizon, self.level = scenario, horizon, level
+    def __init__(self, scenario: Scenario, horizon: float, level: Level, embodiment: str):
+        self.scenario, self.horizon, self.level, self.embodiment = scenario, horizon, level, embodiment
         self.text = ""
         self.witness: Episode | None = None
 
@@ -136,7 +137,7 @@ class _Trial:
             self.text, lost = scene_text.emit(self.scenario.build())
             if lost:
                 return {}, lost, "the emitted text has lost elements"
-            self.world = World.load(self.text)
+            self.world = self._load()
         except (ScengenError, ValueError) as error:
             return {}, {}, f"the scene does not compile: {_one_line(error)}"
         counts = {
@@ -238,7 +239,7 @@ class _Trial:
     def _numerics(self) -> "Finding":
         """The witness with half the time step and with twice the iterations; where it flips, the oracle must do."""
         assert self.witness is not None
-        half, patient = World.load(self.text, substeps=2 * self.world.loop.substeps), World.load(self.text)
+        half, patient = self._load(substeps=2 * self.world.loop.substeps), self._load()
         patient.model.opt.iterations *= 2
         numbers: dict[str, Any] = {}
         for name, world in {"half time step": half, "twice the iterations": patient}.items():
@@ -257,7 +258,12 @@ class _Trial:
         for name, scene in self.scenario.without().items():
             text, _ = scene_text.emit(scene)
             episode = replay(
-                self.scenario, World.load(text), self.witness.tape, self.horizon, self.level.settle, until_settled=True
+                self.scenario,
+                World.load(text, self.embodiment),
+                self.witness.tape,
+                self.horizon,
+                self.level.settle,
+                until_settled=True,
             )
             numbers[name] = _outcome(episode)
             if episode.solved:
@@ -267,7 +273,7 @@ class _Trial:
     def _witness(self) -> "Finding":
         """The tape alone, in a freshly loaded world, must end in the same bits."""
         assert self.witness is not None
-        again = replay(self.scenario, World.load(self.text), self.witness.tape, self.horizon, self.level.settle)
+        again = replay(self.scenario, self._load(), self.witness.tape, self.horizon, self.level.settle)
         settings = {"settle": self.level.settle}
         numbers = {"periods": len(self.witness.tape), "seconds": self.witness.seconds}
         if not again.solved:
@@ -277,6 +283,9 @@ class _Trial:
             numbers,
             "" if again.digest == self.witness.digest else "the replay ends in another state",
         )
+
+    def _load(self, substeps: int | None = None) -> World:
+        return World.load(self.text, self.embodiment, substeps=substeps)
 
     def _run(self, planner: Planner, until_settled: bool = False) -> Episode:
         return run(self.scenario, self.world, planner, self.horizon, self.level.settle, until_settled=until_settled)

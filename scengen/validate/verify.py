@@ -119,7 +119,7 @@ def _replayed(row: Row, scenario: Scenario) -> tuple[list[str], bool]:
     )
     if not isinstance(settle, (int, float)):
         return ["the certificate does not say how long the goal must hold"], False
-    episode = replay(scenario, World.load(row["scene_xml"]), row["witness"], row["horizon"], settle)
+    episode = replay(scenario, World.load(row["scene_xml"], row["embodiment"]), row["witness"], row["horizon"], settle)
     if not episode.solved:
         return [f"the witness fails: {episode.reason}"], False
     same = episode.digest == row["certificate"]["final_state"]
