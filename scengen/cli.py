@@ -13,6 +13,7 @@ from . import config
 from .config import conf_dir, read, tasks, typed
 from .errors import BadConfig, ScengenError, nearest
 from .progress import Bar
+from .sim import native
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 out, err = Console(soft_wrap=False), Console(stderr=True, soft_wrap=True)
@@ -27,6 +28,7 @@ def main() -> None:
 
 def run(argv: Sequence[str]) -> int:
     """Run one verb: 0 all well, 1 something did not hold, 2 bad input."""
+    native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     try:
         if not argv or argv[0] in ("-h", "--help", "help"):
             out.print(_help(), highlight=False)

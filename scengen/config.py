@@ -52,6 +52,9 @@ def read(verb: str, overrides: Sequence[str]) -> Composed:
     node, choices = _compose(verb, overrides)
     plain: dict[str, Any] = OmegaConf.to_container(node, resolve=True)  # type: ignore[assignment]
     settings = {k: v for k, v in plain.items() if k not in ("task", "certify")}
+    for key, value in settings.items():
+        if value == "???":
+            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
     task = load(choices["task"], plain["task"]) if "task" in plain else None
     level = Level()
     if "certify" in plain:
@@ -130,9 +133,10 @@ def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str,
 
 
 def _listed(override: str) -> str:
-    """`keep=refuted,unknown` and `pool=a,b` mean lists here, not sweeps."""
+    """`keep=refuted,unknown` and `pool=a,b` mean lists here, not sweeps; `keep` always is one."""
     key, _, value = override.partition("=")
-    return f"{key}=[{value}]" if key in ("keep", "pool") and "," in value and not value.startswith("[") else override
+    many = key == "keep" or (key == "pool" and "," in value)
+    return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 
 def _settle(node: dict[str, Any], task: Task | None, choice: str) -> dict[str, Any]:
@@ -159,8 +163,9 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
     if match := re.search(r"Could not find '(\w+)/([^']*)'", text):
         group, name = match.groups()
         return UnknownName(group, name, re.findall(r"^\s+(\S+)$", text, re.M))
-    if "You must specify 'task'" in text:
-        return BadConfig(f"which task? say task=<name>; known: {', '.join(tasks())}")
+    if match := re.search(r"You must specify '(\w+)'", text):
+        known = ", ".join(re.findall(r"^\s+(\S+)$", text, re.M))
+        return BadConfig(f"which {match[1]}? say {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
         return _unknown_key(verb, overrides, match[1]) or BadConfig(_first_lines(text))
     for override in overrides:

@@ -1,6 +1,7 @@
 """Scenes as files that plain MuJoCo opens from anywhere."""
 
 import shutil
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import mujoco
@@ -12,9 +13,9 @@ from .sim.world import compose
 
 
 def export(row: Row, folder: Path, robot: bool) -> None:
-    """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml and its meshes.
+    """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
 
-    Paths inside the files are relative, so that the folder can be moved. In scene_with_robot.xml the robot stands as
+    The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In scene_with_robot.xml the robot stands as
     after a reset, in the key frame "home".
 
     Raises:
@@ -32,16 +33,17 @@ def export(row: Row, folder: Path, robot: bool) -> None:
 
 def _with_robot(row: Row, target: Path) -> str:
     spec = compose(row["scene_xml"], row["embodiment"], visual=True)
-    meshes = target / "meshes"
-    meshes.mkdir(exist_ok=True)
-    for mesh in spec.meshes:
-        if mesh.file:
-            source = panda.mesh_file(mesh)
-            shutil.copyfile(source, meshes / f"{mesh.name}{source.suffix}")
-            mesh.file = f"meshes/{mesh.name}{source.suffix}"
-    spec.modelfiledir = str(target)
     _add_home(spec)
-    return spec.to_xml()
+    root = ET.fromstring(spec.to_xml())
+    meshes = target.parent / "meshes"
+    meshes.mkdir(exist_ok=True)
+    for mesh in root.iterfind("asset/mesh[@file]"):
+        source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
+        copy = meshes / f"{mesh.attrib['name']}{source.suffix}"
+        if not copy.exists():
+            shutil.copyfile(source, copy)
+        mesh.set("file", f"../meshes/{copy.name}")
+    return ET.tostring(root, encoding="unicode")
 
 
 def _add_home(spec: mujoco.MjSpec) -> None:

@@ -11,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from .errors import ScengenError
+from .sim import native
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -66,6 +67,7 @@ def each(
 def _prepare(begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     """Leave interrupts to the parent, and die with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    native.silence()
     threading.Thread(target=_die_with_parent, daemon=True).start()
     if begin:
         begin(*arguments)

@@ -32,10 +32,8 @@ class Parameter:
     """Values that differ by this much are the same scene, e.g. 180 for the yaw of a slab [unit]."""
     hidden: bool
     """Whether nobody may read the value off the scene's geometry, colours or names."""
-
-    @property
-    def integer(self) -> bool:
-        return isinstance(self.nominal, int)
+    integer: bool
+    """Whether only whole numbers make sense."""
 
     def check(self, where: str, value: Any) -> None:
         """Raise unless `value` is a finite number of the right kind within the bounds."""
@@ -52,7 +50,8 @@ def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None
     The bounds are physical, not statistical: outside them the builder makes no sense. Which values
     are *likely* is written in conf/task/.
     """
-    meta = {"unit": unit, "low": low, "high": high, "period": period, "hidden": hidden}
+    whole = isinstance(nominal, int)
+    meta = {"unit": unit, "low": low, "high": high, "period": period, "hidden": hidden, "integer": whole}
     return dataclasses.field(default=nominal, metadata=meta)
 
 
@@ -86,6 +85,8 @@ def with_values(owner: D, new: Mapping[str, Value]) -> D:
     for name, value in new.items():
         if name not in known:
             raise UnknownName(f"parameter of {type(owner).__name__}", name, known)
+        if isinstance(known[name], float) and type(value) is int:
+            value = float(value)  # 45 and 45.0 are one scenario and need one id
         head, _, tail = name.partition(".")
         if tail:
             nested.setdefault(head, {})[tail] = value

@@ -20,9 +20,7 @@ BALL_RADIUS = 0.02
 
 
 def scene(timestep: float = 0.002) -> mujoco.MjSpec:
-    """A table with a small ball 1 mm above it, whose bounce takes 2 pi / 2 / 500 = 6 ms, and a box near the
-    hand.
-    """
+    """A table, a small ball 1 mm above it, which bounces within pi / 500 = 6 ms, and a box near the hand."""
     spec = mujoco.MjSpec()
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

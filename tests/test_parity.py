@@ -3,8 +3,8 @@
 Two differences are known. robosuite's controller looks at the arm once before it is put into its initial
 posture, and uses that stale Jacobian and inertia in the first physics step after a reset; ours does not
 (`cleared` below removes it from robosuite's side). And robosuite inverts with LAPACK where we factorise, so
-that the last bits differ; they stay the last bits until a contact has to choose, such as the number of points
-where the empty jaw meets itself.
+that the last bits differ. They stay the last bits until the robot touches something: the points that the
+empty jaw finds on itself, or the hand on the pedestal, can hang on a last bit, and all later motion with it.
 """
 
 import logging
@@ -75,16 +75,18 @@ def grip(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
 
 
 def distance(env: Any, actions: NDArray[np.float32], cleared: bool) -> float:
-    """Largest distance of the two grip sites over an episode [m]; it must have moved at all."""
+    """Largest distance of the two grip sites [m] over an episode, or until the robot touches something."""
     data, loop = start(env, cleared)
     origin, path, apart = grip(loop.model, data), 0.0, 0.0
     for action in actions:
         env.step(action)
         loop.tick(action)
+        if loop.touched[-1].any():
+            break
         theirs = grip(loop.model, data)
         path = max(path, float(np.linalg.norm(theirs - origin)))
         apart = max(apart, float(np.linalg.norm(theirs - grip(loop.model, loop.data))))
-    assert path > 0.01
+    assert path > 0.05
     return apart
 
 
@@ -97,7 +99,7 @@ def test_translation_is_robosuites_to_the_last_bits(lift: Any, seed: int) -> Non
 
 @pytest.mark.parametrize("seed", range(3))
 def test_translation_and_rotation_are_robosuites_to_the_last_bits(lift: Any, seed: int) -> None:
-    assert distance(lift, smooth_actions(seed, 0.5), cleared=True) <= 1e-12
+    assert distance(lift, smooth_actions(seed, 1.0), cleared=True) <= 1e-12
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -127,8 +129,8 @@ FIELDS = {
     "body": "body_mass body_inertia body_ipos body_iquat body_pos body_quat body_gravcomp",
     "jnt": "jnt_type jnt_range jnt_limited jnt_stiffness jnt_pos jnt_axis jnt_margin jnt_solref jnt_solimp "
     "dof_damping dof_armature dof_frictionloss dof_solref dof_solimp",
-    "actuator": "actuator_gainprm actuator_biasprm actuator_ctrlrange actuator_ctrllimited actuator_forcerange "
-    "actuator_forcelimited actuator_gear actuator_dyntype",
+    "actuator": "actuator_gainprm actuator_biasprm actuator_ctrlrange actuator_ctrllimited "
+    "actuator_forcerange actuator_forcelimited actuator_gear actuator_dyntype",
     "geom": "geom_type geom_size geom_pos geom_quat geom_friction geom_contype geom_conaffinity geom_condim "
     "geom_solref geom_solimp geom_priority geom_margin geom_gap geom_solmix",
     "site": "site_pos site_quat",
@@ -180,6 +182,13 @@ def test_the_robot_compiles_to_robosuites_numbers(lift: Any, kind: str, visual: 
             np.testing.assert_array_equal(
                 value(ours, kind, name, field), value(theirs, kind, name, field), err_msg=f"{field} of {name}"
             )
+
+
+def test_every_mesh_of_the_robot_comes_from_a_file_of_robosuite() -> None:
+    scene = mujoco.MjSpec()
+    panda.attach(scene, visual=True)
+    assert len(scene.meshes) > 60
+    assert all(panda.mesh_file(mesh.name, mesh.file).is_file() for mesh in scene.meshes)
 
 
 def test_home_is_robosuites(lift: Any) -> None:

@@ -33,6 +33,12 @@ POSTURE_KD = 2.0 * math.sqrt(POSTURE_KP)
 """Damping of the same [1/s], critical."""
 JAW_SPEED = 0.2
 """Change of the jaw command in one control period: PandaGripper.speed."""
+SEAL = 3
+"""Pads of a suction cup, of four, that must touch something before it pulls: with two it would hang on an edge."""
+CUP = "gripper0_right_suction"
+"""Name of the suction cup's actuator."""
+NONE = -1
+"""Stands for the index of what this robot does not have, jaw or suction cup."""
 FLOOR = 1e-18
 """Pivots below this are raised to it, so that a singular posture gives finite torques, later clipped."""
 
@@ -54,11 +60,14 @@ PLACES = np.dtype(
         ("row", np.int64, (JOINTS,)),
         ("motor", np.int64, (JOINTS,)),
         ("jaw", np.int64, (2,)),
+        ("cup", np.int64),
+        ("pad", np.int64),
     ]
 )
 """Where things are. Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first
 arm joint on; qM whole; subtree_com of the robot; position and rotation of the grip site and of the
-controller's base site. Indices: joint angles in qpos, arm rows in qM, arm motors and jaw motors in ctrl."""
+controller's base site. Indices: joint angles in qpos, arm rows in qM, arm motors, jaw motors and suction cup in
+ctrl, first of the cup's four pads among the geoms."""
 
 STATE = np.dtype(
     [
@@ -68,14 +77,15 @@ STATE = np.dtype(
         ("posture", np.float64, (JOINTS,)),
     ]
 )
-"""What the controller remembers: goal in the base frame [m], jaw command in [-1, 1], initial angles [rad]."""
+"""What the controller remembers: goal in the base frame [m], jaw command in [-1, 1] or, in its first place, suction
+off (0) or on (1), initial angles [rad]."""
 
 WORK = np.dtype(
     [
         ("J", np.float64, (6, JOINTS)),
         ("M", np.float64, (JOINTS, JOINTS)),
         ("M_root", np.float64, (JOINTS, JOINTS)),
-        ("M_inv_Jt", np.float64, (6, JOINTS)),
+        ("white_Jt", np.float64, (JOINTS, 6)),
         ("Lambda_inv", np.float64, (6, 6)),
         ("full_root", np.float64, (6, 6)),
         ("pos_root", np.float64, (3, 3)),
@@ -102,7 +112,12 @@ def places(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.void]:
         base = model.site("robot0_right_center").id
         joints = [model.joint(f"robot0_joint{i + 1}") for i in range(JOINTS)]
         found["motor"] = [model.actuator(f"robot0_torq_j{i + 1}").id for i in range(JOINTS)]
-        found["jaw"] = [model.actuator(f"gripper0_right_gripper_finger_joint{i + 1}").id for i in (0, 1)]
+        found["jaw"] = found["cup"] = found["pad"] = NONE
+        if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, CUP) == NONE:
+            found["jaw"] = [model.actuator(f"gripper0_right_gripper_finger_joint{i + 1}").id for i in (0, 1)]
+        else:
+            found["cup"] = model.actuator(CUP).id
+            found["pad"] = model.geom("gripper0_right_pad0_collision").id
     except KeyError as error:
         raise ValueError(
             f"no Panda in this model: {error.args[0]}; call panda.attach(scene) before compiling"
@@ -128,11 +143,11 @@ def places(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.void]:
 def start(state: NDArray[np.void], posture: ArrayLike) -> None:
     """Put the controller's memory into the condition after a reset, with the initial joint angles [rad]."""
     state["goal_pos"] = state["goal_rot"] = 0.0  # set by the first action, before its first use
-    state["jaw"] = 0.0  # PandaGripper.current_action: half open until told otherwise
+    state["jaw"] = 0.0  # PandaGripper.current_action: half open until told otherwise; a cup's suction is off
     state["posture"] = posture
 
 
-@njit(cache=True)
+@njit
 def set_goal(at: np.record, state: np.record, work: np.record, action: NDArray[np.float32]) -> None:
     """Move goal and jaw by `action`, shape (7,), once per control period, relative to the pose reached."""
     grip_pos, grip_rot = float64s(at.grip_pos, 3), float64s(at.grip_rot, (3, 3))
@@ -152,12 +167,18 @@ def set_goal(at: np.record, state: np.record, work: np.record, action: NDArray[n
         for i in range(3):
             work.world_rot[i, j] = _column_dot(base_rot, i, grip_rot, j)
     _multiply(work.delta, work.world_rot, state.goal_rot)
-    _move_jaw(state, action[6])
+    if at.cup == NONE:
+        _move_jaw(state, action[6])
+    else:
+        state.jaw[0] = 1.0 if action[6] > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit
 def apply(at: np.record, state: np.record, work: np.record) -> None:
-    """Write torques and jaw commands of this physics step into ctrl, between mj_step1 and mj_step2."""
+    """Write torques and jaw commands of this physics step into ctrl, between mj_step1 and mj_step2.
+
+    A suction cup waits for `suck`, because it depends on the contacts.
+    """
     _jacobian(at, work.J)
     _joint_inertia(at, work.M)
     _task_inertia(work)
@@ -166,10 +187,18 @@ def apply(at: np.record, state: np.record, work: np.record) -> None:
     cholesky_solve(work.rot_root, work.task[3:], work.wrench[3:])
     _posture_acceleration(at, state, work)
     _write_torques(at, work)
-    _write_jaw(at, state)
+    if at.cup == NONE:
+        _write_jaw(at, state)
 
 
-@njit(cache=True)
+@njit
+def suck(at: np.record, state: np.record, touching: int) -> None:
+    """Write the suction of this physics step into ctrl: what is asked for, if `touching` pads close the lip."""
+    pull = float64s(at.ctrl + 8 * at.cup, 1)
+    pull[0] = state.jaw[0] if touching >= SEAL else 0.0
+
+
+@njit
 def _rotation(x: float, y: float, z: float, out: NDArray[np.float64]) -> None:
     """Rotation matrix, shape (3, 3), of a rotation vector [rad]: robosuite's axisangle2quat and quat2mat.
 
@@ -200,17 +229,15 @@ def _rotation(x: float, y: float, z: float, out: NDArray[np.float64]) -> None:
     out[2, 2] = 1.0 - q[1] * q[1] - q[2] * q[2]
 
 
-@njit(cache=True)
+@njit
 def _move_jaw(state: np.record, command: float) -> None:
-    """One period of the jaw's ramp (PandaGripper.format_action): only the sign of `command` counts; +
-    closes.
-    """
+    """One period of the jaw's ramp, as PandaGripper.format_action: only the sign counts; positive closes."""
     change = JAW_SPEED * np.sign(command)
     state.jaw[0] = clip(state.jaw[0] - change, -1.0, 1.0)
     state.jaw[1] = clip(state.jaw[1] + change, -1.0, 1.0)
 
 
-@njit(cache=True)
+@njit
 def _jacobian(at: np.record, J: NDArray[np.float64]) -> None:
     """Jacobian of the grip site, shape (6, 7): rows of linear [m/rad], then of angular velocity [rad/rad]."""
     grip, centre = float64s(at.grip_pos, 3), float64s(at.subtree_com, 3)
@@ -224,35 +251,52 @@ def _jacobian(at: np.record, J: NDArray[np.float64]) -> None:
         J[3, i], J[4, i], J[5, i] = wx, wy, wz
 
 
-@njit(cache=True)
+@njit
 def _joint_inertia(at: np.record, M: NDArray[np.float64]) -> None:
-    """The arm's block of the inertia matrix [kg m^2], shape (7, 7). A row of qM lists joint i, i - 1, ...,
-    0.
-    """
+    """The arm's block of the inertia matrix [kg m^2], shape (7, 7). Row i of qM lists joints i to 0."""
     for i in range(JOINTS):
         row = float64s(at.qM + 8 * at.row[i], i + 1)
         for k in range(i + 1):
             M[i, i - k] = M[i - k, i] = row[k]
 
 
-@njit(cache=True)
+@njit
 def _task_inertia(work: np.record) -> None:
-    """Cholesky factors of M, of J M^-1 J^T, and of its translation and rotation blocks alone."""
+    """Cholesky factors of M, of J M^-1 J^T, and of its translation and rotation blocks alone.
+
+    With M = L L^T and W = L^-1 J^T, J M^-1 J^T is W^T W: half the work of solving for M^-1 J^T.
+    """
     cholesky(work.M, work.M_root)
+    _whiten(work.M_root, work.J, work.white_Jt)
+    W = work.white_Jt
     for i in range(6):
-        cholesky_solve(work.M_root, work.J[i], work.M_inv_Jt[i])
         for j in range(i + 1):
-            work.Lambda_inv[i, j] = work.Lambda_inv[j, i] = dot(work.J[i], work.M_inv_Jt[j])
+            total = 0.0
+            for k in range(JOINTS):
+                total += W[k, i] * W[k, j]
+            work.Lambda_inv[i, j] = work.Lambda_inv[j, i] = total
     cholesky(work.Lambda_inv, work.full_root)
     cholesky(work.Lambda_inv[:3, :3], work.pos_root)
     cholesky(work.Lambda_inv[3:, 3:], work.rot_root)
 
 
-@njit(cache=True)
+@njit
+def _whiten(root: NDArray[np.float64], J: NDArray[np.float64], W: NDArray[np.float64]) -> None:
+    """Solve root W = J^T, for all six columns at once: shapes (7, 7), (6, 7), (7, 6)."""
+    for i in range(JOINTS):
+        for j in range(6):
+            W[i, j] = J[j, i]
+        for k in range(i):
+            for j in range(6):
+                W[i, j] -= root[i, k] * W[k, j]
+        scale = 1.0 / root[i, i]
+        for j in range(6):
+            W[i, j] *= scale
+
+
+@njit
 def _task_acceleration(at: np.record, state: np.record, work: np.record) -> None:
-    """Wanted acceleration of the grip site in the world [m/s^2, rad/s^2], shape (6,): kp error - kd
-    velocity.
-    """
+    """Wanted acceleration of the grip site [m/s^2, rad/s^2], world, shape (6,): kp error - kd velocity."""
     grip_pos, grip_rot = float64s(at.grip_pos, 3), float64s(at.grip_rot, (3, 3))
     base_pos, base_rot = float64s(at.base_pos, 3), float64s(at.base_rot, (3, 3))
     _multiply(base_rot, state.goal_rot, work.world_rot)
@@ -264,7 +308,7 @@ def _task_acceleration(at: np.record, state: np.record, work: np.record) -> None
         work.task[i] -= KD * dot(work.J[i], velocity)
 
 
-@njit(cache=True)
+@njit
 def _turn_error(actual: NDArray[np.float64], wanted: NDArray[np.float64], axis: int) -> float:
     """One component of the rotation between two matrices [rad]: control_utils.orientation_error.
 
@@ -277,7 +321,7 @@ def _turn_error(actual: NDArray[np.float64], wanted: NDArray[np.float64], axis: 
     return 0.5 * total
 
 
-@njit(cache=True)
+@njit
 def _posture_acceleration(at: np.record, state: np.record, work: np.record) -> None:
     """Joint accelerations a back to the initial posture [rad/s^2], shape (7,), without effect on the grip
     site.
@@ -295,11 +339,9 @@ def _posture_acceleration(at: np.record, state: np.record, work: np.record) -> N
         work.wrench[i] -= work.leak[i]
 
 
-@njit(cache=True)
+@njit
 def _write_torques(at: np.record, work: np.record) -> None:
-    """ctrl of the arm motors [N m]: J^T wrench + M a + gravity and Coriolis forces, clipped to their
-    range.
-    """
+    """ctrl of the arm motors [N m]: J^T wrench + M a + gravity and Coriolis terms, within their range."""
     bias = float64s(at.qfrc_bias, JOINTS)
     for i in range(JOINTS):
         torque = bias[i] + dot(work.M[i], work.joint)
@@ -310,7 +352,7 @@ def _write_torques(at: np.record, work: np.record) -> None:
         motor[0] = clip(torque, limits[0], limits[1])
 
 
-@njit(cache=True)
+@njit
 def _write_jaw(at: np.record, state: np.record) -> None:
     """ctrl of the finger motors [m]: the jaw command, from [-1, 1] to their range (SimpleGripController)."""
     for i in range(2):
@@ -320,13 +362,13 @@ def _write_jaw(at: np.record, state: np.record) -> None:
         motor[0] = clip(middle + half * state.jaw[i], limits[0], limits[1])
 
 
-@njit(cache=True)
+@njit
 def clip(value: float, low: float, high: float) -> float:
     """`value`, or the bound it lies beyond."""
     return min(max(value, low), high)
 
 
-@njit(cache=True)
+@njit
 def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Scalar product, summed from the first element on."""
     total = 0.0
@@ -335,13 +377,13 @@ def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return total
 
 
-@njit(cache=True)
+@njit
 def _column_dot(a: NDArray[np.float64], i: int, b: NDArray[np.float64], j: int) -> float:
     """Scalar product of column i of `a` and column j of `b`, shapes (3, 3)."""
     return a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
 
 
-@njit(cache=True)
+@njit
 def _multiply(a: NDArray[np.float64], b: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """out = a b, shapes (3, 3); `out` is neither of them."""
     for i in range(3):
@@ -349,7 +391,7 @@ def _multiply(a: NDArray[np.float64], b: NDArray[np.float64], out: NDArray[np.fl
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True)
+@njit
 def cholesky(A: NDArray[np.float64], root: NDArray[np.float64]) -> None:
     """Lower factor of a symmetric positive matrix into `root`, whose upper part is left as it is."""
     for i in range(A.shape[0]):
@@ -360,7 +402,7 @@ def cholesky(A: NDArray[np.float64], root: NDArray[np.float64]) -> None:
             root[i, j] = math.sqrt(max(rest, FLOOR)) if i == j else rest / root[j, j]
 
 
-@njit(cache=True)
+@njit
 def cholesky_solve(root: NDArray[np.float64], b: NDArray[np.float64], x: NDArray[np.float64]) -> None:
     """Solve A x = b for A = root root^T."""
     n = root.shape[0]

@@ -23,7 +23,7 @@ FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
 """Finger positions after a reset [m], shape (2,): robosuite PandaGripper.init_qpos."""
 
 BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
-"""Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), on a mount."""
+"""Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), mounted."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
 """Base orientation (wxyz): robosuite leaves a single arm unturned, facing +x."""
 MOUNT: NDArray[np.float64] = np.array([0.0, 0.0, 0.01])
@@ -53,20 +53,29 @@ farther.
 """
 
 
-def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
+def attach(scene: mujoco.MjSpec, visual: bool = False, hand: mujoco.MjSpec | None = None) -> None:
     """Add the robot to `scene`, named and placed as in robosuite's table environments.
+
+    `hand`: instead of the two-finger jaw, a spec with a body "right_gripper" (see `suction`).
 
     Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times
     faster. It then lacks the wrist's force and torque sensors too, which cost 4 % of a step and influence
     nothing; sites and cameras cost nothing that can be measured, and stay.
     """
-    arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), _jaw(visual).copy()
+    arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), (hand or _jaw(visual)).copy()
     # Arm first: what is attached to it before it is in the scene gets its prefix too (robot0_gripper0_ ...).
     place = scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist())
     place.attach_body(arm.body("base"), "robot0_", "")
     base, wrist = scene.body("robot0_base"), scene.body("robot0_right_hand")
     base.add_frame().attach_body(mount.body("base"), "fixed_mount0_", "")
     wrist.add_frame().attach_body(hand.body("right_gripper"), "gripper0_right_", "")
+
+
+def fingers(model: mujoco.MjModel) -> list[int]:
+    """Places of the finger joints in qpos; none for a hand without a jaw."""
+    names = [f"gripper0_right_finger_joint{i}" for i in (1, 2)]
+    found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names]
+    return [int(model.jnt_qposadr[joint]) for joint in found if joint >= 0]
 
 
 @functools.cache
@@ -91,7 +100,7 @@ def _mount(visual: bool) -> mujoco.MjSpec:
 
 @functools.cache
 def _jaw(visual: bool) -> mujoco.MjSpec:
-    """The two-finger gripper. Another hand is another function like this one, with a body "right_gripper"."""
+    """The two-finger gripper."""
     jaw = _load("grippers/panda_gripper.xml", visual)
     if not visual:
         for sensor in list(jaw.sensors):
@@ -121,10 +130,10 @@ FOLDERS = {"gripper0_": "grippers", "fixed_mount0_": "bases", "robot0_": "robots
 """Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""
 
 
-def mesh_file(mesh: mujoco.MjsMesh) -> Path:
-    """The file of one of the robot's meshes."""
-    folder = next(folder for prefix, folder in FOLDERS.items() if mesh.name.startswith(prefix))
-    return _assets() / folder / mesh.file
+def mesh_file(name: str, file: str) -> Path:
+    """Where one of the robot's meshes lies on this machine, from its name and the file that its MJCF gives."""
+    folder = next(folder for prefix, folder in FOLDERS.items() if name.startswith(prefix))
+    return _assets() / folder / file
 
 
 def strip_visual(spec: mujoco.MjSpec) -> None:

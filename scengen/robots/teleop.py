@@ -15,8 +15,8 @@ MOTION = 6
 class Filter:
     """Exponential moving average of the six motion channels, then a limit on the change per step.
 
-    Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs beyond [-1,
-    1] are clipped first, so that outputs never leave it. One object filters one stream of actions.
+    Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs are clipped
+    to [-1, 1] first, so that outputs never leave it. One object filters one stream of actions.
     """
 
     def __init__(self) -> None:
@@ -24,9 +24,7 @@ class Filter:
         self._input = np.zeros(MOTION + 1)
 
     def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
-        """The filtered action, shape (7,): float32, exactly what the controller receives and a witness
-        records.
-        """
+        """The filtered action, shape (7,), float32: exactly what controller and witness get."""
         given = np.asarray(action, np.float64)
         if given.shape != (MOTION + 1,):
             raise ValueError(f"an action has shape ({MOTION + 1},), not {given.shape}")
@@ -68,7 +66,7 @@ def _filter(state: NDArray[np.float64], action: NDArray[np.float64], out: NDArra
     return True
 
 
-@njit(cache=True)
+@njit
 def _unit(value: float) -> float:
     """`value` clipped to [-1, 1]."""
     return min(max(value, -1.0), 1.0)

@@ -131,7 +131,9 @@ def parse(where: str, node: Any) -> Dist:
     if not (args and all(map(_number, args))):
         raise BadConfig(f"{where} = {node!r}; [{kind}, {expected}] takes finite numbers")
     try:
-        return Choice(tuple(args)) if family is Choice else family(*args)
+        if family is Choice:
+            return Choice(tuple(args))
+        return family(*map(float, args)) if family in (Uniform, LogUniform) else family(*args)
     except (TypeError, ValueError) as error:
         why = error if isinstance(error, ValueError) else f"got {len(args)} arguments"
         raise BadConfig(f"{where} = {node!r}; expected [{kind}, {expected}]: {why}") from None

@@ -1,11 +1,14 @@
-"""The control loop of one Panda, compiled: filtered actions in, physics and history of contacts out."""
+"""The control loop of one Panda with jaw or suction cup, compiled: filtered actions in, physics and history of contacts out."""
+
+import hashlib
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from ..robots import osc
+from ..robots import osc, panda
 from ..robots.panda import FINGERS, HOME, JOINTS
 from . import native
 
@@ -30,8 +33,27 @@ SCENE = np.dtype(
 )
 """Addresses of the structs, of their fields (`native.Layout`), and physics steps in one control period."""
 
-MEMORY = np.dtype([("scene", SCENE), ("at", osc.PLACES), ("state", osc.STATE), ("work", osc.WORK)])
-"""Everything that compiled code needs besides MuJoCo, in one record: one argument is the cheapest call."""
+
+def _sources() -> str:
+    """A digest of every file that goes into the compiled entry points."""
+    files = [str(module.__file__) for module in (osc, panda, native)]
+    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in [__file__, *files])).hexdigest()[:16]
+
+
+MEMORY = np.dtype(
+    [
+        ("scene", SCENE),
+        ("at", osc.PLACES),
+        ("state", osc.STATE),
+        ("work", osc.WORK),
+        (f"sources_{_sources()}", np.int64),
+    ]
+)
+"""Everything that compiled code needs besides MuJoCo, in one record: one argument is the cheapest call.
+
+The last field is never used. numba's disk cache looks at the types of the arguments and at the file of the
+entry point alone, and would take machine code of an older `osc` for the present one; its name forbids that.
+"""
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -78,14 +100,14 @@ class Loop:
         self.touched, self.touching = self._latches
         self._action = np.zeros(ACTION, np.float32)
         self._no_record = np.zeros((0, model.nu))
-        self._fingers = [model.joint(f"gripper0_right_finger_joint{i}").qposadr[0] for i in (1, 2)]
+        self._fingers = panda.fingers(model)
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: `home`, jaw half open, nothing touched. Bit for bit the same as a fresh loop."""
+        """Back to the start: `home`, jaw half open or suction off, nothing touched. Bit for bit the same as a fresh loop."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._memory["at"]["angle"][0]] = self.home
-        self.data.qpos[self._fingers] = FINGERS
+        self.data.qpos[self._fingers] = FINGERS[: len(self._fingers)]
         osc.start(self._state, self.home)
         self._latches[:] = 0
         mujoco.mj_forward(self.model, self.data)
@@ -182,9 +204,7 @@ def _owners(model: mujoco.MjModel) -> NDArray[np.int32]:
 
 @njit(nogil=True, cache=True)
 def _tick(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray) -> int:
-    """One control period; the number of warnings, or -1 for an action that is not finite, then nothing is
-    done.
-    """
+    """One control period; the number of warnings, or -1 and nothing done for an action that is not finite."""
     for i in range(ACTION):
         if not np.isfinite(action[i]):
             return -1
@@ -212,27 +232,27 @@ def _replay(memory: NDArray, owner: NDArray, latches: NDArray, tape: NDArray, re
     return native.warnings(scene.warning, scene.warning_stride, scene.warning_kinds)
 
 
-@njit(cache=True)
+@njit
 def _substep(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray, first: bool) -> None:
-    """One physics step under control; the first of a period moves the goal, from the pose mj_step1
-    computed.
-    """
+    """One physics step under control. The first of a period moves the goal, from the pose just computed."""
     scene, at, state, work = memory[0].scene, memory[0].at, memory[0].state, memory[0].work
     native.step1(scene.model, scene.data)
     if first:
         osc.set_goal(at, state, work, action)
     osc.apply(at, state, work)
     _latch(scene, owner, latches)
+    if at.cup != osc.NONE:
+        osc.suck(at, state, _pads_in_contact(scene, at.pad))
     native.step2(scene.model, scene.data)
 
 
-@njit(cache=True)
+@njit
 def _begin(latches: NDArray) -> None:
     """Forget the contacts of the last period."""
     latches[1] = 0
 
 
-@njit(cache=True)
+@njit
 def _latch(scene: np.record, owner: NDArray, latches: NDArray) -> None:
     """Remember which bodies are in contact now. The array of contacts may move at every step."""
     count = native.int32s(scene.ncon, 1)[0]
@@ -245,7 +265,23 @@ def _latch(scene: np.record, owner: NDArray, latches: NDArray) -> None:
         contact += scene.stride
 
 
-@njit(cache=True)
+@njit
+def _pads_in_contact(scene: np.record, first: int) -> int:
+    """How many of the four geoms from `first` on touch something now."""
+    count = native.int32s(scene.ncon, 1)[0]
+    contact = native.int64s(scene.contact, 1)[0]
+    seen = 0
+    for _ in range(count):
+        if native.float64s(contact + scene.dist, 1)[0] <= 0.0:
+            geoms = native.int32s(contact + scene.geom, 2)
+            for i in range(2):
+                if 0 <= geoms[i] - first < 4:
+                    seen |= 1 << (geoms[i] - first)
+        contact += scene.stride
+    return (seen & 1) + (seen >> 1 & 1) + (seen >> 2 & 1) + (seen >> 3)
+
+
+@njit
 def _mark(one: NDArray, other: NDArray, latches: NDArray) -> None:
     """Latch the contact of two (body, is robot) rows, in the row and column of the whole robot too."""
     robot = latches.shape[1] - 1

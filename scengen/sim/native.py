@@ -60,19 +60,19 @@ _int32_pointer = _pointer_to(types.int32)
 _int64_pointer = _pointer_to(types.int64)
 
 
-@njit(cache=True)
+@njit
 def float64s(address, shape):
     """The C-ordered float64 array of `shape` at `address`, not a copy."""
     return carray(_float64_pointer(address), shape)
 
 
-@njit(cache=True)
+@njit
 def int32s(address, shape):
     """The C-ordered int32 array of `shape` at `address`, not a copy."""
     return carray(_int32_pointer(address), shape)
 
 
-@njit(cache=True)
+@njit
 def int64s(address, shape):
     """The C-ordered int64 array of `shape` at `address`, not a copy."""
     return carray(_int64_pointer(address), shape)
@@ -112,7 +112,7 @@ def warning_counts(data: mujoco.MjData) -> tuple[int, int, int]:
     return numbers.ctypes.data, numbers.strides[0], len(numbers)
 
 
-@njit(cache=True)
+@njit
 def warnings(address, stride, kinds):
     """Total of the warnings raised since the last reset, with the values of `warning_counts`."""
     total = 0

@@ -58,5 +58,5 @@ def check(text: str) -> None:
         if element.tag in ("include", "plugin", "extension", "attach"):
             raise BadConfig(f"the scene contains <{element.tag}>; a scene stands alone, without files or plugins")
         for name, value in element.attrib.items():
-            if name.startswith("file") or name.endswith("dir") and element.tag == "compiler":
+            if name.startswith("file") or (name.endswith("dir") and element.tag == "compiler"):
                 raise BadConfig(f"the scene reads {value!r} through <{element.tag} {name}=...>; it must stand alone")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import UnknownName, Unstable
-from ..robots import panda
+from ..robots import osc, panda, suction
 from ..robots.teleop import Filter
 from . import scene_text
 from .loop import Loop
@@ -27,7 +27,8 @@ IDLE: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0])
 
 
 JAW = "panda_jaw"
-EMBODIMENTS: dict[str, Callable[[mujoco.MjSpec, bool], None]] = {JAW: panda.attach}
+SUCTION = "panda_suction"
+EMBODIMENTS: dict[str, Callable[[mujoco.MjSpec, bool], None]] = {JAW: panda.attach, SUCTION: suction.attach}
 """The robots that a task may ask for, and how each is added to a scene, with or without visual geometry."""
 
 
@@ -53,7 +54,7 @@ class World:
     loop: Loop
     filter: Filter = field(default_factory=Filter)
     grip: float = -1.0
-    """The gripper command of the last action: -1 open, 1 closed."""
+    """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> "World":
@@ -116,7 +117,7 @@ class World:
 
     @property
     def hand(self) -> Vec3:
-        """Position of the grip site, between the finger tips [m]."""
+        """Position of the grip site, between the finger tips or in the middle of the suction cup's lip [m]."""
         return self.data.site_xpos[self._grip_site].copy()
 
     @property
@@ -153,6 +154,11 @@ class World:
     def touched(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step since the start."""
         return bool(self.loop.touched[self._label(a), self._label(b)])
+
+    @property
+    def sealed(self) -> bool:
+        """Whether the suction cup pulled at the last physics step: switched on, with its lip closed."""
+        return bool(self.data.ctrl[self.model.actuator(osc.CUP).id] > 0.0)
 
     @property
     def free_bodies(self) -> tuple[str, ...]:

@@ -29,8 +29,8 @@ from ..validate.moves import CLOSED, facing_down, go_to, push, wait
 
 SLAB_MOVES = 0.05
 """How far the slab's centre of mass must go, measured along the table [m] (paper, App. B, T17)."""
-FINGERTIP = 0.012
-"""How far the closed finger tips reach in front of the grip site when it points down [m], measured on the model."""
+FINGERTIP = 0.0105
+"""How far the closed fingers reach in front of the grip site when it points down [m]: half their width in the model."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,9 +125,13 @@ class DominoSingle(Scenario):
         yield from wait(world, lambda: self.success(world), give_up=4.0)
 
     def topple(self, world: World, i: int) -> Plan:
-        """Push tile `i` over along the chain with the closed finger tips, then step back."""
+        """Push tile `i` over along the chain with the closed finger tips, then step back.
+
+        Behind any tile but the first the tips go into the middle of the gap.
+        """
         tile = self.pieces[i]
-        behind = self.spot(i) + 0.8 * tile.height * UP - (tile.thickness / 2 + FINGERTIP + 0.02) * self.u
+        room = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGERTIP)
+        behind = self.spot(i) + 0.8 * tile.height * UP - (tile.thickness / 2 + FINGERTIP + room) * self.u
         half_turn = (self.heading + 90.0) % 180.0 - 90.0  # the closed fingers look the same from behind
         yield from go_to(world, behind + 0.12 * UP, facing_down(math.radians(half_turn)), grip=CLOSED)
         yield from go_to(world, behind, speed=0.15)

@@ -1,0 +1,55 @@
+# make demo: from zero to a verified pool and a contact sheet.   make test: from zero to the passing tests.
+PYTHON ?= python3
+ENV := .venv
+BIN := $(ENV)/bin
+READY := $(ENV)/.ready
+DEMO := generated/demo
+
+.PHONY: setup demo test check format certify reference bench clean
+
+setup: $(READY)
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "scengen needs Python 3.11 or newer; say make PYTHON=...")'
+	$(PYTHON) -m venv $(ENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	@sh tools/opengl.sh
+	@touch $(READY)
+
+demo: setup
+	$(BIN)/scengen generate task=domino_single n=6 workers=2 pool=$(DEMO)/id
+	$(BIN)/scengen generate task=domino_single split=diagonal n=6 workers=2 pool=$(DEMO)/diagonal
+	$(BIN)/scengen verify pool=$(DEMO)/id workers=2
+	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
+	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html
+
+test: setup
+	$(BIN)/scengen verify pool=generated/reference workers=2
+	$(BIN)/python -m pytest -n 2
+
+check: setup
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/pyright
+
+format: setup
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+# Every split of every task at level full: long. N scenarios each.
+N ?= 20
+certify: setup
+	$(BIN)/python tools/certify_all.py $(N)
+
+# The small pool in the repository; write it anew when a family or the format changes.
+reference: setup
+	rm -rf generated/reference generated/reference.run
+	$(BIN)/scengen generate task=domino_single n=6 workers=2 pool=generated/reference
+	rm -rf generated/reference.run
+
+bench: setup
+	$(BIN)/scengen bench
+
+clean:
+	rm -rf $(ENV) $(DEMO) $(DEMO).run build dist *.egg-info

@@ -1,0 +1,287 @@
+"""Holed cuboid cage: a thin-walled box with one circular hole on a face of your choice, and a low sill on its floor.
+
+       ________________
+      |  _             |      side view; the hole is where the floor ends near +x
+      | (_)   |        |
+      |_______|____   _|      the sill is the low bar in the middle of the floor
+
+Collision geometry is an exact convex decomposition: plates are boxes, and the part of the holed plate around the hole
+is cut by rays from the hole's centre into wedges whose inner faces touch the circle from outside. So the hole is a
+regular polygon that contains the nominal circle, and the cavity is the nominal cuboid: no ball sticks where it should
+pass, and none passes that is wider than the hole.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..params import check_bounds, param
+from .scene import PRIORITY, STIFF, show
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+WEDGES = 20
+"""Sides of the polygon. Its corners lie radius * (1 / cos(pi / 20) - 1) outside the circle: 1.2 % of the radius,
+0.37 mm for the largest hole that the bounds allow."""
+SEGMENTS = 64
+"""Sides of the circle in the picture; 0.02 mm from the true one at the nominal radius."""
+
+BOTTOM, END, SIDE, TOP = range(4)
+"""Values of `face`. The other end and the other side are these in a cage that is turned round."""
+FACES = {BOTTOM: (2, -1, 0), END: (0, 1, 1), SIDE: (1, 1, 0), TOP: (2, 1, 0)}
+"""For each face: the axis it looks along, which way, and the axis along which `offset` is measured."""
+
+Box = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Centre and full size of a cuboid [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoledCage:
+    """A closed box with one round hole. x is the long axis; the origin is the centre of its foot.
+
+    The paper gives no lengths (App. C: "one circular hole on a configurable face"). Ours fit the task's hand: the
+    width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of 3 mm acrylic (86 cm^3 at 1.19 g/cm^3).
+    """
+
+    length: float = param(0.130, "m", 0.08, 0.20)
+    width: float = param(0.050, "m", 0.03, 0.075)
+    height: float = param(0.050, "m", 0.03, 0.10)
+    wall: float = param(0.003, "m", 0.002, 0.008)
+    face: int = param(BOTTOM, "0 bottom, 1 end, 2 side, 3 top", BOTTOM, TOP)
+    hole: float = param(0.0175, "m", 0.005, 0.03)
+    """Radius of the hole."""
+    offset: float = param(0.043, "m", -0.08, 0.08)
+    """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
+    sill: float = param(0.003, "m", 0.0, 0.015)
+    """Height of the bar across the middle of the floor; it is as thick as the walls. At 0 there is none."""
+    mass: float = param(0.100, "kg", 0.02, 0.5)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    closed: bool = False
+    """Whether the hole is stopped up: the same cage without its way out."""
+    rgba: tuple[float, float, float, float] = (0.35, 0.62, 0.85, 0.40)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    # --- geometry, in the cage's own axes -------------------------------------------------
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """Outer edges [m], shape (3,)."""
+        return np.array([self.length, self.width, self.height])
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Centre of the cuboid [m], shape (3,)."""
+        return np.array([0.0, 0.0, self.height / 2])
+
+    @property
+    def cavity(self) -> NDArray[np.float64]:
+        """Inner edges [m], shape (3,)."""
+        return self.size - 2 * self.wall
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vector out of the holed face, shape (3,)."""
+        axis, sign, _ = FACES[self.face]
+        return sign * np.eye(3)[axis]
+
+    @property
+    def hole_centre(self) -> NDArray[np.float64]:
+        """Centre of the hole, halfway through the wall [m], shape (3,)."""
+        axis, _, along = FACES[self.face]
+        return self.middle + (self.size[axis] - self.wall) / 2 * self.normal + self.offset * np.eye(3)[along]
+
+    @property
+    def margin(self) -> float:
+        """Least distance from the rim of the hole to a wall that stands on its face [m]; negative: it does not fit."""
+        axis, _, along = FACES[self.face]
+        across = 3 - axis - along
+        return min(self.cavity[along] / 2 - abs(self.offset), self.cavity[across] / 2) - self.hole
+
+    def tilt_over_sill(self, radius: float) -> float:
+        """Tilt of the floor at which a ball that lies against the sill rolls over it [rad].
+
+        The ball turns about the sill's edge, and does so once the vertical through its centre passes that edge:
+        cos(tilt) = 1 - height / radius. Where the sill is as high as the centre no tilt below a right angle will do.
+        """
+        return math.acos(max(0.0, 1 - self.sill / radius))
+
+    # --- mass -----------------------------------------------------------------------------
+
+    def inertial(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Centre of mass [m], shape (3,), and inertia about it [kg m^2], shape (3, 3).
+
+        The body is cuboid - cavity - hole + sill, all of one density:
+        inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass;
+        own = volume / 12 * (|e|^2 - e e^T, diagonal only) for a cuboid with edges e, and for the hole, a disc of radius
+        R and thickness w, volume * R^2 / 2 about its axis and volume * (3 R^2 + w^2) / 12 across it.
+        """
+        parts = [_cuboid(self.middle, self.size, 1.0), _cuboid(self.middle, self.cavity, -1.0)]
+        parts += [_cuboid(*box, 1.0) for box in self._sill()]
+        if not self.closed:
+            axis = FACES[self.face][0]
+            own = np.full(3, (3 * self.hole**2 + self.wall**2) / 12)
+            own[axis] = self.hole**2 / 2
+            parts.append((-math.pi * self.hole**2 * self.wall, self.hole_centre, np.diag(own)))
+        volume = sum(v for v, _, _ in parts)
+        com = sum((v * centre for v, centre, _ in parts), np.zeros(3)) / volume
+        inertia = np.zeros((3, 3))
+        for v, centre, own in parts:
+            d = centre - com
+            inertia += v * (own + d @ d * np.eye(3) - np.outer(d, d))
+        return com, self.mass / volume * inertia
+
+    # --- collision geometry ---------------------------------------------------------------
+
+    def boxes(self) -> list[Box]:
+        """Cuboids whose union, with the wedges, is the cage. Plates overlap at the edges of the cage."""
+        plates = []
+        for axis in range(3):
+            for sign in (-1, 1):
+                if self.closed or FACES[self.face][:2] != (axis, sign):
+                    out, size = sign * np.eye(3)[axis], self.size.copy()
+                    size[axis] = self.wall
+                    plates.append((self.middle + (self.size[axis] - self.wall) / 2 * out, size))
+        return plates + self._sill() + ([] if self.closed else self._beside_patch())
+
+    def wedges(self) -> list[NDArray[np.float64]]:
+        """Corners of the convex prisms around the hole [m], each of shape (n, 3)."""
+        if self.closed:
+            return []
+        axis, _, along = FACES[self.face]
+        across = 3 - axis - along
+        prisms = []
+        for flat in self._wedges_in_plane():
+            points = np.tile(self.hole_centre, (2 * len(flat), 1))
+            points[:, along] += np.tile(flat[:, 0], 2)
+            points[:, across] += np.tile(flat[:, 1], 2)
+            points[:, axis] += np.repeat([-self.wall / 2, self.wall / 2], len(flat))
+            prisms.append(points)
+        return prisms
+
+    def _sill(self) -> list[Box]:
+        if self.sill == 0:
+            return []
+        return [
+            (np.array([0, 0, self.wall + self.sill / 2]), np.array([self.wall, self.cavity[1], self.sill])),
+        ]
+
+    def _patch(self) -> tuple[float, float, float]:
+        """The rectangle that is cut into wedges, seen from the hole: its two ends and its half width [m]."""
+        axis, _, along = FACES[self.face]
+        half, reach = self.size[along] / 2, self.hole / math.cos(math.pi / WEDGES) + self.wall
+        ends = max(-half - self.offset, -reach), min(half - self.offset, reach)
+        return *ends, self.size[3 - axis - along] / 2
+
+    def _beside_patch(self) -> list[Box]:
+        """What is left of the holed plate at both ends of the patch."""
+        axis, _, along = FACES[self.face]
+        start, stop, _ = self._patch()
+        half, boxes = self.size[along] / 2, []
+        for low, high in ((-half - self.offset, start), (stop, half - self.offset)):
+            if high > low:
+                centre, size = self.hole_centre.copy(), self.size.copy()
+                centre[along] += (low + high) / 2
+                size[axis], size[along] = self.wall, high - low
+                boxes.append((centre, size))
+        return boxes
+
+    def _wedges_in_plane(self) -> list[NDArray[np.float64]]:
+        """Convex polygons around the hole's centre, each between two rays, the circle and the patch's border."""
+        start, stop, half = self._patch()
+        corners = [np.array([x, y]) for x in (start, stop) for y in (-half, half)]
+        step = 2 * math.pi / WEDGES
+        polygons = []
+        for middle in step * np.arange(WEDGES):
+            mid = np.array([math.cos(middle), math.sin(middle)])
+            rays = [np.array([math.cos(middle + s), math.sin(middle + s)]) for s in (-step / 2, step / 2)]
+            inner = [self.hole / math.cos(step / 2) * ray for ray in rays]
+            outer = [_leaving(ray, start, stop, half) * ray for ray in rays]
+            outer += [c for c in corners if c @ mid > math.cos(step / 2) * math.hypot(*c)]
+            polygons.append(np.array(inner + outer))
+        return polygons
+
+    # --- body -----------------------------------------------------------------------------
+
+    def solid(self) -> "Manifold":
+        """The true body, by constructive solid geometry: what is shown, and what the decomposition is tested against."""
+        from manifold3d import Manifold
+
+        def block(centre: NDArray[np.float64], size: NDArray[np.float64]) -> Manifold:
+            return Manifold.cube(size.tolist(), True).translate(centre.tolist())
+
+        body = block(self.middle, self.size) - block(self.middle, self.cavity)
+        for centre, size in self._sill():  # let into floor and walls by half a wall, so that the parts are one
+            body += block(centre - [0, 0, self.wall / 4], size + [0, self.wall, self.wall / 2])
+        if self.closed:
+            return body
+        bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
+        turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[self.face]
+        return body - bore.rotate(turn).translate(self.hole_centre.tolist())
+
+    def spec(self) -> mujoco.MjSpec:
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body(name="body")
+        com, inertia = self.inertial()
+        body.explicitinertial, body.mass, body.ipos = True, self.mass, com
+        body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        for i, (centre, size) in enumerate(self.boxes()):
+            geom = self._touchable(body, f"box_{i}")
+            geom.type, geom.pos, geom.size = mujoco.mjtGeom.mjGEOM_BOX, centre, size / 2
+        for i, corners in enumerate(self.wedges()):
+            spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
+            geom = self._touchable(body, f"wedge_{i}")
+            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, f"wedge_{i}"
+        shown = self.solid().to_mesh()
+        spec.add_mesh(
+            name="look",
+            uservert=np.asarray(shown.vert_properties, float)[:, :3].ravel().tolist(),
+            userface=np.asarray(shown.tri_verts).ravel().tolist(),
+        )
+        body.add_geom(
+            name="look",
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname="look",
+            group=1,
+            contype=0,
+            conaffinity=0,
+            mass=0,
+            rgba=self.rgba,
+        )
+        return spec
+
+    def _touchable(self, body: mujoco.MjsBody, name: str) -> mujoco.MjsGeom:
+        """A geom of the decomposition; group 3 is not drawn, the picture is the mesh's."""
+        return body.add_geom(
+            name=name,
+            group=3,
+            mass=0,
+            friction=[self.friction, 0.005, 0.0001],
+            condim=4,
+            solref=STIFF,
+            priority=PRIORITY,
+        )
+
+
+def _cuboid(
+    centre: NDArray[np.float64], size: NDArray[np.float64], sign: float
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Signed volume [m^3], centre [m], and inertia about it per volume [m^2], shape (3, 3)."""
+    own = (size @ size - size**2) / 12
+    return sign * float(np.prod(size)), centre, np.diag(own)
+
+
+def _leaving(ray: NDArray[np.float64], start: float, stop: float, half: float) -> float:
+    """Distance [m] at which a ray from the hole's centre leaves the patch."""
+    ends = [(stop if ray[0] > 0 else start) / ray[0]] if ray[0] else []
+    return min([*ends, *([half / abs(ray[1])] if ray[1] else [])])
+
+
+if __name__ == "__main__":
+    show(HoledCage())

@@ -1,0 +1,208 @@
+"""Hooks to pull with: an L, a J whose bend is a half circle, and a T, all lying flat.
+
+The paper ships "J-shape (two variants) and T-shape, parametric handle length and hook radius" (App. C), and uses an
+"L-shaped hook" in T23; it gives no numbers. Ours fit the Panda's jaw, which opens to 80 mm, and a cube of 40 mm.
+
+Every hook is a set of boxes in one plane: bars for what is straight, and for the bend bars that lie tangent to the
+inner circle from outside, so that what the circle lets in the hook lets in. Each bar weighs in proportion to its
+length along the middle line; overlaps at the corners count once.
+
+The handle starts at x = -length / 2, where it is held, and ends at x = length / 2; the origin is the middle of its
+underside. The tip points to +y, or to -y if the hook is mirrored.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..params import check_bounds, param
+from .scene import PRIORITY, STIFF, show
+
+Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
+"""Two ends of a straight stretch in the plane [m], shape (2,) each, and how far the box goes on beyond both [m]."""
+BEND_PARTS = 12
+"""Bars of a half circle: its outside then is off the circle by 1 / cos(7.5 deg) - 1 = 0.9 % of the radius."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LHook:
+    """A handle with a straight tip at a right angle to its end."""
+
+    length: float = param(0.34, "m", 0.20, 0.50)
+    """Of the handle, the tip's width included."""
+    tip: float = param(0.07, "m", 0.02, 0.12)
+    """How far the tip stands out beside the handle's face."""
+    width: float = param(0.020, "m", 0.010, 0.040)
+    height: float = param(0.025, "m", 0.015, 0.040)
+    mass: float = param(0.12, "kg", 0.02, 0.5)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    mirrored: int = param(0, "1 = tip to the right", 0, 1)
+    rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    @property
+    def side(self) -> float:
+        """Which way the tip points along y: 1 or -1."""
+        return -1.0 if self.mirrored else 1.0
+
+    @property
+    def inside(self) -> float:
+        """x of the face of the tip that pulls [m]."""
+        return self.length / 2 - self.width
+
+    @property
+    def engaging(self) -> float:
+        """Width of the face that pulls, beside the handle [m]."""
+        return self.tip
+
+    @property
+    def bars(self) -> list[Bar]:
+        half, middle = self.width / 2, self.length / 2 - self.width / 2
+        corner = _point(middle, self.side * half)
+        return [
+            (_point(-self.length / 2, 0), _point(self.length / 2, 0), 0.0),
+            (corner, corner + _point(0, self.side * self.tip), 0.0),
+        ]
+
+    def spec(self) -> mujoco.MjSpec:
+        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JHook:
+    """A handle that runs into a half circle. The variants differ in the barb, a straight end that leads back."""
+
+    length: float = param(0.30, "m", 0.15, 0.50)
+    """Of the straight handle, up to where the bend begins."""
+    radius: float = param(0.045, "m", 0.02, 0.08)
+    """Of the middle line of the bend."""
+    barb: float = param(0.0, "m", 0.0, 0.08)
+    """How far the end runs back, parallel to the handle."""
+    width: float = param(0.016, "m", 0.010, 0.030)
+    height: float = param(0.025, "m", 0.015, 0.040)
+    mass: float = param(0.12, "kg", 0.02, 0.5)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    mirrored: int = param(0, "1 = tip to the right", 0, 1)
+    rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    @property
+    def side(self) -> float:
+        """Which way the bend goes along y: 1 or -1."""
+        return -1.0 if self.mirrored else 1.0
+
+    @property
+    def engaging(self) -> float:
+        """Width of the opening: the diameter of the inner circle [m]."""
+        return 2 * self.radius - self.width
+
+    @property
+    def bars(self) -> list[Bar]:
+        start = self.length / 2
+        straight = [(_point(-start, 0), _point(start, 0), 0.0)]
+        back = self.side * 2 * self.radius
+        barb = [(_point(start, back), _point(start - self.barb, back), 0.0)] if self.barb > 0 else []
+        return straight + self._bend() + barb
+
+    def _bend(self) -> list[Bar]:
+        """Bars whose inner faces touch the inner circle in the middle, and whose outer corners meet."""
+        step = math.pi / BEND_PARTS
+        centre = _point(self.length / 2, self.side * self.radius)
+        bars: list[Bar] = []
+        for i in range(BEND_PARTS):
+            angle = (i + 0.5) * step
+            out = _point(math.sin(angle), -self.side * math.cos(angle))
+            along = _point(math.cos(angle), self.side * math.sin(angle))
+            half = self.radius * math.tan(step / 2)
+            more = self.width / 2 * math.tan(step / 2)
+            foot = centre + self.radius * out
+            bars.append((foot - half * along, foot + half * along, more))
+        return bars
+
+    def spec(self) -> mujoco.MjSpec:
+        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
+
+
+ROUND_J = JHook()
+"""First variant: the bend alone."""
+BARBED_J = JHook(barb=0.05, rgba=(0.15, 0.55, 0.55, 1.0))
+"""Second variant: the end leads back along the handle, so that nothing slips out sideways."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class THook:
+    """A handle with a crossbar at its end: it pulls on either side."""
+
+    length: float = param(0.34, "m", 0.20, 0.50)
+    """Of the handle, the crossbar's width included."""
+    tip: float = param(0.06, "m", 0.02, 0.12)
+    """How far the crossbar stands out beside each face of the handle."""
+    width: float = param(0.020, "m", 0.010, 0.040)
+    height: float = param(0.025, "m", 0.015, 0.040)
+    mass: float = param(0.14, "kg", 0.02, 0.5)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    rgba: tuple[float, float, float, float] = (0.45, 0.35, 0.65, 1.0)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    @property
+    def engaging(self) -> float:
+        """Width of the face that pulls, on each side of the handle [m]."""
+        return self.tip
+
+    @property
+    def bars(self) -> list[Bar]:
+        half, middle = self.width / 2, self.length / 2 - self.width / 2
+        return [
+            (_point(-self.length / 2, 0), _point(self.length / 2 - self.width, 0), 0.0),
+            (_point(middle, -half - self.tip), _point(middle, half + self.tip), 0.0),
+        ]
+
+    def spec(self) -> mujoco.MjSpec:
+        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
+
+
+def _point(x: float, y: float) -> NDArray[np.float64]:
+    return np.array([x, y])
+
+
+def _flat(
+    bars: list[Bar],
+    width: float,
+    height: float,
+    mass: float,
+    friction: float,
+    rgba: tuple[float, float, float, float],
+) -> mujoco.MjSpec:
+    """Bars of one cross section lying on z = 0, as one body."""
+    lengths = [float(np.linalg.norm(end - start)) for start, end, _ in bars]
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(name="body")
+    for i, ((start, end, more), length) in enumerate(zip(bars, lengths, strict=True)):
+        (x, y), yaw = (start + end) / 2, math.atan2(*(end - start)[::-1])
+        body.add_geom(
+            name=f"bar_{i}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[length / 2 + more, width / 2, height / 2],
+            pos=[x, y, height / 2],
+            quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
+            mass=mass * length / sum(lengths),
+            friction=[friction, 0.005, 0.0001],
+            condim=4,
+            solref=STIFF,
+            priority=PRIORITY,
+            rgba=rgba,
+        )
+    return spec
+
+
+if __name__ == "__main__":
+    show(LHook())

@@ -1,0 +1,249 @@
+"""Galileo's ramp: two equal inclines that face each other, joined by a round valley, with a goal patch on one of them.
+
+    near                    far
+     \\                     //      s < 0 on the near incline, s > 0 on the far one; s = 0 in the middle of the
+      \\                   //       valley. A ball let go at the one side climbs the other one, as high as it
+       \\__             __//  patch came from if nothing is lost.
+          ``--.......--``
+
+The paper's asset (App. C: "Galileo ramp, parametric angle 10 to 60 deg, mu in [0.10, 0.50]"); its task T14 calls the
+ramp frictionless, so that friction may go down to 0 here.
+
+Losses. A ball that rolls into a sharp V is stopped by half its speed at once: there a height of release says nothing
+about the height on the other side. So the valley is an arc, of flat facets of 3 deg, because a convex geom cannot be
+hollow. The facets are tangents of the arc and may overlap, as each continues below the surface of its neighbours:
+no seam stands out. What a facet takes is the normal part of the speed, as far as the contact is inelastic. With the
+time constant and damping of the other props (0.005 s, critical) that is 4 to 9 % of the height per pass, more at
+half the time step, because the ball touches several facets at once and is braked by those ahead. Steel on steel is
+elastic: with `ELASTIC` a ball loses 0.5 to 2 % at 12 to 40 deg, and half a time step shifts this by less than 1 %.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..params import check_bounds, param
+from .scene import PRIORITY, show
+
+GRAVITY = 9.81
+"""Gravitational acceleration [m/s^2], MuJoCo's own."""
+ELASTIC = (-2e5, -50.0)
+"""Contact stiffness [1/s^2] and damping [1/s] of the floor, per mass. Natural frequency sqrt(2e5) = 447 /s, 3.5 time
+steps of 2 ms to half an oscillation; damping ratio 50 / (2 * 447) = 0.06, so that a bounce returns 84 % of the speed."""
+OWN = PRIORITY + 1
+"""Contact priority. The friction of the floor is the floor's own, whatever lies on it: the ball must be slippery here
+and firm between the fingers."""
+FACET = math.radians(3.0)
+"""Angle between neighbouring facets of the valley [rad]. At 2 deg the losses are the same, at 4 deg they scatter twice
+as much."""
+THICKNESS = 0.012
+"""Thickness of the floor, and height of its lowest point above the table [m]."""
+RIM = 0.015
+"""How far the side walls rise above the floor [m]: most of a ball's radius, and below the palm of any hand in between."""
+WALL = 0.005
+"""Thickness of the side walls [m]."""
+SEAMS = 0.011
+"""Share of the height that the valley's facets take per pass: middle of 0.5 to 1.7 %, measured at 12 to 40 deg."""
+STEP = 0.001
+"""Time step of `climb` [s]."""
+
+FLOOR = (0.62, 0.60, 0.57, 1.0)
+GOAL = (0.20, 0.70, 0.30, 1.0)
+GLASS = (0.55, 0.70, 0.80, 0.35)
+
+Point = NDArray[np.float64]
+"""Shape (3,), in the frame of the ramp: x along the ramp, y across, z up from the table [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp:
+    """The whole ramp. x points from the near side to the far one; the origin is on the table, below the valley."""
+
+    angle: float = param(24.0, "deg", 10.0, 60.0)
+    """Slope of both inclines."""
+    friction: float = param(0.0, "1", 0.0, 0.5)
+    """Of the whole floor, against anything that lies on it."""
+    span: float = param(0.52, "m", 0.2, 0.76)
+    """Length along the table, from the one top to the other."""
+    bend: float = param(0.12, "m", 0.04, 0.3)
+    """Radius of the valley."""
+    width: float = param(0.14, "m", 0.03, 0.3)
+    """Distance between the side walls. An open jaw is 0.12 m wide with its fingers."""
+    level: float = param(0.6, "ramp heights", 0.0, 1.0)
+    """Height of the patch's middle above the valley, relative to the top of the ramp."""
+    band: float = param(0.006, "m", 0.002, 0.05)
+    """How much higher the patch's upper edge lies than its lower edge."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    # --- geometry of the floor, by the distance s from the middle of the valley -----------
+
+    @property
+    def slope(self) -> float:
+        """Slope of the inclines [rad]."""
+        return math.radians(self.angle)
+
+    @property
+    def foot(self) -> float:
+        """Where the far incline begins: half the length of the arc [m]."""
+        return self.bend * self.slope
+
+    @property
+    def top(self) -> float:
+        """Where the far incline ends [m]."""
+        return self.foot + (self.span / 2 - self.bend * math.sin(self.slope)) / math.cos(self.slope)
+
+    def height(self, s: float) -> float:
+        """Height of the floor above the middle of the valley [m]."""
+        arc = min(abs(s), self.foot)
+        return self.bend * (1 - math.cos(arc / self.bend)) + (abs(s) - arc) * math.sin(self.slope)
+
+    def at_height(self, height: float) -> float:
+        """Where on the far incline the floor is that high [m]."""
+        return self.foot + (height - self.height(self.foot)) / math.sin(self.slope)
+
+    @property
+    def patch(self) -> tuple[float, float]:
+        """Lower and upper edge of the patch [m]."""
+        middle = self.level * self.height(self.top)
+        return self.at_height(middle - self.band / 2), self.at_height(middle + self.band / 2)
+
+    def tilt(self, s: float) -> float:
+        """Slope of the floor, negative on the near side [rad]."""
+        return max(-self.foot, min(self.foot, s)) / self.bend
+
+    def normal(self, s: float) -> Point:
+        """Unit vector out of the floor."""
+        return np.array([-math.sin(self.tilt(s)), 0.0, math.cos(self.tilt(s))])
+
+    def floor(self, s: float) -> Point:
+        """A point on the middle line of the floor."""
+        arc = max(-self.foot, min(self.foot, s))
+        x = self.bend * math.sin(arc / self.bend) + (s - arc) * math.cos(self.slope)
+        return np.array([x, 0.0, THICKNESS + self.height(s)])
+
+    # --- motion of a ball -----------------------------------------------------------------
+
+    @property
+    def arrival(self) -> float:
+        """Highest speed at the patch's lower edge with which a sliding ball turns back on the patch [m/s]."""
+        return math.sqrt(2 * GRAVITY * self.band)
+
+    @property
+    def rolls(self) -> bool:
+        """Whether a solid ball rolls on the inclines without slipping: mu > 2/7 tan(slope)."""
+        return self.friction > 2.0 / 7.0 * math.tan(self.slope)
+
+    def climb(self, start: float, radius: float) -> float:
+        """Height of the floor [m] where a ball turns back on the far side, let go on the near side at `start` < 0 [m].
+
+        Newton's law for the centre, and for the spin of a solid ball (2/5 m r^2), with Coulomb friction that acts
+        until the ball rolls; the valley presses with v^2 / (bend - radius) in addition. The far incline is taken as
+        endless. Without friction, and where the ball rolls all along, that gives the height of the start.
+        """
+        s, speed, spin, g = start, 0.0, 0.0, GRAVITY
+        while s < 0.0 or speed > 0.0:
+            tilt = self.tilt(s)
+            inside = abs(s) < self.foot
+            press = g * math.cos(tilt) + (speed**2 / (self.bend - radius) if inside else 0.0)
+            rolling = (g * math.sin(tilt) - (speed - spin) / STEP) / 3.5
+            rub = max(-self.friction * press, min(self.friction * press, rolling))
+            speed += STEP * (rub - g * math.sin(tilt))
+            spin -= STEP * 2.5 * rub
+            s += STEP * speed * (self.bend / (self.bend - radius) if inside else 1.0)
+        return self.height(s) - SEAMS * self.height(start)
+
+    def release(self, radius: float) -> float:
+        """Height of the floor [m] on the near side from which a ball turns back in the middle of the patch.
+
+        Raises nothing: a height above the top of the ramp is an answer too.
+        """
+        goal = self.level * self.height(self.top)
+        low, high = goal, 4.0 * goal
+        while high - low > 1e-4:
+            middle = (low + high) / 2
+            enough = self.climb(-self.at_height(middle), radius) >= goal
+            low, high = (low, middle) if enough else (middle, high)
+        return (low + high) / 2
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def spec(self) -> mujoco.MjSpec:
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body(name="body")
+        for name, rgba, stretches in self._floors():
+            part = body.add_body(name=name)
+            for i, (start, end) in enumerate(stretches):
+                self._slab(part, f"{name}_{i}", start, end, rgba)
+        for side in (-1, 1):
+            self._walls(body, side)
+        return spec
+
+    def _floors(self) -> Iterator[tuple[str, tuple[float, ...], list[tuple[Point, Point]]]]:
+        """Name, colour and stretches of each part of the floor: the ends of every slab's surface."""
+        low, high = self.patch
+        facets = max(2, math.ceil(2 * self.slope / FACET))
+        turn = 2 * self.slope / facets
+        half = self.bend * math.tan(turn / 2) + WALL
+        middles = [self.bend * (-self.slope + i * turn) for i in range(1, facets)]
+        yield "near", FLOOR, [(self.floor(-self.top), self._along(-self.foot, half))]
+        yield "valley", FLOOR, [(self._along(s, -half), self._along(s, half)) for s in middles]
+        yield "far", FLOOR, [(self._along(self.foot, -half), self.floor(low))]
+        yield "patch", GOAL, [(self.floor(low), self.floor(high))]
+        yield "beyond", FLOOR, [(self.floor(high), self.floor(self.top))]
+
+    def _along(self, s: float, further: float) -> Point:
+        """A point on the tangent of the floor at s."""
+        tilt = self.tilt(s)
+        return self.floor(s) + further * np.array([math.cos(tilt), 0.0, math.sin(tilt)])
+
+    def _slab(
+        self, body: mujoco.MjsBody, name: str, start: Point, end: Point, rgba: tuple[float, ...]
+    ) -> None:
+        """A slab whose upper side runs from `start` to `end`."""
+        run = end - start
+        tilt = math.atan2(run[2], run[0])
+        down = THICKNESS / 2 * np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
+        size = [float(np.linalg.norm(run)) / 2, self.width / 2, THICKNESS / 2]
+        self._board(body, name, (start + end) / 2 + down, size, tilt, rgba)
+
+    def _walls(self, body: mujoco.MjsBody, side: int) -> None:
+        """A side wall along each incline and across the valley, and a post under each top."""
+        y = side * (self.width + WALL) / 2
+        shift, tall = np.array([0.0, y, 0.0]), (THICKNESS + RIM) / 2
+        for end in (-1, 1):
+            foot, top, up = self.floor(end * self.foot), self.floor(end * self.top), self.normal(end * self.top)
+            middle = (foot + top) / 2 + (RIM - tall) * up + shift
+            size = [float(np.linalg.norm(top - foot)) / 2, WALL / 2, tall]
+            self._board(body, f"wall_{side}_{end}", middle, size, end * self.slope, GLASS)
+            post = np.array([end * (self.span / 2 - WALL), y, top[2] / 2])
+            self._board(body, f"post_{side}_{end}", post, [WALL, WALL / 2, top[2] / 2], 0.0, FLOOR)
+        foot = self.floor(self.foot)
+        middle = np.array([0.0, y, (foot[2] + RIM) / 2])
+        self._board(body, f"wall_{side}_0", middle, [foot[0] + WALL, WALL / 2, (foot[2] + RIM) / 2], 0.0, GLASS)
+
+    def _board(
+        self, body: mujoco.MjsBody, name: str, pos: Point, size: list[float], tilt: float, rgba: tuple[float, ...]
+    ) -> None:
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=size,
+            pos=pos,
+            quat=[math.cos(tilt / 2), 0, -math.sin(tilt / 2), 0],
+            friction=[self.friction, 0.005, 0.0001],
+            condim=3,
+            solref=ELASTIC,
+            priority=OWN,
+            mass=0.1,
+            rgba=rgba,
+        )
+
+
+if __name__ == "__main__":
+    show(Ramp())

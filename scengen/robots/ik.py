@@ -1,0 +1,127 @@
+"""How near the Panda's grip site can come to a place: inverse kinematics within joint limits, from fixed starts.
+
+A residual found here is attained by a posture, so it can only be too large, never too small: it proves reach, and
+suggests its absence. `shortfall` proves absence: it is too small everywhere, never too large. Where the two are close
+to each other nothing is left to doubt. Neither knows of collisions, gravity or torque: the arm may pass through the
+table and itself, so what is out of reach here is out of reach for good.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from . import panda
+
+LEVER = 0.1
+"""A turn of 1 rad counts as much as this distance [m]: about the length of the hand."""
+STARTS: NDArray[np.float64] = np.array(
+    [
+        panda.HOME,
+        [0.0, 0.9, 0.0, -0.6, 0.0, 1.5, 0.8],
+        [0.0, 1.5, 0.0, -0.1, 0.0, 1.6, 0.8],
+        [0.0, 0.9, 0.0, -1.2, 1.5, 1.2, -0.8],
+        [0.0, 0.9, 0.0, -1.2, -1.5, 1.2, 2.0],
+        [0.0, 0.3, 1.5, -1.2, 0.0, 2.5, 0.8],
+        [0.0, 0.3, -1.5, -1.2, 0.0, 2.5, 0.8],
+        [0.0, 1.2, 0.0, -0.6, 0.0, 3.0, 0.8],
+    ]
+)
+"""Joint angles from which a search sets out [rad], shape (n, 7): home, leaning and stretched, wrist and elbow to
+either side, wrist up. Joint 1 is turned towards the target first."""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The best posture of a search."""
+
+    angles: NDArray[np.float64]
+    """Joint angles [rad], shape (7,)."""
+    residual: float
+    """Distance left between grip site and target [m]."""
+    turn: float
+    """Angle left between the hand and the asked orientation [rad]; 0 where any orientation will do."""
+
+
+def reach(target: ArrayLike, frame: NDArray[np.float64] | None = None) -> Nearest:
+    """The posture that brings the grip site closest to `target`, in the least-squares sense.
+
+    Args:
+        target: world position [m], shape (3,).
+        frame: orientation of the grip site, shape (3, 3); any orientation will do by default.
+    """
+    goal = np.asarray(target, float)
+    found = [_descend(goal, frame, start) for start in STARTS]
+    return min(found, key=lambda n: n.residual + LEVER * n.turn)
+
+
+def shortfall(target: ArrayLike) -> float:
+    """A distance [m] by which the grip site misses `target` in every posture: the triangle inequality.
+
+    Not positive where the bound says nothing. It ignores joint limits, and so is smaller than `reach` finds.
+    """
+    return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - panda.REACH
+
+
+def _descend(goal: NDArray[np.float64], frame: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
+    arm = _arm()
+    low, high = arm.limits
+    angles = start.copy()
+    angles[0] = np.arctan2(goal[1] - panda.BASE[1], goal[0] - panda.BASE[0])
+
+    def error(q: NDArray[np.float64]) -> NDArray[np.float64]:
+        place, here = arm.pose(q)
+        return place - goal if frame is None else np.concatenate([place - goal, LEVER * _turn(here, frame)])
+
+    def slope(q: NDArray[np.float64]) -> NDArray[np.float64]:
+        return arm.slope(q, frame is not None)
+
+    end = least_squares(error, np.clip(angles, low + 1e-6, high - 1e-6), slope, (low, high), xtol=1e-10).x
+    left = error(end)
+    return Nearest(end, float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])) / LEVER)
+
+
+class _Arm:
+    """The bare arm as MuJoCo compiles it, for its kinematics alone."""
+
+    def __init__(self) -> None:
+        spec = mujoco.MjSpec()
+        panda.attach(spec)
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.site = self.model.site("gripper0_right_grip_site").id
+        joints = [self.model.joint(f"robot0_joint{i + 1}") for i in range(panda.JOINTS)]
+        self.at = np.array([joint.qposadr[0] for joint in joints])
+        self.dofs = np.array([joint.dofadr[0] for joint in joints])
+        ranges = np.array([joint.range for joint in joints])
+        self.limits = ranges[:, 0], ranges[:, 1]
+
+    def pose(self, angles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position [m] and orientation of the grip site."""
+        self.data.qpos[self.at] = angles
+        mujoco.mj_kinematics(self.model, self.data)
+        return self.data.site_xpos[self.site].copy(), self.data.site_xmat[self.site].reshape(3, 3).copy()
+
+    def slope(self, angles: NDArray[np.float64], turning: bool) -> NDArray[np.float64]:
+        """Derivative of the position, and of `LEVER` times the turn, shape (3 or 6, 7)."""
+        self.pose(angles)
+        mujoco.mj_comPos(self.model, self.data)
+        along, about = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacSite(self.model, self.data, along, about, self.site)
+        return np.vstack([along, LEVER * about])[: 6 if turning else 3, self.dofs]
+
+
+@functools.cache
+def _arm() -> _Arm:
+    return _Arm()
+
+
+def _turn(here: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rotation vector [rad] that turns `there` into `here`, in world axes."""
+    quat, turn = np.empty(4), np.empty(3)
+    mujoco.mju_mat2Quat(quat, (here @ there.T).ravel())
+    mujoco.mju_quat2Vel(turn, quat, 1.0)
+    return turn

@@ -1,0 +1,119 @@
+"""A suction cup on the Panda's flange, built here because robosuite has no suction gripper.
+
+        flange      The cup is four box pads in a body of its own, because MuJoCo's adhesion acts on every contact of
+          ||        a body, and a single box or cylinder drops a thin plate at 20 N: too few contact points hold it.
+         _||_       The pull is a fixed force, unlike a vacuum, so the control loop gates it: it acts only while at
+        [][]        least three of the pads touch something (`osc.SEAL`), as a cup sucks only when its lip is closed.
+
+Names and frames are those of robosuite's Panda gripper: body "right_gripper", "eef" with the grip site, here in the
+middle of the pads' lower face, z out of the hand, and the wrist's force and torque sensors.
+"""
+
+import functools
+
+import mujoco
+
+from . import panda
+
+PULL = 40.0
+"""Force that holds a sealed cup to a flat face [N]: a 30 mm cup at 0.6 bar below the air's pressure pulls 42 N."""
+LENGTH = 0.097
+"""From the flange to the lower face of the pads [m]: the grip site of robosuite's jaw has the same place."""
+PAD = 0.012
+"""Edge of one square pad [m]."""
+PITCH = 0.015
+"""Distance of neighbouring pads' middles [m]; with `PAD` the cup covers a square of 27 mm."""
+REACHES = (PITCH + PAD) / 2
+"""How far the cup reaches to each side of the grip site [m]: a face must go on that far to take all four pads."""
+MASS = 0.3
+"""Mass of the tool [kg]: robosuite's Panda hand without its fingers."""
+
+_LIP = 0.004
+"""Thickness of the pads [m]."""
+_RUBBER = (0.13, 0.13, 0.15, 1.0)
+_METAL = (0.75, 0.76, 0.78, 1.0)
+_STEM = ((0.031, 0.0, 0.020, _METAL), (0.011, 0.020, 0.078, _METAL), (0.017, 0.078, LENGTH - _LIP, _RUBBER))
+"""Radius, lower and upper end along the hand's axis [m] and colour of flange plate, tube and bellows."""
+
+
+def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
+    """Add the Panda with a suction cup to `scene`; see `panda.attach`."""
+    panda.attach(scene, visual, hand=_cup(visual))
+
+
+@functools.cache
+def _cup(visual: bool) -> mujoco.MjSpec:
+    """The tool alone."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.autolimits = True
+    hand = spec.worldbody.add_body(name="right_gripper", quat=[0.707107, 0, 0, -0.707107])
+    hand.add_site(name="ft_frame", size=[0.01, 0.01, 0.01], rgba=[1, 0, 0, 1], group=1)
+    hand.explicitinertial = True
+    hand.mass, hand.ipos, hand.inertia = MASS, [0, 0, 0.03], [3e-4, 3e-4, 1.5e-4]  # a cylinder, 60 x 80 mm
+    for i, (radius, low, high, rgba) in enumerate(_STEM):
+        _cylinder(hand, f"hand_collision_{i}", radius, low, high)
+        if visual:
+            look = _cylinder(hand, f"hand_visual_{i}", radius, low, high)
+            look.group, look.contype, look.conaffinity, look.mass, look.rgba = 1, 0, 0, 0, rgba
+    _sites(hand)
+    pad = hand.add_body(name="suction_pad", pos=[0, 0, LENGTH])
+    pad.explicitinertial = True
+    pad.mass, pad.ipos, pad.inertia = 0.01, [0, 0, -_LIP / 2], [1e-6, 1e-6, 2e-6]
+    for i in range(4):  # the control loop expects the four pads in a row
+        _pad(pad, f"pad{i}_collision", i)
+    if visual:
+        for i in range(4):
+            look = _pad(pad, f"pad{i}_visual", i)
+            look.group, look.contype, look.conaffinity, look.mass, look.rgba = 1, 0, 0, 0, _RUBBER
+    pull = spec.add_actuator(name="suction", trntype=mujoco.mjtTrn.mjTRN_BODY, target="suction_pad")
+    pull.ctrllimited, pull.ctrlrange = True, [0, 1]
+    pull.gainprm[0] = PULL
+    if visual:
+        for kind, name in ((mujoco.mjtSensor.mjSENS_FORCE, "force_ee"), (mujoco.mjtSensor.mjSENS_TORQUE, "torque_ee")):
+            spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="ft_frame")
+    return spec
+
+
+def _cylinder(body: mujoco.MjsBody, name: str, radius: float, low: float, high: float) -> mujoco.MjsGeom:
+    """A piece of the stem between two places on the hand's axis [m]."""
+    return body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, (high - low) / 2, 0],
+        pos=[0, 0, (high + low) / 2],
+    )
+
+
+def _pad(body: mujoco.MjsBody, name: str, quarter: int) -> mujoco.MjsGeom:
+    """One pad, its lower face in the plane of the grip site."""
+    x, y = ((1, 1), (-1, 1), (-1, -1), (1, -1))[quarter]
+    return body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[PAD / 2, PAD / 2, _LIP / 2],
+        pos=[x * PITCH / 2, y * PITCH / 2, -_LIP / 2],
+        friction=[1.0, 0.005, 0.0001],
+        condim=4,
+        solref=(0.005, 1.0),
+    )
+
+
+def _sites(hand: mujoco.MjsBody) -> None:
+    """The sites that robosuite looks for in every gripper."""
+    eef = hand.add_body(name="eef", pos=[0, 0, LENGTH])
+    eef.add_site(name="grip_site", size=[0.01, 0.01, 0.01], rgba=[1, 0, 0, 0.5], group=1)
+    turned = {"ee_x": [0.707105, 0, 0.707108, 0], "ee_y": [0.707105, 0.707108, 0, 0], "ee_z": [1, 0, 0, 0]}
+    for i, (name, quat) in enumerate(turned.items()):
+        pos, rgba = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]
+        pos[i], rgba[i] = 0.1, 1.0
+        eef.add_site(
+            name=name, pos=pos, quat=quat, size=[0.005, 0.1, 0], rgba=rgba, type=mujoco.mjtGeom.mjGEOM_CYLINDER, group=1
+        )
+    eef.add_site(
+        name="grip_site_cylinder",
+        size=[0.005, 10, 0],
+        rgba=[0, 1, 0, 0.3],
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        group=1,
+    )
