@@ -16,7 +16,8 @@ from .progress import Bar
 from .sim import native
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-out, err = Console(soft_wrap=False), Console(stderr=True, soft_wrap=True)
+out = Console(width=None if sys.stdout.isatty() else 160)
+err = Console(stderr=True, soft_wrap=True)
 
 Arguments = Sequence[str]
 

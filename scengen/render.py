@@ -1,11 +1,14 @@
 """Pictures of scenes and film strips of rollouts. Needs OpenGL: EGL or OSMesa without a display."""
 
 import io
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import mujoco
 import numpy as np
+from mujoco import gl_context
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -26,6 +29,7 @@ class Camera:
 
     def __init__(self, world: World, width: int = 320, height: int = 240):
         self.world = world
+        _check_backend()
         try:
             self._renderer = mujoco.Renderer(world.model, height, width)
         except Exception as error:  # what fails differs by platform and back end: ImportError, AttributeError, GLError
@@ -34,8 +38,8 @@ class Camera:
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
         self._view = mujoco.MjvCamera()
-        self._view.lookat = [0.0, 0.0, 0.88]
-        self._view.distance, self._view.azimuth, self._view.elevation = 1.35, 145.0, -32.0
+        self._view.lookat = [-0.05, 0.0, 0.92]
+        self._view.distance, self._view.azimuth, self._view.elevation = 1.15, 140.0, -28.0
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
@@ -55,6 +59,15 @@ class Camera:
         robot = model.body_rootid == model.body("robot0_base").id
         hulls = robot[model.geom_bodyid] & (model.geom_group == 0)
         model.geom_rgba[hulls, 3] = 0.0
+
+
+def _check_backend() -> None:
+    """Refuse the back end that needs a display where there is none: trying it twice ends the process."""
+    if "glfw" in gl_context.GLContext.__module__ and sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        raise NoPictures(
+            "no OpenGL for pictures without a display; on Debian install libegl1 libgl1 libosmesa6, and set "
+            "MUJOCO_GL=egl or import scengen before mujoco"
+        )
 
 
 @contextmanager

@@ -64,7 +64,7 @@ class Scenario(abc.ABC):
         """Why the episode is lost for good, or None. A failure ends the episode."""
         return None
 
-    def script(self, world: World) -> None:  # noqa: B027: most scenes have no events
+    def script(self, world: World) -> None:  # noqa: B027
         """Events of the scene itself, called before every control period. Draws nothing: all values are parameters."""
 
     def shortcuts(self) -> Mapping[str, Planner]:

@@ -3,7 +3,7 @@
        ________________
       |  _             |      side view; the hole is where the floor ends near +x
       | (_)   |        |
-      |_______|____   _|      the sill is the low bar in the middle of the floor
+      |_______|____   _|      the sill is the low bar on the floor
 
 Collision geometry is an exact convex decomposition: plates are boxes, and the part of the holed plate around the hole
 is cut by rays from the hole's centre into wedges whose inner faces touch the circle from outside. So the hole is a
@@ -57,13 +57,15 @@ class HoledCage:
     """Radius of the hole."""
     offset: float = param(0.043, "m", -0.08, 0.08)
     """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
-    sill: float = param(0.003, "m", 0.0, 0.015)
-    """Height of the bar across the middle of the floor; it is as thick as the walls. At 0 there is none."""
+    sill: float = param(0.005, "m", 0.0, 0.015)
+    """Height of the bar across the floor; it is as thick as the walls. At 0 there is none."""
+    sill_x: float = param(-0.012, "m", -0.08, 0.08)
+    """Where the sill stands, from the middle of the floor."""
     mass: float = param(0.100, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     closed: bool = False
     """Whether the hole is stopped up: the same cage without its way out."""
-    rgba: tuple[float, float, float, float] = (0.35, 0.62, 0.85, 0.40)
+    rgba: tuple[float, float, float, float] = (0.35, 0.62, 0.85, 0.25)
 
     def __post_init__(self) -> None:
         check_bounds(self)
@@ -168,9 +170,8 @@ class HoledCage:
     def _sill(self) -> list[Box]:
         if self.sill == 0:
             return []
-        return [
-            (np.array([0, 0, self.wall + self.sill / 2]), np.array([self.wall, self.cavity[1], self.sill])),
-        ]
+        centre = np.array([self.sill_x, 0, self.wall + self.sill / 2])
+        return [(centre, np.array([self.wall, self.cavity[1], self.sill]))]
 
     def _patch(self) -> tuple[float, float, float]:
         """The rectangle that is cut into wedges, seen from the hole: its two ends and its half width [m]."""

@@ -31,11 +31,11 @@ BEND_PARTS = 12
 class LHook:
     """A handle with a straight tip at a right angle to its end."""
 
-    length: float = param(0.34, "m", 0.20, 0.50)
+    length: float = param(0.37, "m", 0.20, 0.50)
     """Of the handle, the tip's width included."""
     tip: float = param(0.07, "m", 0.02, 0.12)
     """How far the tip stands out beside the handle's face."""
-    width: float = param(0.020, "m", 0.010, 0.040)
+    width: float = param(0.032, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.12, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)

@@ -42,19 +42,19 @@ class Seesaw:
     Pivot offset and beam mass: paper, App. C ("pivot offset +-0.10 m; beam mass 0.20-0.80 kg"); it gives nothing else.
     """
 
-    length: float = param(0.56, "m", 0.2, 0.8)
+    length: float = param(0.60, "m", 0.2, 0.8)
     width: float = param(0.050, "m", 0.02, 0.10)
     thickness: float = param(0.012, "m", 0.004, 0.03)
     height: float = param(0.095, "m", 0.04, 0.20)
-    """Of the level deck's upper face. An arm of 0.38 m dips by 66 mm at the stop and must not strike the ground."""
+    """Of the level deck's upper face. An arm of 0.40 m dips by 69 mm at the stop and must not strike the ground."""
     drop: float = param(0.060, "m", 0.03, 0.12)
     """Of the deck's upper face below the axle."""
     pivot_offset: float = param(0.0, "m", -0.10, 0.10)
     """Of the axle from the middle of the deck."""
     mass: float = param(0.35, "kg", 0.2, 0.8, hidden=True)
     friction: float = param(0.8, "1", 0.05, 1.5)
-    damping: float = param(0.12, "N m s/rad", 0.0, 1.0)
-    """Of an air dashpot, as laboratory balances have: about half of critical for the loads of interest."""
+    damping: float = param(0.16, "N m s/rad", 0.0, 1.0)
+    """Of an air dashpot, as laboratory balances have: about 0.8 of critical, 2 sqrt(0.4 N m x 0.03 kg m^2)."""
     rubbing: float = param(0.002, "N m", 0.0, 0.05)
     """Dry friction of the bearing: mu r N = 0.1 x 2 mm x 10 N for a steel axle of 4 mm that carries 1 kg."""
     stop: float = param(10.0, "deg", 6.0, 25.0)
@@ -87,6 +87,7 @@ class Seesaw:
 
     def spec(self) -> mujoco.MjSpec:
         spec = mujoco.MjSpec()
+        spec.compiler.degree = False
         stand = spec.worldbody.add_body(name="body")
         box, grey = mujoco.mjtGeom.mjGEOM_BOX, [0.35, 0.37, 0.40, 1]
         side = self.width / 2 + CHEEK + SLACK + POST / 2

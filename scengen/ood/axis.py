@@ -53,7 +53,8 @@ class Axis:
             modulo = f" modulo {parameter.period:g}" if parameter.period else ""
             raise BadConfig(
                 f"axis {self.name}: {parameter.name} goes to {spell(there)}, which touches or overlaps its "
-                f"training range {spell(here)}{modulo} [{parameter.unit}]; move it outside or narrow the range in `id`"
+                f"training range {spell(here)}{modulo} [{parameter.unit}]; move it outside, "
+                f"narrow the range in `id`, or drop the axis (~task.axes.{self.name})"
             )
         finite = (Fixed, Choice, Integer)
         kind = "categorical" if isinstance(there, finite) or isinstance(here, finite) else "interval"

@@ -38,7 +38,7 @@ from ..params import param
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, release
+from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, push, release
 
 LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
@@ -50,15 +50,28 @@ TOUCH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088
 The first two stretches are those of `panda.REACH`; the third ends at the tip of an open finger, 0.0545 across the axis
 of joint 7 and 0.2127 along it, measured on the collision meshes.
 """
-ARM = 0.70
+ARM = 0.72
 """Farthest distance of a top-down grasp at table height from the robot's first axis that plans use [m]; inverse
 kinematics allows 0.76."""
+JAW_OPENING = 0.08
+"""Widest thing that fits between the fingers [m]: twice the range of a finger joint, panda_gripper.xml."""
 GRASP_FROM_END = 0.035
 """Where the handle is held, measured from its end [m]: the pads are 16 mm wide."""
 GRASP_HEIGHT = 0.014
 """Height of the grip site over the table when the hook is held [m]; the finger tips end 9 mm below it."""
-CLEAR = 0.015
-"""Free space kept between hook and cube before the hook is behind it [m]."""
+RAISED, NOSE_UP = 0.003, 0.03
+"""How far the held end of the hook is raised while it moves [m], and how much its far end is tilted up [rad].
+Dragged flat, the tip catches the table's edge from outside as soon as it has been behind a cube that stands there."""
+CLEAR, WIDE = 0.012, 0.03
+"""Free space kept between hook and cube where the tip goes behind it, and on the way there [m]."""
+SQUARING = 0.015
+"""How far the handle pushes the cube sideways before the tip pulls it [m]: that turns a cube that stands askew by
+20 deg until its side lies against the handle."""
+
+OUTWARDS = math.radians(40.0)
+"""Tilt of a hand that reaches out for the cube: near full stretch inverse kinematics comes closest with it."""
+STRETCHED = 0.03
+"""How far short of full stretch a reaching plan stops [m]: beyond it the arm is singular and creeps."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +140,8 @@ class ToolRetrieve(Scenario):
             return Refutation("the arm may touch the cube without the hook", {"gap": gap, "reach": TOUCH})
         if (needed := self.distance + self.half * math.sqrt(2) - self.stretch) > ARM:
             return Refutation("the hook is too short", {"hand at": needed, "arm": ARM})
+        if (both := self.cube.edge + self.hook.width) <= JAW_OPENING:
+            return Refutation("the jaw can hold hook and cube together", {"both": both, "jaw": JAW_OPENING})
         if self.hook.tip < self.half:
             return Refutation("the tip ends before the cube's middle", {"tip": self.hook.tip, "half": self.half})
         away = float(np.linalg.norm(self.outline[:2].mean(axis=0) - BASE[:2]))
@@ -180,17 +195,21 @@ class ToolRetrieve(Scenario):
         yield from self._descend_on(world, held, math.atan2(along[1], along[0]))
         yield from grasp(world, 0.4)
 
-    def draw_in(self, world: World) -> Plan:
-        """Pass the hook by the cube on the side away from its tip, put the tip behind the cube, pull."""
+    def draw_in(self, world: World, mirror: float = 1.0) -> Plan:
+        """Pass the hook by the cube on the side away from its tip, put the tip behind the cube, pull.
+
+        With `mirror` = -1 it passes on the other side, and the tip ends up behind nothing.
+        """
         cube = world.com("cube") - BASE
         bearing, there = math.atan2(cube[1], cube[0]), math.hypot(cube[0], cube[1])
         away = self._half_across(world, bearing)
-        passing = away + CLEAR + self.hook.tip + self.hook.width / 2
+        passing = away + WIDE + self.hook.tip + self.hook.width / 2
         behind, near = there + away + CLEAR, self._drawn + self.half
-        yield from self.slide(world, bearing, there - away - 4 * CLEAR, passing, within=0.015)
-        yield from self.slide(world, bearing, behind, passing)
-        yield from self.slide(world, bearing, behind, away + 0.003 + self.hook.width / 2)
-        yield from self.slide(world, bearing, near, away + 0.003 + self.hook.width / 2, speed=0.2, within=0.01)
+        beside = self.half + self.hook.width / 2 - SQUARING
+        yield from self.slide(world, bearing, there - away - self.hook.width - WIDE, passing, within=0.015, mirror=mirror)
+        yield from self.slide(world, bearing, behind, passing, mirror=mirror)
+        yield from self.slide(world, bearing, behind, beside, speed=0.2, mirror=mirror)
+        yield from self.slide(world, bearing, near, beside, speed=0.2, within=0.01, mirror=mirror)
 
     def put_down(self, world: World) -> Plan:
         """Take the tip, then the handle off the cube, let go, go up."""
@@ -219,7 +238,7 @@ class ToolRetrieve(Scenario):
         within: float = 0.004,
         mirror: float = 1.0,
     ) -> Plan:
-        """Slide the held hook until it lies along `bearing` [rad], seen from the robot's first axis.
+        """Move the held hook over the table until it lies along `bearing` [rad], seen from the robot's first axis.
 
         Args:
             inside: how far out the face that pulls shall lie [m].
@@ -227,13 +246,12 @@ class ToolRetrieve(Scenario):
                 where the tip points [m].
             mirror: -1 for the other side.
         """
-        turn = _turned(bearing)
+        held = world.frame("hook").T @ np.column_stack([world.hand - world.pos("hook"), world.hand_frame])
         place = np.array([inside - self.hook.inside, -mirror * self.hook.side * beside, 0.0])
-        goal = np.array([BASE[0], BASE[1], TABLE_TOP]) + turn @ place
-        hand, hook = world.hand_frame, world.frame("hook")
-        frame = turn @ hook.T @ hand
-        at = goal + turn @ hook.T @ (world.hand - world.pos("hook"))
-        yield from go_to(world, at, frame, speed=speed, within=within)
+        goal = BASE + _turned(bearing) @ place
+        goal[2] = TABLE_TOP + RAISED + self.hook.length / 2 * math.sin(NOSE_UP)
+        hook = _turned(bearing) @ _leaning(NOSE_UP)
+        yield from go_to(world, goal + hook @ held[:, 0], hook @ held[:, 1:], speed=speed, within=within)
 
     @property
     def _drawn(self) -> float:
@@ -255,7 +273,61 @@ class ToolRetrieve(Scenario):
     # --- shortcuts ------------------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Planner]:
-        return {}
+        return {
+            "reach for the cube": self._reach,
+            "pull with the tip turned away": self._pull_past,
+            "pick the cube with the hook": self._pick_with_hook,
+            "grasp cube and handle together": self._grasp_both,
+        }
+
+    def _reach(self, world: World) -> Plan:
+        """Stretch the arm towards the cube as far as it goes, hand tilted outwards, close, lift."""
+        out = (world.com("cube") - SHOULDER) / np.linalg.norm(world.com("cube") - SHOULDER)
+        bearing = math.atan2(out[1], out[0])
+        tilted = _turned(bearing) @ _leaning(OUTWARDS) @ facing_down()
+        nearest = SHOULDER + (REACH - STRETCHED) * out
+        yield from go_to(world, nearest - 0.1 * out + 0.05 * UP, tilted, within=0.03, grip=OPEN)
+        yield from go_to(world, nearest, tilted, within=0.01)
+        yield from grasp(world, 0.3)
+        yield from go_to(world, nearest - 0.1 * out + 0.1 * UP, within=0.03)
+
+    def _pull_past(self, world: World) -> Plan:
+        """Draw with the handle on the wrong side of the cube, then reach for where the cube still is."""
+        yield from self.take_hook(world)
+        yield from self.draw_in(world, mirror=-1.0)
+        yield from self.put_down(world)
+        yield from self._reach(world)
+
+    def _pick_with_hook(self, world: World) -> Plan:
+        """Draw the cube in and lift it in the corner of the hook, then open the jaw."""
+        yield from self.take_hook(world)
+        yield from self.draw_in(world)
+        yield from go_to(world, world.hand + 0.12 * UP, within=0.02)
+        yield from release(world)
+
+    def _grasp_both(self, world: World) -> Plan:
+        """Draw the cube in, let go of the hook where it is, and close the jaw across cube and handle."""
+        yield from self.take_hook(world)
+        yield from self.draw_in(world)
+        yield from release(world)
+        yield from go_to(world, world.hand + 0.1 * UP, within=0.02)
+        along, left = world.frame("hook")[:, 0], world.frame("hook")[:, 1]
+        middle = world.com("cube") - self.hook.side * self.hook.width / 2 * left
+        frame = facing_down(math.remainder(math.atan2(along[1], along[0]), math.pi))
+        yield from go_to(world, middle + (TABLE_TOP + 0.10 - middle[2]) * UP, frame, within=0.004)
+        yield from push(world, -0.1 * UP, until=lambda: self._low(world, middle[2]))
+        yield from grasp(world, 0.4)
+        yield from go_to(world, world.hand + 0.12 * UP, within=0.02)
+
+    def _low(self, world: World, height: float) -> bool:
+        """Whether the hand is down at `height` [m], or something has stopped it."""
+        return world.hand[2] <= height or world.touching(ROBOT, "cube") or world.touching(ROBOT, "hook")
+
+
+def _leaning(tilt: float) -> Mat3:
+    """The rotation by `tilt` [rad] that turns down towards x."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    return np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
 
 
 def _turned(yaw: float) -> Mat3:

@@ -143,3 +143,35 @@ def turn_between(here: Mat3, there: Mat3) -> Vec3:
     mujoco.mju_mat2Quat(quat, (there @ here.T).ravel())
     mujoco.mju_quat2Vel(turn, quat, 1.0)
     return turn
+
+
+def rotate(
+    world: World,
+    frame: Mat3,
+    rate: float = 1.0,
+    until: Callable[[], bool] = lambda: False,
+    grip: float | None = None,
+    within: float = 0.03,
+    give_up: float = 6.0,
+) -> Plan:
+    """Turn the hand on the spot to `frame` at an even `rate` [rad/s], until it is there or something happens.
+
+    Turns the shorter way; ends within `within` [rad] of the frame.
+
+    Raises:
+        GaveUp: it was not there within `give_up` [s].
+    """
+    end, here, start = world.time + give_up, world.hand, world.hand_frame
+    way = turn_between(start, frame)
+    angle, turned = math.sqrt(way @ way), 0.0
+    while not until():
+        left = turn_between(world.hand_frame, frame)
+        if math.sqrt(left @ left) < within:
+            return
+        if world.time > end:
+            raise GaveUp(f"the hand stayed {math.degrees(math.sqrt(left @ left)):.0f} deg short for {give_up:g} s")
+        turned = min(angle, turned + rate * Loop.PERIOD)
+        share, quat, mat = turned / max(angle, 1e-9), np.empty(4), np.empty(9)
+        mujoco.mju_axisAngle2Quat(quat, way / max(angle, 1e-9), share * angle)
+        mujoco.mju_quat2Mat(mat, quat)
+        yield steer(world, here, np.zeros(3), turn_between(world.hand_frame, mat.reshape(3, 3) @ start), grip)
