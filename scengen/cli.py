@@ -5,12 +5,13 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
 from . import config
-from .config import conf_dir, read, tasks, typed
+from .config import conf_dir, read, search_path, tasks, typed
 from .errors import BadConfig, ScengenError, nearest
 from .progress import Bar
 from .sim import native
@@ -110,7 +111,7 @@ def verify(arguments: Arguments) -> int:
         raise BadConfig(f"workers = {settings.workers}; it must be at least 1")
     pool = Pool.open(_one(settings.pool))
     with Bar(err, f"verify {pool.folder}", len(pool)) as bar:
-        report = verify(pool, config.task, settings.workers, settings.expired == "fail", bar.show)
+        report = verify(pool, partial(config.task, search=search_path(arguments)), settings.workers, settings.expired == "fail", bar.show)
     result = {"pool_sha256": pool.sha256, **asdict(report)}
     if settings.json:
         _write(Path(settings.json), json.dumps(result, indent=1) + "\n")
@@ -200,11 +201,11 @@ def list_tasks(arguments: Arguments) -> int:
     """what can be generated: tasks, parameters, splits and their proofs"""
     from .report import task_tables, tasks_table
 
-    settings = typed("", TasksSettings, read("tasks", arguments).settings)
+    settings, search = typed("", TasksSettings, read("tasks", arguments).settings), search_path(arguments)
     if settings.name is None:
-        out.print(tasks_table([config.task(name) for name in tasks()]))
+        out.print(tasks_table([config.task(name, search) for name in tasks(search)]))
         return OK
-    for table in task_tables(config.task(settings.name)):
+    for table in task_tables(config.task(settings.name, search)):
         out.print(table)
     return OK
 

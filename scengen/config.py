@@ -63,19 +63,25 @@ def read(verb: str, overrides: Sequence[str]) -> Composed:
     return Composed(settings, task, level, plain)
 
 
-def tasks() -> list[str]:
-    """Names of all task files on Hydra's search path."""
+def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
+    """Those overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`."""
+    return tuple(o for o in overrides if o.startswith("hydra.searchpath="))
+
+
+def tasks(search: Sequence[str] = ()) -> list[str]:
+    """Names of all task files, those of other packages included (`search_path`)."""
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
-        return sorted(GlobalHydra.instance().config_loader().get_group_options("task"))
+        loader = GlobalHydra.instance().config_loader()
+        return sorted(loader.get_group_options("task", config_name="tasks", overrides=list(search)))
 
 
-def task(name: str) -> Task:
+def task(name: str, search: Sequence[str] = ()) -> Task:
     """The task of that name, as its file says.
 
     Raises:
         UnknownName: there is no such file.
     """
-    found = read("one_task", [f"task={name}"]).task
+    found = read("one_task", [f"task={name}", *search]).task
     assert found is not None
     return found
 

@@ -48,12 +48,15 @@ def summary_lines(summary: Summary) -> list[str]:
 
 
 def pool_table(pool: Pool) -> Table:
-    """One line per scenario."""
-    table = Table("id", "index", "split", "moved", "parameters", title=f"{pool.folder}", title_justify="left")
-    for row in pool.rows(["id", "index", "split", "moved", "params"]):
-        table.add_row(
-            row["id"], str(row["index"]), row["split"], _values(row["moved"]), _values(row["params"], short=True)
-        )
+    """One line per scenario, with the parameters that differ from one to another."""
+    rows = [(row, json.loads(row["params"])) for row in pool.rows(["id", "index", "moved", "params"])]
+    first = rows[0][1] if rows else {}
+    drawn = [name for name in first if any(params[name] != first[name] for _, params in rows)]
+    split = pool.manifest["config"]["split"]
+    table = Table("id", "index", "parameters", title=f"{pool.folder}: {split}", title_justify="left")
+    for row, params in rows:
+        shown = [name for name in params if name in drawn or name in json.loads(row["moved"])]
+        table.add_row(row["id"], str(row["index"]), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
     return table
 
 
@@ -142,11 +145,6 @@ def thumbnail(row: Row, width: int = 320, height: int = 240) -> str:
     """A picture of the start of a scenario, as a data address for HTML."""
     with render.camera(row["scene_xml"], row["embodiment"], width, height) as view:
         return "data:image/webp;base64," + base64.b64encode(render.encode(view.take())).decode()
-
-
-def _values(text: str, short: bool = False) -> str:
-    pairs = [f"{name.rpartition('.')[2] if short else name}={value:.4g}" for name, value in json.loads(text).items()]
-    return ", ".join(pairs)
 
 
 def _numbers(numbers: Mapping[str, Any]) -> str:

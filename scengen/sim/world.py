@@ -173,13 +173,13 @@ class World:
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the future depends on, in one vector."""
-        return np.concatenate([self.loop.state(), self.filter.state(), [self.grip]])
+        return np.concatenate([self.loop.state(), self.filter.state, [self.grip]])
 
     def restore(self, state: NDArray[np.float64]) -> None:
         """Continue from `state()` of a world of the same scene, bit by bit."""
-        n = len(self.filter.state())
+        n = len(self.filter.state)
         self.loop.restore(state[: -n - 1])
-        self.filter.restore(state[-n - 1 : -1])
+        self.filter.state = state[-n - 1 : -1]
         self.grip = float(state[-1])
 
     @property

@@ -54,11 +54,14 @@ DOWN = 0.0015
 """Largest height of a piece's foot above the bin's floor where it lies on it [m]."""
 APART = 0.008
 """Least distance of two things on the table at the start [m]: a cup may be a little off, a piece a little turned."""
-TRANSIT = 0.06
+TRANSIT = 0.04
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
-PACE = 8.0
-CAUGHT = math.radians(1.5)
-NEAR, INTEGRAL, LEVER = 0.003, 4.0, 0.08
+CAUGHT = math.radians(0.7)
+SP=60
+CALM=0.01
+W=0.5
+PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
+NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
 
@@ -280,13 +283,12 @@ class Packing(Scenario):
         """Bring piece `i` to a position [m] and yaw [rad] in the bin, and let go once it lies there."""
         name = f"piece_{i}"
         yield from self.lift(world, i, yaw)
-        over = np.array([pos[0], pos[1], TABLE_TOP + TRANSIT])
-        yield from carry(world, name, over, yaw, within=0.02)
+        over = pos + (self.thickness + 0.006) * UP
         lies = lies or (lambda: self.lies(world, i))
         while not lies():
-            yield from carry(world, name, pos + 1.3 * self.thickness * UP, yaw, within=self.clearance / 2, calm=0.005)
+            yield from carry(world, name, over, yaw, within=W * self.clearance)
             caught = lambda: lies() or world.tilt(name) > CAUGHT
-            yield from carry(world, name, pos - 0.002 * UP, yaw, speed=0.06, until=caught)
+            yield from carry(world, name, pos - 0.002 * UP, yaw, speed=SP * self.clearance, until=caught)
         yield from release(world, seconds=0.1)
         yield from go_to(world, world.hand + 0.04 * UP, within=0.01)
 
@@ -338,7 +340,6 @@ def carry(
     yaw: float,
     speed: float = 0.25,
     within: float = 0.003,
-    calm: float = math.inf,
     until: Callable[[], bool] | None = None,
     give_up: float = 5.0,
 ) -> Plan:
@@ -351,25 +352,24 @@ def carry(
     Raises:
         GaveUp: that took longer than `give_up` [s].
     """
-    end, goal, frame = world.time + give_up, np.asarray(target, float), _upright(yaw)
-    setpoint, bias = world.hand, np.zeros(3)
+    end, goal, frame, setpoint = world.time + give_up, np.asarray(target, float), _upright(yaw), world.hand
+    turned = frame @ world.frame(body).T
+    aim, aim_frame = goal + turned @ (world.hand - world.pos(body)), turned @ world.hand_frame
     while not (until and until()):
-        turn, turned = turn_between(world.frame(body), frame), frame @ world.frame(body).T
-        left = goal + turned @ (world.hand - world.pos(body)) - world.hand
-        error, askew = math.sqrt(left @ left), math.sqrt(turn @ turn)
-        if until is None and error < within and askew * LEVER < within:
-            pace = world.velocity(body)[3:]
-            if math.sqrt(pace @ pace) < calm:
-                return
+        left, askew = goal - world.pos(body), turn_between(world.frame(body), frame)
+        error, angle, pace = (math.sqrt(v @ v) for v in (left, askew, world.velocity(body)[3:]))
+        if until is None and error < within and angle * LEVER < within and pace < CALM:
+            return
         if world.time > end:
-            raise GaveUp(f"{body} stayed {1000 * error:.1f} mm and {math.degrees(askew):.1f} deg off for {give_up:g} s")
+            raise GaveUp(f"{body} stayed {1000 * error:.1f} mm and {math.degrees(angle):.1f} deg off for {give_up:g} s")
         if error < NEAR:
-            bias = bias + INTEGRAL * Loop.PERIOD * left
-        ahead = world.hand + left + bias - setpoint
+            aim = aim + INTEGRAL * Loop.PERIOD * left
+        ahead = aim - setpoint
         distance = math.sqrt(ahead @ ahead)
         velocity = ahead * (min(speed, PACE * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
-        yield steer(world, setpoint, velocity, turn, CLOSED)
+        turn = turn_between(world.hand_frame, aim_frame)
+        yield steer(world, world.hand + FIRM * (setpoint - world.hand), velocity, FIRM_TURN * turn, CLOSED)
 
 
 def _upright(yaw: float) -> Mat3:

@@ -55,6 +55,8 @@ INNER = 0.055
 """Least distance between block and axle [m]: the fingers pass the posts by 1 cm."""
 BESIDE = 0.056
 """Least distance between the middles of two blocks [m]: 16 mm of air at 40 mm of width."""
+PALM = 0.110
+"""Half the width of the hand across the fingers, and 8 mm of air [m]: robosuite's panda_gripper.xml, hull of the hand."""
 RIM = 0.004
 """Least deck beyond a block [m]."""
 EXPECTED_BEAM, EXPECTED_TARGET, EXPECTED_WEIGHT = 0.35, 0.22, 0.27
@@ -189,8 +191,8 @@ class SeesawBalance(Scenario):
             return Refutation("the deck strikes the table before its stop", {"dip": dip, "height": under})
         away = self.start - self.foot
         beside = abs(float(self.s[0] * away[1] - self.s[1] * away[0]))
-        if beside < (need := 0.05 + self.seesaw.width / 2 + self.weight.width / math.sqrt(2)):
-            return Refutation("the counterweight stands in the seesaw's way", {"beside": beside, "needed": need})
+        if beside < (need := PALM + self.seesaw.width / 2):
+            return Refutation("the hand cannot take the counterweight beside the seesaw", {"beside": beside, "needed": need})
         grip = max(self.seesaw.friction, min(self.target.friction, self.weight.friction))
         if grip < (need := 1.5 * math.tan(math.radians(self.seesaw.stop))):
             return Refutation("blocks slide on the tilted deck", {"friction": grip, "needed": need})
