@@ -111,7 +111,8 @@ def verify(arguments: Arguments) -> int:
         raise BadConfig(f"workers = {settings.workers}; it must be at least 1")
     pool = Pool.open(_one(settings.pool))
     with Bar(err, f"verify {pool.folder}", len(pool)) as bar:
-        report = verify(pool, partial(config.task, search=search_path(arguments)), settings.workers, settings.expired == "fail", bar.show)
+        find_task = partial(config.task, search=search_path(arguments))
+        report = verify(pool, find_task, settings.workers, settings.expired == "fail", bar.show)
     result = {"pool_sha256": pool.sha256, **asdict(report)}
     if settings.json:
         _write(Path(settings.json), json.dumps(result, indent=1) + "\n")

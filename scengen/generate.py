@@ -3,10 +3,11 @@
 import itertools
 import json
 import math
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,7 @@ def generate(task: Task, node: Mapping[str, Any], level: Level, settings: Settin
     try:
         records = journal.records()
         _extend(task, node["task"], level, settings, records, journal, progress)
-        return _finish(folder, identity, settings, records)
+        return _finish(folder, identity, settings, records, journal)
     finally:
         journal.close()
 
@@ -109,7 +110,9 @@ def attempt(task: Task, split: str, seed: int, index: int, level: Level, keep: t
         draw = task.draw(split, seed, index)
     except Infeasible as error:
         why = max(error.reasons, key=error.reasons.__getitem__)
-        return Record(index, "refuted", "feasible", why, error.tries, error.reasons, None, time.process_time() - start)
+        return Record(
+            index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, time.process_time() - start
+        )
     certified = certify(draw.scenario, task.horizon, level, task.embodiment)
     certificate = certified.certificate
     failed = certificate.failed
@@ -120,7 +123,7 @@ def attempt(task: Task, split: str, seed: int, index: int, level: Level, keep: t
         failed.name if failed else "",
         failed.reason if failed else "",
         draw.attempt + 1,
-        draw.rejected,
+        dict(draw.rejected),
         row,
         time.process_time() - start,
     )
@@ -203,14 +206,18 @@ def _extend(
     missing = (i for i in range(limit) if i not in records)
     job = (task.name, dict(node), level, settings.split, settings.seed, tuple(settings.keep))
 
+    verdicts = Counter(r.verdict for r in records.values())
+
     def needed(index: int) -> bool:
         """Whether index can still be among the first n certified ones."""
+        if verdicts["certified"] < settings.n:
+            return True
         return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
 
     def done(record: Record) -> None:
         journal.add(record)
-        records[record.index] = record
-        verdicts = Counter(r.verdict for r in records.values())
+        records[record.index] = replace(record, row=None)
+        verdicts[record.verdict] += 1
         progress(verdicts["certified"], len(records), verdicts)
 
     for record in each(_work, itertools.takewhile(needed, missing), settings.workers, _begin, job):
@@ -229,18 +236,15 @@ def _work(index: int) -> Record:
     return attempt(_JOB["task"], _JOB["split"], _JOB["seed"], index, _JOB["level"], _JOB["keep"])
 
 
-def _finish(folder: Path, identity: Mapping[str, Any], settings: Settings, records: Mapping[int, Record]) -> Summary:
+def _finish(
+    folder: Path, identity: Mapping[str, Any], settings: Settings, records: Mapping[int, Record], journal: Journal
+) -> Summary:
     """Write the first n certified indices, and count up to the last of them."""
-    counted, rows = [], []
-    for index in sorted(records):
-        record = records[index]
-        counted.append(record)
-        if record.verdict == "certified" and record.row:
-            rows.append(record.row)
-        if len(rows) == settings.n:
-            break
-    kept = [r.row for r in counted if r.verdict in settings.keep and r.row]
-    reasons = Counter(f"{r.check}: {r.reason}" for r in counted if r.check)
+    certified = [i for i in sorted(records) if records[i].verdict == "certified"][: settings.n]
+    enough = len(certified) == settings.n
+    counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
+    kept = [r.index for r in counted if r.verdict in settings.keep and r.check != "feasible"]
+    reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check)
     counts = funnel(counted)
     first = sum(r.verdict == "certified" and r.proposals == 1 for r in counted)
     manifest = {
@@ -251,5 +255,9 @@ def _finish(folder: Path, identity: Mapping[str, Any], settings: Settings, recor
         "indices": len(counted),
         "first_draws": first,
     }
-    written = pool.write(folder, manifest, rows, kept)
-    return Summary(written, len(rows), len(counted), counts, reasons, first, math.fsum(r.cpu for r in counted))
+    written = pool.write(folder, manifest, journal.rows(certified), list(journal.rows(kept)))
+    return Summary(written, len(certified), len(counted), counts, reasons, first, math.fsum(r.cpu for r in counted))
+
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+"""Numbers in a reason; without them, rejections of the same kind have the same reason and can be counted."""

@@ -2,8 +2,8 @@
 
 import json
 import sqlite3
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +25,10 @@ class Record:
     reason: str
     proposals: int
     """Draws made for this index, infeasible ones included."""
-    infeasible: Mapping[str, int]
+    infeasible: dict[str, int]
     """Infeasible draws by reason."""
     row: Row | None
-    """The scenario, if it goes into the pool or is kept on request."""
+    """The scenario, if it goes into the pool or is kept on request; None in what `Journal.records` gives."""
     cpu: float
     """Processor time spent [s]; differs from run to run and stays out of the pool."""
 
@@ -68,7 +68,8 @@ class Journal:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("CREATE TABLE IF NOT EXISTS run (identity TEXT)")
             self._db.execute(
-                "CREATE TABLE IF NOT EXISTS record (idx INTEGER PRIMARY KEY, body TEXT, tape BLOB, cpu REAL)"
+                "CREATE TABLE IF NOT EXISTS record"
+                " (idx INTEGER PRIMARY KEY, body TEXT, scene TEXT, tape BLOB, cpu REAL)"
             )
             begun = self._db.execute("SELECT identity FROM run").fetchone()
         except sqlite3.DatabaseError:
@@ -85,40 +86,32 @@ class Journal:
             )
 
     def records(self) -> dict[int, Record]:
-        """All records so far, by index."""
-        return {
-            i: _read(body, tape, cpu) for i, body, tape, cpu in self._db.execute("SELECT * FROM record ORDER BY idx")
-        }
+        """All records so far by index, without their rows: those of a large run do not fit into memory."""
+        found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
+        return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu) for body, cpu in found)}
+
+    def rows(self, indices: Iterable[int]) -> Iterator[Row]:
+        """The stored scenarios of these indices, one after the other."""
+        for index in indices:
+            scene, tape = self._db.execute("SELECT scene, tape FROM record WHERE idx = ?", (index,)).fetchone()
+            yield {**json.loads(scene), "witness": np.frombuffer(tape, np.float32).reshape(-1, 7)}
 
     def add(self, record: Record) -> None:
         """Store one record; once this returns it survives a kill."""
-        row = dict(record.row) if record.row else None
-        tape = np.asarray(row.pop("witness"), np.float32).tobytes() if row else None
-        body = {
-            "index": record.index,
-            "verdict": record.verdict,
-            "check": record.check,
-            "reason": record.reason,
-            "proposals": record.proposals,
-            "infeasible": dict(record.infeasible),
-            "row": row,
-        }
+        body = {f.name: getattr(record, f.name) for f in fields(record) if f.name not in ("row", "cpu")}
+        scene, tape = None, None
+        if record.row is not None:
+            scene = json.dumps({k: v for k, v in record.row.items() if k != "witness"})
+            tape = np.asarray(record.row["witness"], np.float32).tobytes()
         with self._db:
             self._db.execute(
-                "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?)",
-                (record.index, json.dumps(body), tape, record.cpu),
+                "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",
+                (record.index, json.dumps(body), scene, tape, record.cpu),
             )
 
     def close(self) -> None:
         self._db.close()
         self._lock.release()
-
-
-def _read(body: str, tape: bytes | None, cpu: float) -> Record:
-    node = json.loads(body)
-    if node["row"] is not None:
-        node["row"]["witness"] = np.frombuffer(tape or b"", np.float32).reshape(-1, 7)
-    return Record(**node, cpu=cpu)
 
 
 def _different(a: Any, b: Any, path: str = "") -> list[str]:

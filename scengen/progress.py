@@ -15,7 +15,7 @@ class Bar:
 
     def __init__(self, console: Console, title: str, total: int):
         self.console, self.title, self.total = console, title, total
-        self._last = time.monotonic()
+        self._last, self._said = time.monotonic(), 0
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -39,6 +39,7 @@ class Bar:
     def show(self, done: int, note: str = "") -> None:
         """Say that `done` of the total are done."""
         self._progress.update(self._task, completed=done, note=note)
-        if not self.console.is_terminal and (time.monotonic() - self._last > EVERY or done == self.total):
-            self._last = time.monotonic()
+        due = time.monotonic() - self._last > EVERY or (done == self.total and self._said != done)
+        if due and not self.console.is_terminal:
+            self._last, self._said = time.monotonic(), done
             self.console.print(f"{self.title}: {done} of {self.total} {note}".rstrip(), highlight=False)

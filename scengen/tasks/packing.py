@@ -54,7 +54,7 @@ DOWN = 0.0015
 """Largest height of a piece's foot above the bin's floor where it lies on it [m]."""
 APART = 0.008
 """Least distance of two things on the table at the start [m]: a cup may be a little off, a piece a little turned."""
-TRANSIT = 0.04
+TRANSIT = 0.05
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
 CAUGHT = math.radians(0.7)
 SP=60
@@ -284,6 +284,7 @@ class Packing(Scenario):
         name = f"piece_{i}"
         yield from self.lift(world, i, yaw)
         over = pos + (self.thickness + 0.006) * UP
+        yield from carry(world, name, np.array([pos[0], pos[1], TABLE_TOP + TRANSIT]), yaw, within=0.02)
         lies = lies or (lambda: self.lies(world, i))
         while not lies():
             yield from carry(world, name, over, yaw, within=W * self.clearance)
