@@ -101,10 +101,12 @@ class HoledCage:
 
     @property
     def margin(self) -> float:
-        """Least distance from the rim of the hole to a wall that stands on its face [m]; negative: it does not fit."""
+        """Least distance from the rim of the hole to what stands on its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]
-        across = 3 - axis - along
-        return min(self.cavity[along] / 2 - abs(self.offset), self.cavity[across] / 2) - self.hole
+        free = [self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2]
+        if self.face == BOTTOM and self.sill > 0:
+            free.append(abs(self.offset - self.sill_x) - self.wall / 2)
+        return min(free) - self.hole
 
     def tilt_over_sill(self, radius: float) -> float:
         """Tilt of the floor at which a ball that lies against the sill rolls over it [rad].

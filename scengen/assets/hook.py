@@ -37,8 +37,8 @@ class LHook:
     """How far the tip stands out beside the handle's face."""
     width: float = param(0.032, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
-    mass: float = param(0.12, "kg", 0.02, 0.5)
-    friction: float = param(0.6, "1", 0.05, 1.5)
+    mass: float = param(0.10, "kg", 0.02, 0.5)
+    friction: float = param(0.8, "1", 0.05, 1.5)
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
     rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
 
@@ -86,7 +86,7 @@ class JHook:
     width: float = param(0.016, "m", 0.010, 0.030)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.12, "kg", 0.02, 0.5)
-    friction: float = param(0.6, "1", 0.05, 1.5)
+    friction: float = param(0.8, "1", 0.05, 1.5)
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
     rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
 
@@ -147,7 +147,7 @@ class THook:
     width: float = param(0.020, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.14, "kg", 0.02, 0.5)
-    friction: float = param(0.6, "1", 0.05, 1.5)
+    friction: float = param(0.8, "1", 0.05, 1.5)
     rgba: tuple[float, float, float, float] = (0.45, 0.35, 0.65, 1.0)
 
     def __post_init__(self) -> None:

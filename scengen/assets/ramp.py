@@ -33,7 +33,7 @@ GRAVITY = 9.81
 """Gravitational acceleration [m/s^2], MuJoCo's own."""
 ELASTIC = (-2e5, -50.0)
 """Contact stiffness [1/s^2] and damping [1/s] of the floor, per mass. Natural frequency sqrt(2e5) = 447 /s, 3.5 time
-steps of 2 ms to half an oscillation; damping ratio 50 / (2 * 447) = 0.06, so that a bounce returns 84 % of the speed."""
+steps of 2 ms to half an oscillation; damping ratio 50 / (2 * 447) = 0.06: a bounce returns 84 % of the speed."""
 OWN = PRIORITY + 1
 """Contact priority. The friction of the floor is the floor's own, whatever lies on it: the ball must be slippery here
 and firm between the fingers."""
@@ -43,7 +43,7 @@ FACET = math.radians(1.0)
 THICKNESS = 0.012
 """Thickness of the floor, and height of its lowest point above the table [m]."""
 RIM = 0.015
-"""How far the side walls rise above the floor [m]: most of a ball's radius, and below the palm of any hand in between."""
+"""How far the side walls rise above the floor [m]: most of a ball's radius, far below the palm of the hand."""
 WALL = 0.005
 """Thickness of the side walls [m]."""
 SEAMS = (0.026, 0.045)
@@ -72,8 +72,8 @@ class Ramp:
     """Length along the table, from the one top to the other."""
     bend: float = param(0.12, "m", 0.04, 0.3)
     """Radius of the valley."""
-    width: float = param(0.14, "m", 0.03, 0.3)
-    """Distance between the side walls. An open jaw is 0.12 m wide with its fingers."""
+    width: float = param(0.15, "m", 0.03, 0.3)
+    """Distance between the side walls. An open jaw is 0.13 m wide with its fingers."""
     level: float = param(0.6, "ramp heights", 0.0, 1.0)
     """Height of the patch's middle above the valley, relative to the top of the ramp."""
     band: float = param(0.006, "m", 0.002, 0.05)
@@ -203,9 +203,7 @@ class Ramp:
         tilt = self.tilt(s)
         return self.floor(s) + further * np.array([math.cos(tilt), 0.0, math.sin(tilt)])
 
-    def _slab(
-        self, body: mujoco.MjsBody, name: str, start: Point, end: Point, rgba: tuple[float, ...]
-    ) -> None:
+    def _slab(self, body: mujoco.MjsBody, name: str, start: Point, end: Point, rgba: tuple[float, ...]) -> None:
         """A slab whose upper side runs from `start` to `end`."""
         run = end - start
         tilt = math.atan2(run[2], run[0])
@@ -235,7 +233,7 @@ class Ramp:
             name=name,
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=size,
-            pos=pos,
+            pos=pos.tolist(),
             quat=[math.cos(tilt / 2), 0, -math.sin(tilt / 2), 0],
             friction=[self.friction, 0.005, 0.0001],
             condim=3,

@@ -57,7 +57,8 @@ ROOM = 0.040
 ASIDE = 0.19
 """How far from the stool the cage is emptied [m]: the tilted cage and the stool reach 0.07 m each."""
 WIDEST = math.radians(55.0)
-"""The cage is emptied towards a heading within this of straight ahead, where the hand can lean far [rad]."""
+"""The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can lean
+far, and the ball has half a metre to run out."""
 YAW_LEAST, YAW_MOST = math.radians(-100.0), math.radians(190.0)
 """Turns of the downward hand that joint 7 allows with 10 deg and more to spare [rad]: its limits are +-2.897 rad, and
 it is at pi / 4 where the hand is not turned."""
@@ -127,6 +128,8 @@ class BallCageEscape(Scenario):
             return Refutation("the hole does not fit into its face", {"hole": cage.hole, "margin": cage.margin})
         if r >= cage.hole:
             return Refutation("the ball is wider than the hole", {"ball": r, "hole": cage.hole})
+        if cage.face in (BOTTOM, SIDE) and cage.offset - cage.hole < cage.sill_x + cage.wall / 2:
+            return Refutation("the hole is not beyond the sill", {"hole": cage.offset - cage.hole, "sill": cage.sill_x})
         if cage.face == TOP:
             return Refutation("the hole looks up, and the hand cannot turn over", {"steepest": STEEPEST})
         if self.least_tilt + SPARE > STEEPEST:
@@ -227,10 +230,10 @@ class BallCageEscape(Scenario):
     def pick_up(self, world: World) -> Plan:
         """Take the cage by its width and lift it clear of the stool."""
         handle, yaw = self.foot + HANDLE * UP, self._grip_yaw()
-        if abs(yaw) > math.pi / 2:  # the shorter way to a heading behind the robot may be the wrong way
-            yield from go_to(world, world.hand, facing_down(yaw / 2), grip=OPEN, within=0.02)
-        yield from go_to(world, handle + 0.06 * UP, facing_down(yaw), grip=OPEN, within=0.01)
-        yield from go_to(world, handle, speed=0.15)
+        halfway = facing_down(yaw / 2)  # from there on the shorter way round is the one that joint 7 can go
+        yield from go_to(world, handle + 0.10 * UP, halfway, grip=OPEN, within=0.03)
+        yield from go_to(world, handle + 0.06 * UP, facing_down(yaw), within=0.015)
+        yield from go_to(world, handle, speed=0.15, within=0.005)
         yield from grasp(world, 0.3)
         yield from go_to(world, handle + 0.05 * UP, speed=0.10, within=0.01)
 
@@ -246,15 +249,18 @@ class BallCageEscape(Scenario):
         spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
         yield from go_to(world, [spot[0], spot[1], max(world.hand[2], spot[2])], speed=0.2, within=0.01)
         yield from go_to(world, spot, speed=0.2, within=0.01)
-        turn = self._turn_towards_front(world, world.frame("cage") @ down)
+        turn = self._turn_to_middle(world, world.frame("cage") @ down, -side)
         for _ in range(2):  # each half is the shorter way
-            yield from rotate(world, _about_z(turn / 2) @ world.hand_frame, rate=1.5)
+            yield from rotate(world, _about_z(turn / 2) @ world.hand_frame, rate=2.0)
 
     @staticmethod
-    def _turn_towards_front(world: World, leaning: Vec3) -> float:
-        """The smallest turn of the hand that takes a direction to the front and joint 7 to no limit [rad]."""
+    def _turn_to_middle(world: World, leaning: Vec3, side: float) -> float:
+        """The smallest turn of the hand that takes a direction to the front, and to the table's middle [rad].
+
+        Out of its 360 deg more or less, one that joint 7 can go.
+        """
         heading, yaw = math.atan2(leaning[1], leaning[0]), hand_yaw(world)
-        turns = [front - heading + lap for front in np.linspace(-WIDEST, WIDEST, 23) for lap in LAPS]
+        turns = [side * front - heading + lap for front in np.linspace(0.0, WIDEST, 12) for lap in LAPS]
         return min((t for t in turns if YAW_LEAST <= yaw + t <= YAW_MOST), key=abs)
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:

@@ -260,8 +260,8 @@ class DominoSelect(Scenario):
     def topple(self, world: World, tile: str) -> Plan:
         """Push a tile over along its chain with the closed finger tips, then step back."""
         behind = self.foot(tile) + 0.8 * self.tile.height * UP - (self.tile.thickness / 2 + FINGERTIP + 0.02) * self.u
-        yield from go_to(world, behind + 0.10 * UP, self._across, grip=CLOSED)
-        yield from go_to(world, behind, speed=0.15)
+        yield from go_to(world, behind + 0.08 * UP, self._across, speed=0.3, within=0.02, grip=CLOSED)
+        yield from go_to(world, behind, self._across, within=0.005)
         yield from push(world, 0.08 * self.u, until=lambda: world.tilt(tile) > TOPPLED)
         yield from go_to(world, world.hand - 0.03 * self.u + 0.03 * UP, within=0.01)
 
@@ -292,23 +292,23 @@ class DominoSelect(Scenario):
         """No choice at all: one chain after the other, the right one last."""
         for k in [*self.wrong, self.intact]:
             yield from self.topple(world, f"tile_{k}_0")
-            yield from go_to(world, world.hand + 0.10 * UP, within=0.01)
+            yield from go_to(world, world.hand + 0.05 * UP, speed=0.3, within=0.02)
 
     def _push_slab(self, world: World) -> Plan:
         """Straight to the target: knock the slab of the intact chain over along its lane, from in front of it."""
         slab = f"slab_{self.intact}"
         beside = self.foot(slab) + 0.8 * self.slab.height * UP - 0.06 * self.u
-        yield from go_to(world, beside + 0.10 * UP, self._across, grip=CLOSED)
-        yield from go_to(world, beside)
+        yield from go_to(world, beside + 0.06 * UP, self._across, speed=0.3, within=0.02, grip=CLOSED)
+        yield from go_to(world, beside, self._across, within=0.005)
         yield from push(world, 0.15 * self.u, until=lambda: self.success(world))
 
     def _carry(self, world: World) -> Plan:
         """Take the intact chain's first tile, which may be touched, and knock its slab over with it."""
         tile, slab = self.foot(f"tile_{self.intact}_0"), self.foot(f"slab_{self.intact}")
         grip = tile + 0.6 * self.tile.height * UP
-        yield from go_to(world, grip + 0.10 * UP, self._across, grip=OPEN)
-        yield from go_to(world, grip, speed=0.15)
+        yield from go_to(world, grip + 0.06 * UP, self._across, speed=0.3, within=0.01, grip=OPEN)
+        yield from go_to(world, grip, self._across)
         yield from grasp(world)
-        yield from go_to(world, grip + 0.06 * UP)
+        yield from go_to(world, grip + 0.08 * UP)
         yield from go_to(world, slab + 0.8 * self.slab.height * UP - 0.04 * self.u)
         yield from push(world, 0.15 * self.u, until=lambda: self.success(world))

@@ -37,7 +37,7 @@ import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
-from ..assets.ramp import WALL, Ramp
+from ..assets.ramp import RIM, WALL, Ramp
 from ..assets.scene import PRIORITY, STIFF, TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
@@ -45,8 +45,14 @@ from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
 from ..validate.moves import OPEN, facing_down, go_to, grasp, push, release, wait
 
-TRAY = (0.07, 0.04)
-"""Half the inner size of the tray [m], across and along the ramp: an open jaw with its fingers is 0.12 m wide."""
+JAW = 0.132
+"""Width of the open jaw with its fingers [m], measured on the model as the next two."""
+FINGER = (0.010, 0.009)
+"""Half a finger's thickness, and how far it reaches beyond the grip site, along the ramp and down [m]."""
+PALM = (0.032, 0.031)
+"""Half the palm's thickness, and how far it is behind the grip site [m]."""
+TRAY = (0.075, 0.04)
+"""Half the inner size of the tray [m], across and along the ramp: the open jaw must fit."""
 TRAY_RIM = 0.012
 """Height of the tray's rim above its floor [m]: holds the ball, and stays below its equator."""
 TRAY_WALL = 0.005
@@ -104,6 +110,11 @@ class GalileoRampDrop(Scenario):
         return float((world.com("ball") - self.middle) @ self.frame[:, 0])
 
     @cached_property
+    def edge(self) -> float:
+        """How far along the ramp, level, the centre of a ball is that touches the patch's upper edge [m]."""
+        return float((self.resting(self.ramp.patch[1]) - self.middle) @ self.frame[:, 0])
+
+    @cached_property
     def start(self) -> float:
         """Where to let the ball go [m], negative on the near side."""
         return -self.ramp.at_height(self.ramp.release(self.ball.radius))
@@ -128,7 +139,18 @@ class GalileoRampDrop(Scenario):
         highest = self.ramp.climb(self.brim, self.ball.radius)
         if highest < (edge := self.ramp.height(high)) + self.ramp.band:
             return Refutation("a ball from the top does not overshoot", {"climbs": highest, "edge": edge})
-        return self._misplaced()
+        return self._cramped() or self._misplaced()
+
+    def _cramped(self) -> Refutation | None:
+        """No room for a hand that points down and holds the ball on the incline by its middle."""
+        if self.ramp.width < JAW:
+            return Refutation("the open jaw does not fit between the walls", {"jaw": JAW, "width": self.ramp.width})
+        fall, centre = math.tan(self.ramp.slope), self.ball.radius / math.cos(self.ramp.slope)
+        if (tips := centre - FINGER[1] - FINGER[0] * fall) < 0.0:
+            return Refutation("the fingers meet the floor before the ball does", {"room": tips})
+        if (palm := centre + PALM[1] - PALM[0] * fall - RIM / math.cos(self.ramp.slope)) < 0.0:
+            return Refutation("the palm meets the walls before the ball meets the floor", {"room": palm})
+        return None
 
     def _misplaced(self) -> Refutation | None:
         corners = np.array([[a, b, 0.0] for a in (-1, 1) for b in (-1, 1)])
@@ -152,7 +174,7 @@ class GalileoRampDrop(Scenario):
 
     def _add_tray(self, scene: mujoco.MjSpec) -> None:
         a = math.radians(self.heading) / 2
-        body = scene.worldbody.add_body(name="tray", pos=self.tray, quat=[math.cos(a), 0, 0, math.sin(a)])
+        body = scene.worldbody.add_body(name="tray", pos=self.tray.tolist(), quat=[math.cos(a), 0, 0, math.sin(a)])
         (across, along), half = TRAY, TRAY_WALL / 2
         tall = TRAY_RIM / 2 + half
         boards = [((0.0, 0.0, half), (along, across, half))]
@@ -190,7 +212,7 @@ class GalileoRampDrop(Scenario):
         along = self.along(world)
         if along > 0.0 and world.touching(ROBOT, "ball"):
             return "the robot touched the ball beyond the middle of the ramp"
-        if along > (self.frame.T @ (self.resting(self.ramp.patch[1]) - self.middle))[0]:
+        if along > self.edge:
             return "the ball went past the patch"
         return None
 

@@ -43,10 +43,10 @@ from ..errors import GaveUp
 from ..params import check_bounds, param
 from ..robots.panda import REACH, SHOULDER
 from ..robots.suction import REACHES
-from ..scenario import Plan, Planner, Refutation, Scenario
+from ..scenario import Action, Plan, Planner, Refutation, Scenario
 from ..sim.loop import Loop
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, push, release, steer, turn_between
+from ..validate.moves import CLOSED, OPEN, facing_down, go_to, release, steer, turn_between
 
 FLAT = math.radians(2.0)
 """Largest tilt of a piece that lies flat [rad]. A piece with one long side on a neighbour tilts by 6 deg and more."""
@@ -59,9 +59,10 @@ TRANSIT = 0.05
 CAUGHT = math.radians(0.7)
 SP=60
 CALM=0.01
+FIRMLY=0.15
 W=0.5
 PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
-NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
+NEAR, INTEGRAL, LEVER = 0.003, 1.5, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
 
@@ -298,8 +299,9 @@ class Packing(Scenario):
         name = f"piece_{i}"
         turn = float(turn_between(world.frame(name), _upright(yaw))[2])
         spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), _yaw_of(world.frame(name)))
-        yield from go_to(world, spot + TRANSIT * UP, facing_down(-turn / 2), grip=OPEN)
-        yield from push(world, -0.10 * UP, until=lambda: world.sealed, grip=CLOSED)
+        down = facing_down(-turn / 2)
+        yield from go_to(world, spot + (self.thickness + 0.03) * UP, down, grip=OPEN, within=0.005)
+        yield from suck(world, spot + self.thickness * UP, down)
         yield from go_to(world, world.hand + TRANSIT * UP, within=0.015)
 
     # --- shortcuts ------------------------------------------------------------------------
@@ -332,6 +334,26 @@ class Packing(Scenario):
         """The packing without its last piece."""
         for i in range(self.count - 1):
             yield from self.pack(world, i, *self.goal(i))
+
+
+def suck(world: World, spot: Vec3, frame: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
+    """Press the cup onto a face at `spot` [m] until it has held on for `FIRMLY` [s]; by then it lies flat.
+
+    Raises:
+        GaveUp: that took longer than `give_up` [s].
+    """
+    end, sealed, setpoint = world.time + give_up, world.time, np.array([spot[0], spot[1], world.hand[2]])
+    while world.time - sealed < FIRMLY:
+        if world.time > end:
+            raise GaveUp(f"the cup did not get hold of anything for {give_up:g} s")
+        if not world.sealed:
+            sealed, setpoint = world.time, setpoint - speed * Loop.PERIOD * UP
+        yield firm(world, setpoint, -speed * UP * (not world.sealed), turn_between(world.hand_frame, frame))
+
+
+def firm(world: World, setpoint: Vec3, velocity: Vec3, turn: Vec3) -> Action:
+    """As `steer` with suction on, but stiffer: for the last millimetres of slow moves, where friction holds back."""
+    return steer(world, world.hand + FIRM * (setpoint - world.hand), velocity, FIRM_TURN * turn, CLOSED)
 
 
 def carry(
@@ -369,8 +391,7 @@ def carry(
         distance = math.sqrt(ahead @ ahead)
         velocity = ahead * (min(speed, PACE * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
-        turn = turn_between(world.hand_frame, aim_frame)
-        yield steer(world, world.hand + FIRM * (setpoint - world.hand), velocity, FIRM_TURN * turn, CLOSED)
+        yield firm(world, setpoint, velocity, turn_between(world.hand_frame, aim_frame))
 
 
 def _upright(yaw: float) -> Mat3:

@@ -55,11 +55,13 @@ ARM = 0.72
 kinematics allows 0.76."""
 JAW_OPENING = 0.08
 """Widest thing that fits between the fingers [m]: twice the range of a finger joint, panda_gripper.xml."""
+HAND_AT = 0.65
+"""How far out the hand is when the tip is behind the cube, if the handle is long enough [m]."""
 GRASP_FROM_END = 0.035
-"""Where the handle is held, measured from its end [m]: the pads are 16 mm wide."""
+"""Least distance from the handle's end to where it is held [m]: the pads are 16 mm wide."""
 GRASP_HEIGHT = 0.014
 """Height of the grip site over the table when the hook is held [m]; the finger tips end 9 mm below it."""
-RAISED, NOSE_UP = 0.003, 0.03
+RAISED, NOSE_UP = 0.003, 0.07
 """How far the held end of the hook is raised while it moves [m], and how much its far end is tilted up [rad].
 Dragged flat, the tip catches the table's edge from outside as soon as it has been behind a cube that stands there."""
 CLEAR, WIDE = 0.012, 0.03
@@ -130,22 +132,26 @@ class ToolRetrieve(Scenario):
 
     @property
     def stretch(self) -> float:
-        """Distance from where the handle is held to the face that pulls [m]."""
-        return self.hook.inside + self.hook.length / 2 - GRASP_FROM_END
+        """Distance from where the handle is held to the face that pulls [m].
+
+        As short as it may be: the farther out the hook is held, the less its weight turns it in the jaw.
+        """
+        whole = self.hook.inside + self.hook.length / 2 - GRASP_FROM_END
+        return min(whole, self.distance + self.half * math.sqrt(2) + CLEAR - HAND_AT)
 
     def infeasible(self) -> Refutation | None:
         if (far := float(np.abs(self.outline).max())) > TABLE_HALF:
             return Refutation("hook or cube overhang the table", {"farthest": far, "edge": TABLE_HALF})
         if (gap := self.out_of_touch) <= 0:
             return Refutation("the arm may touch the cube without the hook", {"gap": gap, "reach": TOUCH})
-        if (needed := self.distance + self.half * math.sqrt(2) - self.stretch) > ARM:
+        if (needed := self.distance + self.half * math.sqrt(2) + CLEAR - self.stretch) > ARM:
             return Refutation("the hook is too short", {"hand at": needed, "arm": ARM})
         if (both := self.cube.edge + self.hook.width) <= JAW_OPENING:
             return Refutation("the jaw can hold hook and cube together", {"both": both, "jaw": JAW_OPENING})
         if self.hook.tip < self.half:
             return Refutation("the tip ends before the cube's middle", {"tip": self.hook.tip, "half": self.half})
-        away = float(np.linalg.norm(self.outline[:2].mean(axis=0) - BASE[:2]))
-        if away > ARM:
+        held = [self.hook_x, self.hook_y] + (self.hook.inside - self.stretch) * _turned(math.radians(self.hook_yaw))[:2, 0]
+        if (away := float(np.linalg.norm(held - BASE[:2]))) > ARM:
             return Refutation("the handle is out of reach", {"distance": away, "arm": ARM})
         return None
 
@@ -189,8 +195,8 @@ class ToolRetrieve(Scenario):
         yield from self.lift_cube(world)
 
     def take_hook(self, world: World) -> Plan:
-        """Grasp the handle near its end, across."""
-        held = world.pos("hook") + world.frame("hook") @ [GRASP_FROM_END - self.hook.length / 2, 0, GRASP_HEIGHT]
+        """Grasp the handle across."""
+        held = world.pos("hook") + world.frame("hook") @ [self.hook.inside - self.stretch, 0, GRASP_HEIGHT]
         along = world.frame("hook")[:, 0]
         yield from self._descend_on(world, held, math.atan2(along[1], along[0]))
         yield from grasp(world, 0.4)

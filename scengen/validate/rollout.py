@@ -198,6 +198,24 @@ class _Stillness:
         return self.periods * Loop.PERIOD >= STILL_FOR
 
 
+class Judge:
+    """Decides from period to period whether an episode is over: the one place where goal, hold and time limit meet."""
+
+    def __init__(self, scenario: Scenario, horizon: float):
+        self.scenario, self.horizon, self.held = scenario, horizon, 0.0
+
+    def look(self, world: World) -> tuple[Outcome, str] | None:
+        """The outcome and its reason once the episode is over; to be asked after every control period."""
+        if reason := self.scenario.failure(world):
+            return "failure", reason
+        self.held = self.held + Loop.PERIOD if self.scenario.success(world) else 0.0
+        if self.held and self.held >= self.scenario.HOLD - 1e-9:
+            return "success", ""
+        if world.time > self.horizon - 1e-9:
+            return "timeout", f"the goal was not reached in {self.horizon:g} s"
+        return None
+
+
 def _live(
     scenario: Scenario,
     world: World,
@@ -207,34 +225,36 @@ def _live(
     stillness: _Stillness | None,
 ) -> Episode:
     tape: list[NDArray[np.float32]] = []
+    judge = Judge(scenario, horizon)
 
     def ended(outcome: Outcome, reason: str = "", at: float | None = None) -> Episode:
         rows = np.array(tape, np.float32).reshape(-1, 7)
         return Episode(outcome, reason, round(world.time if at is None else at, 6), rows, world.digest)
 
-    def period() -> str | None:
-        """Live one control period. Returns the reason of a failure."""
+    def period() -> None:
         action = source.next()
         scenario.script(world)
         world.follow(action)
         tape.append(action)
-        return scenario.failure(world)
 
     try:
-        held = 0.0
-        while held == 0.0 or held < scenario.HOLD - 1e-9:
-            if world.time > horizon - 1e-9:
-                return ended("timeout", source.note or f"the goal was not reached in {horizon:g} s")
-            if reason := period():
-                return ended("failure", reason)
-            held = held + Loop.PERIOD if scenario.success(world) else 0.0
-            if stillness and source.ended and not held and stillness.lasts():
-                return ended("timeout", source.note or "everything came to rest without reaching the goal")
+        verdict = None
+        while verdict is None:
+            period()
+            verdict = judge.look(world)
+            if verdict is None and stillness and source.ended and not judge.held and stillness.lasts():
+                verdict = "timeout", "everything came to rest without reaching the goal"
+        outcome, reason = verdict
+        if outcome == "timeout":
+            return ended(outcome, source.note or reason)
+        if outcome == "failure":
+            return ended(outcome, reason)
         reached = world.time
         source.stop()
         for _ in range(round(settle / Loop.PERIOD)):
-            if reason := period():
-                return ended("failure", f"after the goal was reached: {reason}")
+            period()
+            if lost := scenario.failure(world):
+                return ended("failure", f"after the goal was reached: {lost}")
         if not scenario.success(world):
             return ended("timeout", f"the goal was reached but did not hold for {settle:g} s")
         return ended("success", at=reached)

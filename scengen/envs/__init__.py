@@ -1,0 +1,1 @@
+"""Pools as environments: Gymnasium's interface over certified scenarios."""

@@ -1,0 +1,231 @@
+"""Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v0", pool="generated/id")`.
+
+An environment plays the certified scenarios of a pool, the same scene text, physics and controller that the certificate
+speaks of. Nothing is sampled at reset: the seed chooses among the stored scenarios, and the id comes back in `info`.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from .. import config
+from ..errors import BadConfig, PoolError, UnknownName, Unstable
+from ..params import with_values
+from ..pool import Pool, Row
+from ..render import Camera
+from ..samplers.task import Task
+from ..sim.loop import ACTION, Loop
+from ..sim.world import World
+from ..validate.identity import versions
+from ..validate.rollout import Judge
+from .observations import CAMERAS, PROPRIOCEPTION, STREAMS, Reading, check_names
+
+Observation = dict[str, Reading]
+
+
+class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """The scenarios of one task in one or more pools.
+
+    Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
+    closed), at 100 Hz. They go to the controller as they are; oracles and people pass theirs through `scengen.robots.teleop.Filter`
+    first. Values outside [-1, 1] are clipped.
+
+    Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
+
+    Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
+    `info` holds `scenario`, `scene_sha256`, `split`, `axes`, `success`, `is_success`, and `reason` once it is over.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": round(1 / Loop.PERIOD)}  # noqa: RUF012
+
+    def __init__(
+        self,
+        task: str,
+        pool: str | Path | Sequence[str | Path],
+        observations: Sequence[str] = PROPRIOCEPTION,
+        render_mode: str | None = None,
+        width: int = 256,
+        height: int = 256,
+        camera: str = "agentview",
+    ):
+        """Open the pools.
+
+        Args:
+            task: name of the task; scenarios of others are refused.
+            pool: folder of a pool, or several.
+            observations: names of streams and cameras; what is not asked for costs nothing.
+            render_mode: None or `rgb_array`.
+            width: of all pictures [pixels].
+            height: of all pictures [pixels].
+            camera: what `render` shows: one of the scene's or the robot's cameras.
+
+        Raises:
+            ScengenError: a pool is missing, damaged, of another version or task; a name is unknown.
+        """
+        check_names(observations)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
+        self.task: Task = config.task(task)
+        self.render_mode, self.size, self.camera = render_mode, (width, height), camera
+        self.streams = {name: STREAMS[name] for name in observations if name in STREAMS}
+        self.cameras = [name for name in observations if name in CAMERAS]
+        self._rows = {row["id"]: row for folder in _folders(pool) for row in _scenarios(folder, task)}
+        self._order = list(self._rows)
+        self._next = 0
+        self._world: World | None = None
+        self._eye: Camera | None = None
+        self._row: Row = self._rows[self._order[0]]
+        self.task_description = self._row["instruction"]
+        self.action_space = spaces.Box(-1.0, 1.0, (ACTION,), np.float32)
+        boxes: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(-s.bound, s.bound, s.shape, np.float32) for name, s in self.streams.items()
+        }
+        pictures = {name: spaces.Box(0, 255, (height, width, 3), np.uint8) for name in self.cameras}
+        self.observation_space = spaces.Dict({**boxes, **pictures})
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """Ids of all scenarios, in the order of the pools."""
+        return tuple(self._order)
+
+    @property
+    def world(self) -> World:
+        """The running simulation."""
+        if self._world is None:
+            raise BadConfig("call reset before anything else")
+        return self._world
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Put a scenario at its start: `options={"scenario": id}`, else number `seed` of the pool, else the next one.
+
+        Raises:
+            UnknownName: there is no such scenario or option.
+        """
+        super().reset(seed=seed)
+        unknown = set(options or {}) - {"scenario"}
+        if unknown:
+            raise UnknownName("reset option", unknown.pop(), ["scenario"])
+        if seed is not None:
+            self._next = seed % len(self._order)
+        chosen = (options or {}).get("scenario", self._order[self._next])
+        if chosen not in self._rows:
+            raise UnknownName("scenario", str(chosen), self._order)
+        self._next = (self._order.index(chosen) + 1) % len(self._order)
+        self._load(self._rows[chosen])
+        self._over = False
+        return self._observe(), self._info("", False)
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Live one control period of 10 ms.
+
+        Raises:
+            ValueError: the action has another shape than (7,) or is not finite; nothing was simulated then.
+        """
+        given = np.asarray(action, np.float32)
+        if given.shape != (ACTION,) or not np.isfinite(given).all():
+            raise ValueError(f"an action is {ACTION} finite numbers in [-1, 1], not {np.array2string(given)}")
+        world = self.world
+        self._scenario.script(world)
+        try:
+            world.follow(np.clip(given, -1.0, 1.0))
+            verdict = self._judge.look(world)
+        except Unstable as error:
+            verdict = "unstable", str(error)
+        outcome, reason = verdict or (None, "")
+        success = outcome == "success"
+        terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
+        return self._observe(), float(success), terminated, truncated, self._info(reason, success)
+
+    def render(self) -> Reading | None:  # type: ignore[override]
+        """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
+        return self._picture(self.camera) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Free the renderer."""
+        if self._eye is not None:
+            self._eye.close()
+            self._eye = None
+
+    def _load(self, row: Row) -> None:
+        if self._world is None or row["id"] != self._row["id"]:
+            self.close()
+            self._world = World.load(row["scene_xml"], row["embodiment"], visual=self._sees)
+            self._scenario = with_values(self.task.family(), row["values"])
+        self._row = row
+        self._world.reset()
+        self._judge = Judge(self._scenario, row["horizon"])
+
+    @property
+    def _sees(self) -> bool:
+        return bool(self.cameras) or self.render_mode is not None
+
+    def _observe(self) -> Observation:
+        world = self.world
+        seen: Observation = {name: _clipped(s.read(world), s.bound) for name, s in self.streams.items()}
+        for name in self.cameras:
+            seen[name] = self._picture(CAMERAS[name])
+        return seen
+
+    def _picture(self, camera: str) -> NDArray[np.uint8]:
+        if self._eye is None:
+            self._eye = Camera(self.world, *self.size)
+        return self._eye.take(camera).copy()
+
+    def _info(self, reason: str, success: bool) -> dict[str, Any]:
+        names = ("split", "axes", "scene_sha256")
+        info = {"scenario": self._row["id"], **{name: self._row[name] for name in names}}
+        return {**info, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
+
+
+def register() -> None:
+    """Tell Gymnasium every task as `scengen/<task>-v0`; called by its plugin mechanism."""
+    for name in config.tasks():
+        gymnasium.register(
+            f"scengen/{name}-v0", "scengen.envs.gym:ScenarioEnv", kwargs={"task": name}, nondeterministic=False
+        )
+
+
+def _folders(pool: str | Path | Sequence[str | Path]) -> list[str | Path]:
+    return [pool] if isinstance(pool, (str, Path)) else list(pool)
+
+
+def _scenarios(folder: str | Path, task: str) -> list[Row]:
+    """The rows of a pool without witnesses, their parameters parsed."""
+    pool = Pool.open(folder).check()
+    made, here = pool.manifest["versions"], versions()
+    for package in ("mujoco", "robosuite"):
+        if made[package] != here[package]:
+            raise PoolError(
+                f"{folder} was certified with {package} {made[package]}, this is {here[package]}; install that "
+                "version, or run scengen verify and certify the pool again"
+            )
+    columns = [
+        "id",
+        "task",
+        "split",
+        "axes",
+        "instruction",
+        "horizon",
+        "params",
+        "embodiment",
+        "scene_xml",
+        "scene_sha256",
+    ]
+    rows = list(pool.rows(columns))
+    if not rows:
+        raise PoolError(f"{folder} holds no scenario; see scengen generate")
+    if others := {row["task"] for row in rows} - {task}:
+        raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
+    return [{**row, "values": json.loads(row["params"])} for row in rows]
+
+
+def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
+    return np.clip(reading, -bound, bound).astype(np.float32)
