@@ -6,14 +6,11 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-import trimesh
 from helpers import anywhere
 from hypothesis import given, settings
 from manifold3d import Manifold
 
-from scengen.assets.ball import Ball
 from scengen.assets.cage import BOTTOM, END, SEGMENTS, SIDE, TOP, WEDGES, HoledCage
-from scengen.assets.scene import PRIORITY, STIFF, place, table
 
 BAR = 0.0005
 """Largest error that a decomposition may have [m]."""

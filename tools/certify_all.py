@@ -9,7 +9,16 @@ failed = [
     f"{name}/{split}"
     for name in config.tasks()
     for split in ("id", *config.task(name).axes)
-    if cli.run(("generate", f"task={name}", f"split={split}", f"n={n}", "certify=full", "workers=2",
-                f"pool=generated/certify/{name}-{split}"))
+    if cli.run(
+        (
+            "generate",
+            f"task={name}",
+            f"split={split}",
+            f"n={n}",
+            "certify=full",
+            "workers=2",
+            f"pool=generated/certify/{name}-{split}",
+        )
+    )
 ]
 sys.exit(f"fewer than {n} certified: {', '.join(failed)}" if failed else 0)

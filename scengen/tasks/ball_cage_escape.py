@@ -29,7 +29,7 @@ import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
-from ..assets.cage import BOTTOM, END, SIDE, TOP, HoledCage
+from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage
 from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..assets.stool import Stool
 from ..params import param
@@ -153,7 +153,9 @@ class BallCageEscape(Scenario):
         before, behind = self.stool_x - stool.length / 2, self.stool_x + stool.length / 2
         hole = cage.offset - cage.hole, cage.offset + cage.hole
         if cage.face == BOTTOM and not (before <= hole[0] and hole[1] <= behind and cage.hole <= stool.width / 2):
-            return Refutation("the stool does not cover the hole", {"near": before, "far": behind, "width": stool.width})
+            return Refutation(
+                "the stool does not cover the hole", {"near": before, "far": behind, "width": stool.width}
+            )
         load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
         if not before < load < behind:
             return Refutation("the cage tips off the stool by itself", {"load": load, "near": before, "far": behind})
@@ -173,7 +175,9 @@ class BallCageEscape(Scenario):
 
     def _scene(self, cage: HoledCage) -> mujoco.MjSpec:
         scene, yaw = table(), math.radians(self.yaw)
-        place(scene, self.stool, "stool", self.foot + self.axes @ [self.stool_x, 0, -self.stool.height], yaw, free=False)
+        place(
+            scene, self.stool, "stool", self.foot + self.axes @ [self.stool_x, 0, -self.stool.height], yaw, free=False
+        )
         place(scene, cage, "cage", self.foot, yaw)
         inside = [self.ball_x, self.ball_y, cage.wall + self.ball.radius]
         place(scene, self.ball, "ball", self.foot + self.axes @ inside)

@@ -246,7 +246,9 @@ class DominoSelect(Scenario):
             return "the robot touched a tile other than a first one"
         if len(touched) > 1:
             return "the robot touched a second chain"
-        if any(math.dist(world.pos(tile), self.foot(tile)) > CARRIED and world.touching(ROBOT, tile) for tile in touched):
+        if any(
+            math.dist(world.pos(tile), self.foot(tile)) > CARRIED and world.touching(ROBOT, tile) for tile in touched
+        ):
             return "the robot carried the first tile away"
         return None
 

@@ -57,10 +57,10 @@ APART = 0.008
 TRANSIT = 0.05
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
 CAUGHT = math.radians(0.7)
-SP=60
-CALM=0.01
-FIRMLY=0.15
-W=0.5
+SP = 60
+CALM = 0.01
+FIRMLY = 0.15
+W = 0.5
 PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
 NEAR, INTEGRAL, LEVER = 0.003, 1.5, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""

@@ -190,14 +190,18 @@ class SeesawBalance(Scenario):
         if not INNER <= abs(self.offset) <= far:
             return Refutation("the target has no room on its arm", {"offset": abs(self.offset), "farthest": far})
         if (out := float(np.abs([self.x, self.y, self.weight_x, self.weight_y]).max())) > TABLE_HALF - 0.05:
-            return Refutation("the stand or the counterweight is not on the table", {"farthest": out, "edge": TABLE_HALF})
+            return Refutation(
+                "the stand or the counterweight is not on the table", {"farthest": out, "edge": TABLE_HALF}
+            )
         dip = max(map(abs, self.seesaw.ends)) * math.sin(math.radians(self.seesaw.stop))
         if (under := self.seesaw.height - self.seesaw.thickness) < dip:
             return Refutation("the deck strikes the table before its stop", {"dip": dip, "height": under})
         away = self.start - self.foot
         beside = abs(float(self.s[0] * away[1] - self.s[1] * away[0]))
         if beside < (need := PALM + self.seesaw.width / 2):
-            return Refutation("the hand cannot take the counterweight beside the seesaw", {"beside": beside, "needed": need})
+            return Refutation(
+                "the hand cannot take the counterweight beside the seesaw", {"beside": beside, "needed": need}
+            )
         grip = max(self.seesaw.friction, min(self.target.friction, self.weight.friction))
         if grip < (need := 1.5 * math.tan(math.radians(self.seesaw.stop))):
             return Refutation("blocks slide on the tilted deck", {"friction": grip, "needed": need})
@@ -213,9 +217,19 @@ class SeesawBalance(Scenario):
         if room < ROOM:
             return Refutation(
                 "no place on the deck balances with room to spare",
-                {"balance": at, "margin": margin, "room": room, "needed": ROOM, "inner": spans[0][0], "outer": spans[-1][1]},
+                {
+                    "balance": at,
+                    "margin": margin,
+                    "room": room,
+                    "needed": ROOM,
+                    "inner": spans[0][0],
+                    "outer": spans[-1][1],
+                },
             )
-        reaches = [np.linalg.norm(self.foot + self.raised * at * self.s + 0.15 * UP - SHOULDER), np.linalg.norm(self.start - SHOULDER)]
+        reaches = [
+            np.linalg.norm(self.foot + self.raised * at * self.s + 0.15 * UP - SHOULDER),
+            np.linalg.norm(self.start - SHOULDER),
+        ]
         if (away := float(max(reaches))) > REACH:
             return Refutation("a place of the counterweight is out of reach", {"distance": away, "reach": REACH})
         return None
@@ -240,7 +254,9 @@ class SeesawBalance(Scenario):
         place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
         place(scene, self.target, "target", self._on_deck(self.offset, tilt), yaw)
         turn = np.zeros(4)
-        mujoco.mju_mulQuat(turn, scene.body("target").quat, np.array([math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0]))
+        mujoco.mju_mulQuat(
+            turn, scene.body("target").quat, np.array([math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0])
+        )
         scene.body("target").quat = turn
         return scene
 
@@ -371,5 +387,3 @@ class SeesawBalance(Scenario):
         yield from go_to(world, spot + 0.08 * UP, self._across(self.s), grip=CLOSED)
         yield from push(world, -0.08 * UP, until=lambda: side * self.tilt(world) > 0, grip=CLOSED)
         yield from hold(world, 2.0 * self.HOLD, CLOSED)
-
-

@@ -38,7 +38,7 @@ from ..params import param
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, push, release
+from ..validate.moves import OPEN, facing_down, go_to, grasp, push, release
 
 LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
@@ -100,9 +100,7 @@ class ToolRetrieve(Scenario):
     def spot(self) -> Vec3:
         """Where the centre of the cube's foot stands [m]."""
         a = math.radians(self.bearing)
-        return np.array(
-            [BASE[0] + self.distance * math.cos(a), BASE[1] + self.distance * math.sin(a), TABLE_TOP]
-        )
+        return np.array([BASE[0] + self.distance * math.cos(a), BASE[1] + self.distance * math.sin(a), TABLE_TOP])
 
     @property
     def half(self) -> float:
@@ -150,7 +148,9 @@ class ToolRetrieve(Scenario):
             return Refutation("the jaw can hold hook and cube together", {"both": both, "jaw": JAW_OPENING})
         if self.hook.tip < self.half:
             return Refutation("the tip ends before the cube's middle", {"tip": self.hook.tip, "half": self.half})
-        held = [self.hook_x, self.hook_y] + (self.hook.inside - self.stretch) * _turned(math.radians(self.hook_yaw))[:2, 0]
+        held = [self.hook_x, self.hook_y] + (self.hook.inside - self.stretch) * _turned(math.radians(self.hook_yaw))[
+            :2, 0
+        ]
         if (away := float(np.linalg.norm(held - BASE[:2]))) > ARM:
             return Refutation("the handle is out of reach", {"distance": away, "arm": ARM})
         return None
@@ -212,7 +212,9 @@ class ToolRetrieve(Scenario):
         passing = away + WIDE + self.hook.tip + self.hook.width / 2
         behind, near = there + away + CLEAR, self._drawn + self.half
         beside = self.half + self.hook.width / 2 - SQUARING
-        yield from self.slide(world, bearing, there - away - self.hook.width - WIDE, passing, within=0.015, mirror=mirror)
+        yield from self.slide(
+            world, bearing, there - away - self.hook.width - WIDE, passing, within=0.015, mirror=mirror
+        )
         yield from self.slide(world, bearing, behind, passing, mirror=mirror)
         yield from self.slide(world, bearing, behind, beside, speed=0.2, mirror=mirror)
         yield from self.slide(world, bearing, near, beside, speed=0.2, within=0.01, mirror=mirror)
