@@ -44,7 +44,7 @@ def bench(repeats: int) -> tuple[Table, dict[str, float]]:
     }
     table = Table("measure", "value", "bar", "what", title="bench", title_justify="left")
     told = {
-        "rollout_to_raw": "a certification rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
+        "rollout_to_raw": "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
         "robosuite_to_ours": "robosuite's env.step / our control period, on the same compiled Lift model",
         "scenario_to_first_step_ms": "from parameter values to the first physics step, warm [ms]",
     }

@@ -15,8 +15,8 @@ from .sim.world import compose
 def export(row: Row, folder: Path, robot: bool) -> None:
     """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
 
-    The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In scene_with_robot.xml the robot stands as
-    after a reset, in the key frame "home".
+    The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In
+    scene_with_robot.xml the robot stands as after a reset, in the key frame "home".
 
     Raises:
         BadConfig: the folder cannot be written.

@@ -1,14 +1,19 @@
-"""Certify N scenarios of every split of every task at level full. `python tools/certify_all.py 20`"""
+"""Certify N scenarios of every split of every task at level full. `python tools/certify_all.py 20 [split ...]`"""
 
 import sys
 
 from scengen import cli, config
 
-n = sys.argv[1] if len(sys.argv) > 1 else "20"
-failed = [
-    f"{name}/{split}"
+n, *splits = sys.argv[1:]
+pools = [
+    (name, split)
     for name in config.tasks()
     for split in ("id", *config.task(name).axes)
+    if not splits or split in splits
+]
+failed = [
+    f"{name}/{split}"
+    for name, split in pools
     if cli.run(
         (
             "generate",

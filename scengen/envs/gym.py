@@ -33,8 +33,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
-    closed), at 100 Hz. They go to the controller as they are; oracles and people pass theirs through `scengen.robots.teleop.Filter`
-    first. Values outside [-1, 1] are clipped.
+    closed), at 100 Hz. They go to the controller as they are; oracles and people pass theirs through
+    `scengen.robots.teleop.Filter` first. Values outside [-1, 1] are clipped.
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
 

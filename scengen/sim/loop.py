@@ -1,4 +1,4 @@
-"""The control loop of one Panda with jaw or suction cup, compiled: filtered actions in, physics and history of contacts out."""
+"""The control loop of one Panda with jaw or suction cup, compiled: filtered actions in, physics and contacts out."""
 
 import hashlib
 from pathlib import Path
@@ -104,7 +104,7 @@ class Loop:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: `home`, jaw half open or suction off, nothing touched. Bit for bit the same as a fresh loop."""
+        """Back to the start: `home`, jaw half open or suction off, nothing touched. The same bits as a fresh loop."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._memory["at"]["angle"][0]] = self.home
         self.data.qpos[self._fingers] = FINGERS[: len(self._fingers)]
