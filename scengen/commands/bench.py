@@ -1,0 +1,27 @@
+"""the costs that scengen promises, as ratios within one run"""
+
+from dataclasses import dataclass
+
+from ..bench import bench
+from ..config import read, typed
+from ..errors import BadConfig
+from . import OK, Arguments, out, write_json
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen bench`; meanings stand in conf/bench.yaml."""
+
+    json: str | None = None
+    repeats: int = 5
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("bench", arguments).settings)
+    if settings.repeats < 1:
+        raise BadConfig(f"repeats = {settings.repeats}; it must be at least 1")
+    table, result = bench(settings.repeats)
+    out.print(table)
+    if settings.json:
+        write_json(settings.json, result)
+    return OK

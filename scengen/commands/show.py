@@ -1,0 +1,47 @@
+"""what is in a pool, or one scenario of it; pictures on request"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import render, report
+from ..config import read, typed
+from ..errors import BadConfig
+from ..pool import Pool
+from . import OK, Arguments, err, out, several, write
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen show`; meanings stand in conf/show.yaml."""
+
+    pool: str | list[str] = ""
+    id: str | None = None
+    to: str | None = None
+    images: int = 60
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("show", arguments).settings)
+    folders = several(settings.pool)
+    pools = [Pool.open(folder).check() for folder in folders]
+    target = Path(settings.to) if settings.to else None
+    if settings.id is None:
+        if target and target.suffix != ".html":
+            raise BadConfig(f"to = {target}; a contact sheet is an .html file (a single scenario, id=, gives a .png)")
+        for pool in pools:
+            out.print(report.pool_table(pool))
+            out.print(report.funnel_table(pool.manifest["funnel"], pool.manifest["reasons"]))
+            out.print(f"pool sha256: {pool.sha256}", highlight=False)
+        if target and (remark := report.contact_sheet(pools, target, settings.images)):
+            err.print(f"scengen: {target} has no pictures: {remark}", highlight=False, markup=False)
+    else:
+        row = pools[0].row(settings.id)
+        for table in report.scenario_tables(row):
+            out.print(table)
+        if target:
+            if target.suffix != ".png":
+                raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
+            write(target, render.encode(render.strip(row["scene_xml"], row["embodiment"], row["witness"]), "png"))
+    if target:
+        out.print(f"wrote {target}", highlight=False)
+    return OK
