@@ -1,6 +1,7 @@
 """Pictures of scenes and film strips of rollouts. Needs OpenGL: EGL or OSMesa without a display."""
 
 import io
+import itertools
 import os
 import sys
 from collections.abc import Iterator
@@ -12,9 +13,8 @@ from mujoco import gl_context
 from numpy.typing import NDArray
 from PIL import Image
 
-from .errors import ScengenError
+from .errors import ScengenError, UnknownName
 from .sim.world import World
-from .validate.rollout import Tape
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
@@ -37,16 +37,21 @@ class Camera:
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
-        self._view = mujoco.MjvCamera()
-        self._view.lookat = [-0.05, 0.0, 0.92]
-        self._view.distance, self._view.azimuth, self._view.elevation = 1.15, 140.0, -28.0
+        self._view = _fitted(world, width / height)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
         self._hide_hulls()
 
     def take(self, name: str | None = None) -> Picture:
-        """A picture of the world as it is now, from a named camera or from a corner of the table."""
+        """A picture of the world as it is now, from a named camera or in a view fitted to the scene at this camera's start.
+
+        Raises:
+            UnknownName: there is no such camera.
+        """
+        cameras = [self.world.model.camera(i).name for i in range(self.world.model.ncam)]
+        if name is not None and name not in cameras:
+            raise UnknownName("camera", name, cameras)
         self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
         return self._renderer.render()
 
@@ -59,6 +64,45 @@ class Camera:
         robot = model.body_rootid == model.body("robot0_base").id
         hulls = robot[model.geom_bodyid] & (model.geom_group == 0)
         model.geom_rgba[hulls, 3] = 0.0
+
+
+AZIMUTH, ELEVATION = 140.0, -28.0
+"""Where the fitted view looks [deg]: from the free corner of the table towards the robot, so that the arm hides little."""
+MARGIN = 1.12
+"""How much farther away the fitted view stands than it would have to."""
+CLOSEST = 0.55
+"""It does not come closer than this [m], or one could not tell where on the table things are."""
+
+
+def _fitted(world: World, aspect: float) -> mujoco.MjvCamera:
+    """A view that just holds the scene's things and the robot's hand; the table and the floor go on beyond it."""
+    view = mujoco.MjvCamera()
+    view.azimuth, view.elevation = AZIMUTH, ELEVATION
+    turn, dip = np.radians(AZIMUTH), np.radians(ELEVATION)
+    ahead = np.array([np.cos(dip) * np.cos(turn), np.cos(dip) * np.sin(turn), np.sin(dip)])
+    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
+    axes = np.array([right, np.cross(right, ahead), ahead])
+    points = _corners(world) @ axes.T
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    away = points - centre
+    half = np.tan(np.radians(world.model.vis.global_.fovy) / 2)
+    room = np.abs(away[:, :2]) / [half * aspect, half]  # at this distance from the eye a point stands on the rim
+    view.lookat = axes.T @ centre
+    view.distance = max(CLOSEST, MARGIN * float((room.max(axis=1) - away[:, 2]).max()))
+    return view
+
+
+def _corners(world: World) -> NDArray[np.float64]:
+    """Corners of the boxes around all geoms of the scene but table and floor, and the hand, shape (n, 3) [m]."""
+    model, data = world.model, world.data
+    apart = {model.body(name).id for name in ("world", "table", "robot0_base")}
+    geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    boxes = [
+        data.geom_xpos[g] + (model.geom_aabb[g, :3] + signs * model.geom_aabb[g, 3:]) @ data.geom_xmat[g].reshape(3, 3).T
+        for g in geoms
+    ]
+    return np.vstack([*boxes, world.hand])
 
 
 def _check_backend() -> None:
@@ -82,20 +126,6 @@ def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240)
         yield view
     finally:
         view.close()
-
-
-def strip(scene_xml: str, embodiment: str, tape: Tape, frames: int = 8, width: int = 320, height: int = 240) -> Picture:
-    """A film strip: pictures at equal times from the start to the end of a tape, in rows of four."""
-    with camera(scene_xml, embodiment, width, height) as view:
-        times = np.linspace(0, len(tape), frames).round().astype(int)
-        pictures, done = [], 0
-        for time in times:
-            for action in tape[done:time]:
-                view.world.follow(action)
-            done = time
-            pictures.append(view.take())
-    rows = [np.hstack(pictures[i : i + 4]) for i in range(0, frames - frames % 4, 4)]
-    return np.vstack(rows)
 
 
 def encode(picture: Picture, kind: str = "webp") -> bytes:

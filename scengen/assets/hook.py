@@ -205,4 +205,5 @@ def _flat(
 
 
 if __name__ == "__main__":
-    show(LHook())
+    for hook in (LHook(), ROUND_J, BARBED_J, THook()):
+        show(hook)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import render, report
-from ..config import read, typed
+from .. import config, film, render, report
+from ..config import read, search_path, typed
 from ..errors import BadConfig
 from ..pool import Pool
 from . import OK, Arguments, err, out, several, write
@@ -41,7 +41,8 @@ def command(arguments: Arguments) -> int:
         if target:
             if target.suffix != ".png":
                 raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
-            write(target, render.encode(render.strip(row["scene_xml"], row["embodiment"], row["witness"]), "png"))
+            scenario = config.task(row["task"], search_path(arguments)).scenario(row["params"])
+            write(target, render.encode(film.strip(film.Take.witness(row, scenario)), "png"))
     if target:
         out.print(f"wrote {target}", highlight=False)
     return OK

@@ -1,5 +1,6 @@
 """Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v0", pool="generated/id")`.
 
+Importing this module registers every task; `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself.
 An environment plays the certified scenarios of a pool, the same scene text, physics and controller that the certificate
 speaks of. Nothing is sampled at reset: the seed chooses among the stored scenarios, and the id comes back in `info`.
 """
@@ -16,13 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import config
 from ..errors import BadConfig, PoolError, UnknownName, Unstable
-from ..params import with_values
+from ..params import Value, with_values
 from ..pool import Pool, Row
 from ..render import Camera
 from ..samplers.task import Task
+from ..scenario import Scenario
 from ..sim.loop import ACTION, Loop
 from ..sim.world import World
-from ..validate.identity import versions
+from ..validate.identity import check_versions
 from ..validate.rollout import Judge
 from .observations import CAMERAS, PROPRIOCEPTION, STREAMS, Reading, check_names
 
@@ -63,7 +65,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             render_mode: None or `rgb_array`.
             width: of all pictures [pixels].
             height: of all pictures [pixels].
-            camera: what `render` shows: one of the scene's or the robot's cameras.
+            camera: what `render` shows: one of the paper's cameras (`CAMERAS`) or any camera of the model.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown.
@@ -76,6 +78,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.streams = {name: STREAMS[name] for name in observations if name in STREAMS}
         self.cameras = [name for name in observations if name in CAMERAS]
         self._rows = {row["id"]: row for folder in _folders(pool) for row in _scenarios(folder, task)}
+        if not self._rows:
+            raise PoolError("no pool was given")
         self._order = list(self._rows)
         self._next = 0
         self._world: World | None = None
@@ -100,6 +104,18 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is None:
             raise BadConfig("call reset before anything else")
         return self._world
+
+    @property
+    def scenario(self) -> Scenario:
+        """The running scenario. Privileged: a policy that reads it knows what it should find out."""
+        if self._world is None:
+            raise BadConfig("call reset before anything else")
+        return self._scenario
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Parameter values of the running scenario, by name. Privileged like `scenario`."""
+        return self._row["values"]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -146,7 +162,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
-        return self._picture(self.camera) if self.render_mode == "rgb_array" else None
+        return self._picture(CAMERAS.get(self.camera, self.camera)) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Free the renderer."""
@@ -185,14 +201,6 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return {**info, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
 
 
-def register() -> None:
-    """Tell Gymnasium every task as `scengen/<task>-v0`; called by its plugin mechanism."""
-    for name in config.tasks():
-        gymnasium.register(
-            f"scengen/{name}-v0", "scengen.envs.gym:ScenarioEnv", kwargs={"task": name}, nondeterministic=False
-        )
-
-
 def _folders(pool: str | Path | Sequence[str | Path]) -> list[str | Path]:
     return [pool] if isinstance(pool, (str, Path)) else list(pool)
 
@@ -200,13 +208,7 @@ def _folders(pool: str | Path | Sequence[str | Path]) -> list[str | Path]:
 def _scenarios(folder: str | Path, task: str) -> list[Row]:
     """The rows of a pool without witnesses, their parameters parsed."""
     pool = Pool.open(folder).check()
-    made, here = pool.manifest["versions"], versions()
-    for package in ("mujoco", "robosuite"):
-        if made[package] != here[package]:
-            raise PoolError(
-                f"{folder} was certified with {package} {made[package]}, this is {here[package]}; install that "
-                "version, or run scengen verify and certify the pool again"
-            )
+    check_versions(pool.manifest["versions"], str(folder))
     columns = [
         "id",
         "task",
@@ -229,3 +231,7 @@ def _scenarios(folder: str | Path, task: str) -> list[Row]:
 
 def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
     return np.clip(reading, -bound, bound).astype(np.float32)
+
+
+for _name in config.tasks():
+    gymnasium.register(f"scengen/{_name}-v0", "scengen.envs.gym:ScenarioEnv", kwargs={"task": _name})

@@ -1,4 +1,4 @@
-"""Supports of distributions as unions of closed intervals, and how far apart two of them are."""
+"""Supports of distributions as unions of intervals, and how far apart two of them are."""
 
 import math
 from dataclasses import dataclass
@@ -6,21 +6,36 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """The closed interval [low, high]; a point when both ends agree.
-
-    Half-open ranges are treated by their closure: a range that merely touches the training range shares
-    a limit with it, and a learner has seen values arbitrarily close to that limit.
-    """
+    """The numbers from low to high; a point when both ends agree. An open end does not belong to it."""
 
     low: float
     high: float
+    open_low: bool = False
+    open_high: bool = False
+
+    def __contains__(self, value: float) -> bool:
+        above = self.low < value if self.open_low else self.low <= value
+        return above and (value < self.high if self.open_high else value <= self.high)
 
     def shifted(self, by: float) -> "Interval":
-        return Interval(self.low + by, self.high + by)
+        return Interval(self.low + by, self.high + by, self.open_low, self.open_high)
+
+    def reflected(self, about: float) -> "Interval":
+        """Its mirror image about a value."""
+        return Interval(2 * about - self.high, 2 * about - self.low, self.open_high, self.open_low)
 
     def distance(self, other: "Interval") -> float:
-        """Free space between two intervals; 0 when they touch or overlap."""
+        """Free space between two intervals; 0 when they touch or overlap, whether their ends are open or closed."""
         return max(0.0, other.low - self.high, self.low - other.high)
+
+    def meets(self, other: "Interval") -> bool:
+        """Whether some value belongs to both."""
+        low, high = max(self.low, other.low), min(self.high, other.high)
+        return low < high or (low == high and low in self and low in other)
+
+    def nearest(self, value: float) -> float:
+        """The value of the closed interval that is nearest to another one."""
+        return min(max(value, self.low), self.high)
 
 
 Support = tuple[Interval, ...]
@@ -29,7 +44,23 @@ Support = tuple[Interval, ...]
 
 def distance(a: Support, b: Support, period: float | None = None) -> float:
     """Smallest distance between a value of `a` and a value of `b`, on a circle if there is a period."""
-    return min(_apart(x, y, period) for x in a for y in b)
+    return min(x.distance(z) for x in a for y in b for z in turned(y, x, period))
+
+
+def meet(a: Support, b: Support, period: float | None = None) -> bool:
+    """Whether some value belongs to both.
+
+    Supports that do not meet may still touch: `[0, 1)` and `[1, 2]` share no value, but training comes arbitrarily
+    close to one, so that there is no gap to speak of.
+    """
+    return any(x.meets(z) for x in a for y in b for z in turned(y, x, period))
+
+
+def nearest(support: Support, value: float, period: float | None = None) -> float:
+    """The value of the support that is nearest to `value`, shifted by whole periods to where it is nearest."""
+    here = Interval(value, value)
+    found = (z.nearest(value) for y in support for z in turned(y, here, period))
+    return min(found, key=lambda v: abs(v - value))
 
 
 def width(support: Support) -> float:
@@ -37,9 +68,10 @@ def width(support: Support) -> float:
     return max(i.high for i in support) - min(i.low for i in support)
 
 
-def _apart(a: Interval, b: Interval, period: float | None) -> float:
+def turned(interval: Interval, towards: Interval, period: float | None) -> list[Interval]:
+    """The interval, and with a period all its copies that can be nearest to another one."""
     if period is None:
-        return a.distance(b)
-    turns = math.floor((a.low - b.high) / period)
-    around = math.ceil((a.high - b.low) / period)
-    return min(a.distance(b.shifted(k * period)) for k in range(turns, around + 1))
+        return [interval]
+    first = math.floor((towards.low - interval.high) / period)
+    last = math.ceil((towards.high - interval.low) / period)
+    return [interval.shifted(k * period) for k in range(first, last + 1)]

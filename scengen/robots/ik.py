@@ -7,6 +7,7 @@ table and itself, so what is out of reach here is out of reach for good.
 """
 
 import functools
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -16,6 +17,12 @@ from scipy.optimize import least_squares
 
 from . import panda
 
+TOUCH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
+"""No posture takes any point of the gripper farther than this from `panda.SHOULDER` [m].
+
+The first two stretches are those of `panda.REACH`; the third ends at the tip of an open finger, 0.0545 across the axis
+of joint 7 and 0.2127 along it, measured on the collision meshes.
+"""
 LEVER = 0.1
 """A turn of 1 rad counts as much as this distance [m]: about the length of the hand."""
 STARTS: NDArray[np.float64] = np.array(
@@ -58,12 +65,15 @@ def reach(target: ArrayLike, frame: NDArray[np.float64] | None = None) -> Neares
     return min(found, key=lambda n: n.residual + LEVER * n.turn)
 
 
-def shortfall(target: ArrayLike) -> float:
-    """A distance [m] by which the grip site misses `target` in every posture: the triangle inequality.
+def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
+    """A distance [m] by which the robot misses `target` in every posture: the triangle inequality.
 
     Not positive where the bound says nothing. It ignores joint limits, and so is smaller than `reach` finds.
+
+    Args:
+        length: `panda.REACH` to ask about the grip site, `TOUCH` to ask about any point of the gripper [m].
     """
-    return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - panda.REACH
+    return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - length
 
 
 def _descend(goal: NDArray[np.float64], frame: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
@@ -79,7 +89,8 @@ def _descend(goal: NDArray[np.float64], frame: NDArray[np.float64] | None, start
     def slope(q: NDArray[np.float64]) -> NDArray[np.float64]:
         return arm.slope(q, frame is not None)
 
-    end = least_squares(error, np.clip(angles, low + 1e-6, high - 1e-6), slope, (low, high), xtol=1e-10).x
+    inside = np.clip(angles, low + 1e-6, high - 1e-6)
+    end = least_squares(error, inside, slope, (low, high), xtol=1e-10).x  # type: ignore[arg-type]
     left = error(end)
     return Nearest(end, float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])) / LEVER)
 

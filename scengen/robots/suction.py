@@ -41,6 +41,13 @@ def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
     panda.attach(scene, visual, hand=_cup(visual))
 
 
+def xml() -> str:
+    """The tool alone as MJCF, visual geometry and sensors included."""
+    spec = _cup(True).copy()
+    spec.compile()
+    return spec.to_xml()
+
+
 @functools.cache
 def _cup(visual: bool) -> mujoco.MjSpec:
     """The tool alone."""

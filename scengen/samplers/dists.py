@@ -1,7 +1,7 @@
 """Distributions of one parameter. A closed set: to add one, add a class and a line in `KINDS`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import BadConfig, nearest
@@ -24,44 +24,51 @@ class Fixed:
         return (Interval(self.value, self.value),)
 
 
+CLOSED = "[]"
+ENDS = (CLOSED, "[)", "(]", "()")
+"""Which ends of a range belong to it: a square bracket is closed, a round one open."""
+
+
 @dataclass(frozen=True)
 class Uniform:
-    """Real numbers in [low, high], equally likely."""
+    """Real numbers from low to high, equally likely."""
 
     low: float
     high: float
+    ends: str = field(default=CLOSED, kw_only=True)
 
     def __post_init__(self) -> None:
-        _ordered(self.low, self.high)
+        _ordered(self.low, self.high, self.ends)
 
     def quantile(self, u: float) -> float:
         """The value below which a share `u` of the draws lies."""
-        return self.low + u * (self.high - self.low)
+        return _within(self.low + u * (self.high - self.low), self.support[0])
 
     @property
     def support(self) -> Support:
-        return (Interval(self.low, self.high),)
+        return (Interval(self.low, self.high, self.ends[0] == "(", self.ends[1] == ")"),)
 
 
 @dataclass(frozen=True)
 class LogUniform:
-    """Positive real numbers in [low, high], every factor equally likely."""
+    """Positive real numbers from low to high, every factor equally likely."""
 
     low: float
     high: float
+    ends: str = field(default=CLOSED, kw_only=True)
 
     def __post_init__(self) -> None:
-        _ordered(self.low, self.high)
+        _ordered(self.low, self.high, self.ends)
         if self.low <= 0:
             raise ValueError("both ends must be positive")
 
     def quantile(self, u: float) -> float:
         """The value below which a share `u` of the draws lies."""
-        return min(max(self.low * math.exp(u * math.log(self.high / self.low)), self.low), self.high)
+        return _within(self.low * math.exp(u * math.log(self.high / self.low)), self.support[0])
 
     @property
     def support(self) -> Support:
-        return (Interval(self.low, self.high),)
+        return (Interval(self.low, self.high, self.ends[0] == "(", self.ends[1] == ")"),)
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,23 @@ class Choice:
         return tuple(Interval(v, v) for v in sorted(set(self.options)))
 
 
-Dist = Fixed | Uniform | LogUniform | Integer | Choice
+@dataclass(frozen=True)
+class Mixture:
+    """One of several distributions, equally likely; one that is listed twice is twice as likely."""
+
+    parts: tuple["Dist", ...]
+
+    def quantile(self, u: float) -> Value:
+        """The part at share `u` of the list, and the value at what remains of `u` in that part."""
+        place = u * len(self.parts)
+        return self.parts[int(place)].quantile(place % 1.0)
+
+    @property
+    def support(self) -> Support:
+        return tuple(interval for part in self.parts for interval in part.support)
+
+
+Dist = Fixed | Uniform | LogUniform | Integer | Choice | Mixture
 
 
 KINDS: dict[str, tuple[type[Dist], str]] = {
@@ -109,12 +132,15 @@ KINDS: dict[str, tuple[type[Dist], str]] = {
     "loguniform": (LogUniform, "low, high"),
     "integer": (Integer, "low, high"),
     "choice": (Choice, "value, value, ..."),
+    "mixture": (Mixture, "distribution, distribution, ..."),
 }
 """The spelling of each distribution in a task file, and its arguments."""
 
 
 def parse(where: str, node: Any) -> Dist:
     """Read `[uniform, 0.1, 0.2]`, or a bare number for a constant, from a task file.
+
+    A third argument of a range, such as `"[)"`, says which of its ends belong to it; both do without it.
 
     Raises:
         BadConfig: the node is neither a number nor a list that names a distribution and its arguments.
@@ -128,12 +154,16 @@ def parse(where: str, node: Any) -> Dist:
     if kind not in KINDS:
         raise BadConfig(f"{where}: no distribution named {kind!r}{nearest(kind, KINDS)}; known: {spelled}")
     family, expected = KINDS[kind]
+    if family is Mixture and args:
+        return Mixture(tuple(parse(f"{where}[{i}]", part) for i, part in enumerate(args, 1)))
+    real = family in (Uniform, LogUniform)
+    ends = args.pop() if real and len(args) == 3 and args[-1] in ENDS else CLOSED
     if not (args and all(map(_number, args))):
         raise BadConfig(f"{where} = {node!r}; [{kind}, {expected}] takes finite numbers")
     try:
         if family is Choice:
             return Choice(tuple(args))
-        return family(*map(float, args)) if family in (Uniform, LogUniform) else family(*args)
+        return family(*map(float, args), ends=ends) if real else family(*args)
     except (TypeError, ValueError) as error:
         why = error if isinstance(error, ValueError) else f"got {len(args)} arguments"
         raise BadConfig(f"{where} = {node!r}; expected [{kind}, {expected}]: {why}") from None
@@ -143,6 +173,15 @@ def _number(x: Any) -> bool:
     return isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x)
 
 
-def _ordered(low: float, high: float) -> None:
+def _ordered(low: float, high: float, ends: str = CLOSED) -> None:
     if low > high:
         raise ValueError("the low end lies above the high end")
+    if low == high and ends != CLOSED:
+        raise ValueError("a range of one value has closed ends")
+
+
+def _within(value: float, range_: Interval) -> float:
+    """The value, or the last one before an end that rounding has reached."""
+    low = math.nextafter(range_.low, math.inf) if range_.open_low else range_.low
+    high = math.nextafter(range_.high, -math.inf) if range_.open_high else range_.high
+    return min(max(value, low), high)

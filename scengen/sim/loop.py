@@ -144,6 +144,14 @@ class Loop:
                 raise ValueError(f"ctrl_out must be a C-contiguous float64 array of shape {wanted}")
         return _replay(self._memory, self._owner, self._latches, tape, record)
 
+    def watch(self, first: bool) -> None:
+        """Latch the contacts of a physics step that somebody else makes, between its mj_step1 and mj_step2.
+
+        A suction cup that is switched on but not sealed is switched off for this step. `first`: whether the step
+        begins a control period.
+        """
+        _watch(self._memory, self._owner, self._latches, first)
+
     def state(self) -> NDArray[np.float64]:
         """All that the future depends on, in one vector: integration state, controller, latches, warnings."""
         physics = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))
@@ -230,6 +238,17 @@ def _replay(memory: NDArray, owner: NDArray, latches: NDArray, tape: NDArray, re
         # Not needed for the physics, but the same bits as ticks under any integrator are promised.
         native.kinematics(scene.model, scene.data)
     return native.warnings(scene.warning, scene.warning_stride, scene.warning_kinds)
+
+
+@njit(nogil=True, cache=True)
+def _watch(memory: NDArray, owner: NDArray, latches: NDArray, first: bool) -> None:
+    """What `_substep` does besides controlling the arm."""
+    scene, at = memory[0].scene, memory[0].at
+    if first:
+        _begin(latches)
+    _latch(scene, owner, latches)
+    if at.cup != osc.NONE and _pads_in_contact(scene, at.pad) < osc.SEAL:
+        native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
 
 
 @njit

@@ -194,14 +194,15 @@ class GalileoRampDrop(Scenario):
             )
 
     def without(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the one incline the ball falls from the hand to the table, without the other it flies too low."""
-        return {f"no {side} incline": self._lacking(f"ramp/{side}") for side in ("near", "far")}
+        """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it.
 
-    def _lacking(self, part: str) -> mujoco.MjSpec:
-        scene = self.build()
-        for geom in list(scene.body(part).geoms):
-            scene.delete(geom)
-        return scene
+        The patch, which loses its support then, lies below its place with its lower edge on the table.
+        """
+        near, far = self.build(), self.build()
+        _clear(near, "ramp/near")
+        _clear(far, "ramp/far", "ramp/beyond")
+        far.body("ramp/patch").pos = [0.0, 0.0, -float(self.ramp.floor(self.ramp.patch[0])[2])]
+        return {"no near incline": near, "no far incline": far}
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -261,3 +262,10 @@ class GalileoRampDrop(Scenario):
     def _carry(self, world: World) -> Plan:
         """Straight to the target: put the ball down on the patch."""
         yield from self.let_go(world, sum(self.ramp.patch) / 2)
+
+
+def _clear(scene: mujoco.MjSpec, *bodies: str) -> None:
+    """Take all geoms of some bodies away."""
+    for body in bodies:
+        for geom in list(scene.body(body).geoms):
+            scene.delete(geom)

@@ -11,14 +11,14 @@ hook, pass it behind the cube on the side where its tip can catch, draw the cube
 
 Out of reach. The robot's own table is enough: the arm swings about a shoulder 0.445 m above it, and a band of 2 cm
 before the far edge, the corners aside, is beyond it. Scenarios are refuted unless *no part of the gripper* can touch
-the cube in any posture (`TOUCH`, a bound that ignores joint limits, so that no search has to be believed); the grip
-site misses the cube's centre by 70 mm or more, by that bound and by inverse kinematics (`scengen.robots.ik`) alike.
+the cube in any posture (`ik.TOUCH`, a bound that ignores joint limits, so that no search has to be believed); the grip
+site misses the cube's centre by 70 mm or more, by a bound of the same kind and by inverse kinematics alike.
 
 The goal. The paper says "lift the cube above the table", without numbers. Here: 4 cm above where a cube on the
-table has its centre, as in robosuite's Lift; held by the robot, the hook let go, for 0.3 s, which are the paper's 30
-steps of its other lifting tasks (T12, T13). That the hook must not be touched then says in the goal what the paper
-says in words ("set the hook down, then grasp the cube and lift"). There is no other rule: a policy may push with the
-tip, sweep with the handle, or throw, if it can.
+table has its centre, as in robosuite's Lift; held by the robot and by nothing else, the hook let go, for 0.3 s, which
+are the paper's 30 steps of its other lifting tasks (T12, T13). That the hook must not be touched then says in the goal
+what the paper says in words ("set the hook down, then grasp the cube and lift"). There is no other rule: a policy may
+push with the tip, sweep with the handle, or throw, if it can.
 
 The oracle works in polar coordinates about the robot's first axis, where all bearings look the same to the arm.
 """
@@ -35,6 +35,7 @@ from ..assets.cube import Cube
 from ..assets.hook import LHook
 from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import param
+from ..robots import ik
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
@@ -44,12 +45,6 @@ LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
 FALLEN = 0.10
 """What has its centre this far below the table top will not come back [m]."""
-TOUCH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
-"""No point of the gripper comes farther than this from `SHOULDER` [m].
-
-The first two stretches are those of `panda.REACH`; the third ends at the tip of an open finger, 0.0545 across the axis
-of joint 7 and 0.2127 along it, measured on the collision meshes.
-"""
 ARM = 0.72
 """Farthest distance of a top-down grasp at table height from the robot's first axis that plans use [m]; inverse
 kinematics allows 0.76."""
@@ -57,6 +52,10 @@ JAW_OPENING = 0.08
 """Widest thing that fits between the fingers [m]: twice the range of a finger joint, panda_gripper.xml."""
 HAND_AT = 0.65
 """How far out the hand is when the tip is behind the cube, if the handle is long enough [m]."""
+DRAWN_TO = 0.60
+"""Where the cube is drawn to, if the handle is short enough: its distance from the robot's first axis [m]."""
+NEAREST_HAND = 0.39
+"""How near to the robot's first axis the hand draws [m]: at 0.36 joint 6 of a hand that points down is at its limit."""
 GRASP_FROM_END = 0.035
 """Least distance from the handle's end to where it is held [m]: the pads are 16 mm wide."""
 GRASP_HEIGHT = 0.014
@@ -88,7 +87,7 @@ class ToolRetrieve(Scenario):
     """Direction from the robot's first axis to the cube; 0 is straight ahead."""
     cube_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
     hook_x: float = param(-0.05, "m", -0.4, 0.4)
-    hook_y: float = param(-0.22, "m", -0.4, 0.4)
+    hook_y: float = param(-0.18, "m", -0.4, 0.4)
     hook_yaw: float = param(0.0, "deg", -90.0, 90.0, period=360.0)
     """0: the handle points away from the robot, its end towards it."""
     cube: Cube = Cube()
@@ -112,7 +111,7 @@ class ToolRetrieve(Scenario):
         """How far at least any point of the gripper stays away from the cube [m]; not positive if it may touch."""
         turn, centre = _turned(math.radians(self.cube_yaw)), self.spot + self.half * UP
         inside = np.clip(turn.T @ (SHOULDER - centre), -self.half, self.half)
-        return float(np.linalg.norm(SHOULDER - centre - turn @ inside)) - TOUCH
+        return ik.shortfall(centre + turn @ inside, ik.TOUCH)
 
     @property
     def outline(self) -> NDArray[np.float64]:
@@ -141,7 +140,7 @@ class ToolRetrieve(Scenario):
         if (far := float(np.abs(self.outline).max())) > TABLE_HALF:
             return Refutation("hook or cube overhang the table", {"farthest": far, "edge": TABLE_HALF})
         if (gap := self.out_of_touch) <= 0:
-            return Refutation("the arm may touch the cube without the hook", {"gap": gap, "reach": TOUCH})
+            return Refutation("the arm may touch the cube without the hook", {"gap": gap, "reach": ik.TOUCH})
         if (needed := self.distance + self.half * math.sqrt(2) + CLEAR - self.stretch) > ARM:
             return Refutation("the hook is too short", {"hand at": needed, "arm": ARM})
         if (both := self.cube.edge + self.hook.width) <= JAW_OPENING:
@@ -174,10 +173,13 @@ class ToolRetrieve(Scenario):
 
     def success(self, world: World) -> bool:
         raised = world.com("cube")[2] - TABLE_TOP - self.half
-        return raised >= LIFTED and world.touching(ROBOT, "cube") and not self._touching_hook(world)
+        propped = world.touching("cube", "table") or self._at_hook(world, "cube")
+        held = world.touching(ROBOT, "cube") and not propped and not self._at_hook(world, ROBOT)
+        return raised >= LIFTED and held
 
-    def _touching_hook(self, world: World) -> bool:
-        return "hook" in world.free_bodies and world.touching(ROBOT, "hook")
+    def _at_hook(self, world: World, body: str) -> bool:
+        """Whether a body touches the hook, if there is one."""
+        return "hook" in world.free_bodies and world.touching(body, "hook")
 
     def failure(self, world: World) -> str | None:
         for body in world.free_bodies:
@@ -264,7 +266,7 @@ class ToolRetrieve(Scenario):
     @property
     def _drawn(self) -> float:
         """Where the cube is drawn to: its distance from the robot's first axis [m]."""
-        return max(0.60, 0.36 + self.stretch - self.half)
+        return max(DRAWN_TO, NEAREST_HAND + self.stretch - self.half)
 
     def _half_across(self, world: World, bearing: float) -> float:
         """Half the cube's width seen along `bearing`, and as much across it [m]."""
@@ -285,7 +287,7 @@ class ToolRetrieve(Scenario):
             "reach for the cube": self._reach,
             "pull with the tip turned away": self._pull_past,
             "pick the cube with the hook": self._pick_with_hook,
-            "grasp cube and handle together": self._grasp_both,
+            "grasp the cube with the hook in the jaw": self._grasp_with_hook,
         }
 
     def _reach(self, world: World) -> Plan:
@@ -313,23 +315,17 @@ class ToolRetrieve(Scenario):
         yield from go_to(world, world.hand + 0.12 * UP, within=0.02)
         yield from release(world)
 
-    def _grasp_both(self, world: World) -> Plan:
-        """Draw the cube in, let go of the hook where it is, and close the jaw across cube and handle."""
+    def _grasp_with_hook(self, world: World) -> Plan:
+        """Draw the cube in, bring the hand down on it with the hook still in the jaw, close, lift, let go."""
         yield from self.take_hook(world)
         yield from self.draw_in(world)
-        yield from release(world)
-        yield from go_to(world, world.hand + 0.1 * UP, within=0.02)
-        along, left = world.frame("hook")[:, 0], world.frame("hook")[:, 1]
-        middle = world.com("cube") - self.hook.side * self.hook.width / 2 * left
-        frame = facing_down(math.remainder(math.atan2(along[1], along[0]), math.pi))
-        yield from go_to(world, middle + (TABLE_TOP + 0.10 - middle[2]) * UP, frame, within=0.004)
-        yield from push(world, -0.1 * UP, until=lambda: self._low(world, middle[2]))
+        yield from go_to(world, world.hand + 0.08 * UP, within=0.02)
+        cube = world.com("cube")
+        yield from go_to(world, [cube[0], cube[1], world.hand[2]], within=0.01)
+        yield from push(world, -0.1 * UP, until=lambda: world.hand[2] <= cube[2] or world.touching("hook", "cube"))
         yield from grasp(world, 0.4)
         yield from go_to(world, world.hand + 0.12 * UP, within=0.02)
-
-    def _low(self, world: World, height: float) -> bool:
-        """Whether the hand is down at `height` [m], or something has stopped it."""
-        return world.hand[2] <= height or world.touching(ROBOT, "cube") or world.touching(ROBOT, "hook")
+        yield from release(world)
 
 
 def _leaning(tilt: float) -> Mat3:

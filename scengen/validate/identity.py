@@ -6,6 +6,7 @@ import importlib.metadata
 import importlib.util
 import inspect
 import platform
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +15,7 @@ import numpy as np
 
 from ..assets.domino import Domino
 from ..assets.scene import TABLE_TOP, place, table
+from ..errors import PoolError
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
@@ -24,6 +26,20 @@ def versions() -> dict[str, str]:
     """Versions of everything that the physics depends on."""
     packages = {p: importlib.metadata.version(p) for p in ("scengen", "mujoco", "robosuite", "numpy")}
     return {**packages, "platform": f"{platform.system()}-{platform.machine()}"}
+
+
+def check_versions(made: Mapping[str, str], where: str) -> None:
+    """Refuse what was certified with another MuJoCo or robosuite than the installed one.
+
+    Raises:
+        PoolError: one of them differs.
+    """
+    for package in ("mujoco", "robosuite"):
+        if made[package] != versions()[package]:
+            raise PoolError(
+                f"{where} was certified with {package} {made[package]}, this is {versions()[package]}; install that "
+                "version, or run scengen verify and certify the pool again"
+            )
 
 
 @cache

@@ -1,0 +1,345 @@
+"""Scenarios as robosuite environments: import this module, then `robosuite.make("DominoSingle", ...)`.
+
+    row = Pool.open("generated/domino_single-id").row("3f")
+    env = robosuite.make("DominoSingle", robots="Panda", scenario=row, use_camera_obs=False)
+
+robosuite composes the model, its controller moves the robot, its clock steps the physics. From here come the text of
+the scene, the suction cup, the events of the scene, and the verdict, which is the one of certification.
+"""
+
+import json
+import logging
+import tempfile
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import config
+from ..assets.scene import TABLE_HALF
+from ..errors import BadConfig, PoolError, UnknownName
+from ..params import with_values
+from ..pool import Pool, Row
+from ..robots import suction
+from ..sim import scene_text
+from ..sim.loop import Loop
+from ..sim.world import JAW, SUCTION, World
+from ..validate.identity import check_versions
+from ..validate.rollout import Judge, Outcome
+
+_advice = logging.getLogger("robosuite_logs")
+_advice.disabled = True  # on import, robosuite advises to install what nothing here needs
+import robosuite.environments.base  # noqa: E402
+from robosuite.environments.manipulation.manipulation_env import ManipulationEnv  # noqa: E402
+from robosuite.models.base import MujocoXML  # noqa: E402
+from robosuite.models.grippers import register_gripper  # noqa: E402
+from robosuite.models.grippers.gripper_model import GripperModel  # noqa: E402
+from robosuite.models.robots import RobotModel  # noqa: E402
+from robosuite.models.tasks import ManipulationTask  # noqa: E402
+from robosuite.utils.observables import Observable, sensor  # noqa: E402
+from robosuite.utils.transform_utils import convert_quat  # noqa: E402
+
+_advice.disabled = False
+
+Observations = OrderedDict[str, Any]
+
+ROBOT = "Panda"
+"""robosuite's name of the robot that certificates speak of."""
+GRIPPERS = {JAW: "PandaGripper", SUCTION: "SuctionGripper"}
+"""robosuite's names of the hands of our embodiments."""
+TEXT = ("compiler", "option", "visual")
+"""What the scene says about physics and light, in place of what robosuite puts into every model."""
+COLUMNS = ("id", "task", "split", "axes", "instruction", "horizon", "params", "embodiment", "scene_xml")
+"""What an environment needs to know of a scenario."""
+
+
+@register_gripper
+class SuctionGripper(GripperModel):
+    """The suction cup of `scengen.robots.suction`: one action, suction on where it is positive.
+
+    Its command is what is asked for. Whether the cup pulls is decided in every physics step by `Loop.watch`.
+    """
+
+    def __init__(self, idn: int | str = 0):
+        with _file(suction.xml()) as path:
+            super().__init__(path, idn=idn)
+
+    def format_action(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
+        """-1 for off, 1 for on, which robosuite scales to the actuator's range of 0 to 1."""
+        self.current_action = np.where(np.asarray(action) > 0.0, 1.0, -1.0)
+        return self.current_action
+
+    @property
+    def init_qpos(self) -> NDArray[np.float64]:
+        """No joints."""
+        return np.zeros(0)
+
+
+class SceneModel(MujocoXML):
+    """The text of a scene, as robosuite holds models. Names stay as they are."""
+
+    def __init__(self, text: str):
+        scene_text.check(text)
+        with _file(text) as path:
+            super().__init__(path)
+        for geom in self.worldbody.iter("geom"):
+            # robosuite draws group 1 only; ours is drawn whole. A group has no effect on the physics.
+            if geom.get("group", "0") == "0":
+                geom.set("group", "1")
+
+
+class SceneTask(ManipulationTask):
+    """A scene and the robot, under the scene's own physics options."""
+
+    def __init__(self, scene: SceneModel, robot: RobotModel):
+        super().__init__(mujoco_arena=scene, mujoco_robots=[robot])
+        for tag in TEXT:
+            for theirs in self.root.findall(tag):
+                self.root.remove(theirs)
+            self.root.extend(scene.root.findall(tag))
+
+
+class ScenarioEnv(ManipulationEnv):
+    """The scenarios of one task as a robosuite environment; `environment` makes a class for each task.
+
+    `reward` is 1 once the goal has been reached, else 0; `done` comes at the horizon alone, as everywhere in
+    robosuite. `info` holds `scenario`, `success` and `reason`, why there is none and never will be.
+    Goal, failures and events of the scene follow the certificate's clock of 100 Hz under any `control_freq`; the
+    certificate itself holds for 100 Hz and robosuite's default controller.
+    """
+
+    NAME: ClassVar[str] = ""
+    """Name of the task."""
+    SEARCH: ClassVar[tuple[str, ...]] = ()
+    """Where else to look for its file, see `config.search_path`."""
+
+    outcome: Outcome | None
+    """What has come of the episode; None as long as it is open. A success is lost by a later failure."""
+    reason: str
+    """Why it is no success; empty as long as that is open, and for a success."""
+    world: World
+    """robosuite's model and data, seen through names. To be looked at; robosuite is who steps it."""
+
+    def __init__(
+        self,
+        robots: str | Sequence[str] = ROBOT,
+        scenario: Row | str | None = None,
+        pool: str | Path | None = None,
+        use_object_obs: bool = True,
+        gripper_types: str = "default",
+        control_freq: float = 100,
+        horizon: int | None = None,
+        **arguments: Any,
+    ):
+        """Choose scenarios and build the first.
+
+        Args:
+            robots: "Panda".
+            scenario: a row of a pool (`Pool.row`), or with `pool` how an id in it begins. Without it, every hard
+                reset draws one from the pool, decided by robosuite's `seed`.
+            pool: folder of a pool.
+            use_object_obs: also observe `<body>_pos` [m] and `<body>_quat` (xyzw) of everything that can move.
+            gripper_types: "default" is the hand that the task asks for; no other is accepted.
+            control_freq: actions in a second.
+            horizon: actions in an episode; default: the task's time limit.
+            arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
+
+        Raises:
+            ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite.
+        """
+        self.task = config.task(self.NAME, self.SEARCH)
+        self._choice = _choice(self.NAME, scenario, pool)
+        hand = GRIPPERS[self.task.embodiment]
+        if gripper_types not in ("default", hand):
+            raise BadConfig(f"gripper_types = {gripper_types}; the scenarios of {self.NAME} are certified with {hand}")
+        self.use_object_obs = use_object_obs
+        super().__init__(
+            robots=robots,
+            gripper_types=hand,
+            control_freq=control_freq,
+            horizon=round(self.task.horizon * control_freq) if horizon is None else horizon,
+            **arguments,
+        )
+
+    # --- what robosuite asks for ----------------------------------------------------------
+
+    def reward(self, action: NDArray[np.float64] | None = None) -> float:
+        """1 once the goal has been reached, else 0."""
+        return float(self._check_success())
+
+    def reset(self) -> Observations:
+        """robosuite's reset, and the scene's events of the first control period."""
+        observations = super().reset()
+        self.scenario.script(self.world)
+        return observations
+
+    def _check_success(self) -> bool:
+        """Whether the goal has been reached, and nothing forbidden has happened since."""
+        return self.outcome == "success"
+
+    def _check_robot_configuration(self, robots: Sequence[str]) -> None:
+        if list(robots) != [ROBOT]:
+            raise BadConfig(f"robots = {', '.join(robots)}; the scenarios of {self.NAME} are certified with {ROBOT}")
+
+    def _load_model(self) -> None:
+        super()._load_model()
+        self.row: Row = self._choice[0] if len(self._choice) == 1 else self.rng.choice(self._choice)
+        self.scenario = with_values(self.task.family(), json.loads(self.row["params"]))
+        robot = self.robots[0].robot_model
+        robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF))
+        self.model = SceneTask(SceneModel(self.row["scene_xml"]), robot)
+
+    def _initialize_sim(self, xml_string: str | None = None) -> None:
+        super()._initialize_sim(xml_string)
+        ours, theirs = self.sim.model.opt.timestep, self.model_timestep
+        if ours != theirs:
+            raise BadConfig(f"robosuite.macros.SIMULATION_TIMESTEP = {theirs:g}; the scene's is {ours:g} s")
+
+    def _setup_references(self) -> None:
+        super()._setup_references()
+        model, data = self.sim.model._model, self.sim.data._data
+        self.world = World(model, data, Loop(model, data))
+
+    def _setup_observables(self) -> Observations:
+        observables = super()._setup_observables()
+        for body in self._moving() if self.use_object_obs else ():
+            for name, read in self._pose(body).items():
+                observables[name] = Observable(name=name, sensor=read, sampling_rate=self.control_freq)
+        return observables
+
+    def _reset_observables(self) -> None:
+        """Another scenario may hold other things."""
+        fresh = self._setup_observables()
+        things = {name for name, observable in self._observables.items() if observable.modality == "object"}
+        for name in things - fresh.keys():
+            del self._observables[name]
+        for name in fresh.keys() - self._observables.keys():
+            self.add_observable(fresh[name])
+        super()._reset_observables()
+
+    def _reset_internal(self) -> None:
+        super()._reset_internal()
+        # robosuite's controllers looked at the arm before it was put into its initial posture: let them look again.
+        for controller in self.robots[0].part_controllers.values():
+            controller.new_update = True
+        self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
+        self._judge = Judge(self.scenario, self.row["horizon"])
+        self.outcome, self.reason, self._substep = None, "", 0
+
+    def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
+        """Between mj_step1 and mj_step2, in every physics step."""
+        super()._pre_action(action, policy_step)
+        self.world.grip = float(action[-1])
+        self.world.loop.watch(first=self._substep == 0)
+
+    def _update_observables(self, force: bool = False) -> None:
+        """After every physics step; forced, after a reset."""
+        super()._update_observables(force)
+        if not force:
+            self._substep = (self._substep + 1) % self.world.loop.substeps
+            if self._substep == 0:
+                self._period_ends()
+
+    def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
+        reward, done, info = super()._post_action(action)
+        success = self._check_success()
+        return reward, done, {**info, "scenario": self.row["id"], "success": success, "reason": self.reason}
+
+    # --- the certificate's clock ----------------------------------------------------------
+
+    def _period_ends(self) -> None:
+        """Judge the control period that has passed, and let the scene's events of the next happen."""
+        mujoco.mj_kinematics(self.world.model, self.world.data)  # else poses are those of 2 ms before
+        if self.outcome is None:
+            unstable = ("unstable", ", ".join(self.world.warnings)) if self.world.warnings else None
+            self.outcome, self.reason = unstable or self._judge.look(self.world) or (None, "")
+        elif self.outcome == "success" and (lost := self.scenario.failure(self.world)):
+            self.outcome, self.reason = "failure", f"after the goal was reached: {lost}"
+        self.scenario.script(self.world)
+
+    def _moving(self) -> list[str]:
+        """Bodies of the scene that have joints."""
+        model = self.world.model
+        robot = self.world.body("robot0_base")
+        jointed = np.flatnonzero((model.body_jntnum > 0) & (model.body_rootid != robot))
+        return [model.body(int(body)).name for body in jointed]
+
+    def _pose(self, name: str) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
+        """Sensors of a body's position [m] and orientation (xyzw)."""
+        body = self.world.body(name)
+
+        @sensor(modality="object")
+        def pos(_: Any) -> NDArray[np.float64]:
+            return np.array(self.sim.data.body_xpos[body])
+
+        @sensor(modality="object")
+        def quat(_: Any) -> NDArray[np.float64]:
+            return convert_quat(np.array(self.sim.data.body_xquat[body]), to="xyzw")
+
+        return {f"{name}_pos": pos, f"{name}_quat": quat}
+
+
+del robosuite.environments.base.REGISTERED_ENVS[ScenarioEnv.__name__]  # only its subclasses have a task
+
+
+@cache
+def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
+    """The environment of a task, which robosuite then knows under the task's name in CamelCase.
+
+    Args:
+        task: name of the task.
+        search: folders of other packages, see `config.search_path`.
+
+    Raises:
+        BadConfig: robosuite has another environment of that name.
+    """
+    name = "".join(part.capitalize() for part in task.split("_"))
+    if name in robosuite.environments.base.REGISTERED_ENVS:
+        raise BadConfig(f"task {task}: robosuite has an environment {name} of its own; rename the task")
+    about = f"Scenarios of the task {task}; see {ScenarioEnv.__name__}."
+    return type(name, (ScenarioEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
+
+
+def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> list[Row]:
+    """The scenarios to draw from: one row, those of a pool whose ids begin with a text, or the whole pool.
+
+    Raises:
+        ScengenError: there is none, or one of another task or made with other versions.
+    """
+    if isinstance(scenario, dict) and pool is None:
+        rows, where = [scenario], f"scenario {scenario['id']}"
+        made = json.loads(scenario["certificate"]["versions"])
+    elif pool is not None and not isinstance(scenario, dict):
+        found = Pool.open(pool).check()
+        rows, where, made = list(found.rows(COLUMNS)), str(found.folder), found.manifest["versions"]
+        if scenario is not None:
+            rows = [row for row in rows if row["id"].startswith(scenario)]
+            if len(rows) != 1:
+                raise UnknownName(f"single scenario in {pool}", scenario, [row["id"] for row in found.rows(["id"])])
+    else:
+        raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
+    check_versions(made, where)
+    if others := {row["task"] for row in rows} - {task}:
+        raise PoolError(f"{where} belongs to {', '.join(sorted(others))}, not to {task}")
+    if not rows:
+        raise PoolError(f"{where} holds no scenario; see scengen generate")
+    return rows
+
+
+@contextmanager
+def _file(text: str) -> Iterator[str]:
+    """Path of a file of that content for a moment: robosuite reads models from files only."""
+    with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
+        file.write(text)
+        file.flush()
+        yield file.name
+
+
+for _name in config.tasks():
+    environment(_name)
