@@ -3,6 +3,7 @@
 import logging
 import os
 import statistics
+import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,16 +15,21 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from . import config
+from .envs.gym import ScenarioEnv
+from .generate import Settings, generate
+from .pool import Pool
 from .robots import panda
 from .sim import native, scene_text
 from .sim.loop import Loop
 from .sim.world import World
-from .validate.rollout import Episode, run
+from .validate.rollout import Episode, Tape, run
 
 BARS = {
     "rollout_to_raw": (1.25, "at most"),
     "robosuite_to_ours": (8.0, "at least"),
     "scenario_to_first_step_ms": (20.0, "at most"),
+    "env_step_to_raw": (1.4, "at most"),
+    "env_reset_ms": (20.0, "at most"),
 }
 """What is promised."""
 
@@ -41,12 +47,15 @@ def bench(repeats: int) -> tuple[Table, dict[str, float]]:
         "rollout_to_raw": rollout_to_raw(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
+        **environment(repeats),
     }
     table = Table("measure", "value", "bar", "what", title="bench", title_justify="left")
     told = {
         "rollout_to_raw": "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
         "robosuite_to_ours": "robosuite's env.step / our control period, on the same compiled Lift model",
-        "scenario_to_first_step_ms": "from parameter values to the first physics step, warm [ms]",
+        "scenario_to_first_step_ms": "from parameter values to the first physics step, warm (ms)",
+        "env_step_to_raw": "the Gymnasium environment's step, proprioception only / mj_step of the same states",
+        "env_reset_ms": "the Gymnasium environment's reset of a loaded scenario (ms)",
     }
     for name, value in result.items():
         bar, side = BARS[name]
@@ -64,7 +73,35 @@ def rollout_to_raw(repeats: int) -> float:
     def rollout() -> Episode:
         return run(scenario, world, scenario.oracle, task.horizon)  # type: ignore[attr-defined]
 
-    tape = rollout().tape
+    raw = _bare(world, rollout().tape)
+    return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
+
+
+def environment(repeats: int) -> dict[str, float]:
+    """The Gymnasium environment without cameras: its step over the bare mj_step calls, and its reset [ms]."""
+    with tempfile.TemporaryDirectory() as folder:
+        composed = config.read("generate", ["task=domino_single", "n=1", f"pool={folder}/pool"])
+        assert composed.task is not None
+        settings = Settings(n=1, pool=f"{folder}/pool")
+        generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None)
+        env = ScenarioEnv("domino_single", f"{folder}/pool")
+        (row,) = Pool.open(f"{folder}/pool").rows()
+    env.reset()
+    raw = _bare(env.world, row["witness"])
+
+    def steps() -> None:
+        for action in row["witness"]:
+            env.step(action)
+
+    ratios, resets = [], []
+    for _ in range(repeats):
+        resets.append(1000 * _seconds(env.reset))
+        ratios.append(_seconds(steps) / _seconds(raw))
+    return {"env_step_to_raw": statistics.median(ratios), "env_reset_ms": statistics.median(resets)}
+
+
+def _bare(world: World, tape: Tape) -> Callable[[], None]:
+    """The bare mj_step calls through the states that a tape leads to, from the start."""
     controls = np.zeros((len(tape) * world.loop.substeps, world.model.nu))
     world.reset()
     world.loop.replay(tape, controls)
@@ -74,7 +111,7 @@ def rollout_to_raw(repeats: int) -> float:
         _step_with(world.model._address, world.data._address, world.data.ctrl, controls)
 
     raw()
-    return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
+    return raw
 
 
 def robosuite_to_ours(repeats: int) -> float:

@@ -10,7 +10,7 @@ from .config import conf_dir
 from .errors import BadConfig, ScengenError, nearest
 from .sim import native
 
-VERBS = ("generate", "verify", "show", "export", "tasks", "evaluate", "bench")
+VERBS = ("generate", "verify", "show", "film", "view", "export", "record", "tasks", "evaluate", "robosuite", "bench")
 
 
 def main() -> None:

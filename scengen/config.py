@@ -129,7 +129,10 @@ def _value(where: str, kind: Any, value: Any) -> Any:
 def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str, str]]:
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         try:
-            node = compose(verb, overrides=[_listed(o) for o in overrides], return_hydra_config=True)
+            asked = [_listed(o) for o in overrides]
+            node = compose(verb, overrides=asked, return_hydra_config=True)
+            if recorded := _boundary(verb, asked, node):
+                node = compose(verb, overrides=[recorded, *asked], return_hydra_config=True)
         except (HydraException, OmegaConfBaseException) as error:
             raise _explain(verb, overrides, error) from None
     choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
@@ -138,10 +141,19 @@ def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str,
     return node, choices
 
 
+def _boundary(verb: str, overrides: list[str], node: DictConfig) -> str | None:
+    """The override that brings in conf/boundary/<task>.yaml, the measured limits of a task's axes, if there are any."""
+    task = node.hydra.runtime.choices.get("task")
+    loader = GlobalHydra.instance().config_loader()
+    if task is None or task not in loader.get_group_options("boundary", config_name=verb, overrides=overrides):
+        return None
+    return f"+boundary@task.boundary={task}"
+
+
 def _listed(override: str) -> str:
-    """`keep=refuted,unknown` and `pool=a,b` mean lists here, not sweeps; `keep` always is one."""
+    """`keep=refuted,unknown`, `pool=a,b` and `cameras=a,b` mean lists here, not sweeps; `keep` always is one."""
     key, _, value = override.partition("=")
-    many = key == "keep" or (key == "pool" and "," in value)
+    many = key == "keep" or (key in ("pool", "cameras") and "," in value)
     return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 

@@ -6,16 +6,16 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from .envs.gym import ScenarioEnv
-from .envs.observations import PROPRIOCEPTION, check_names
+from .envs.observations import check_names
 from .errors import BadConfig, ScengenError
+from .log import Log
 from .parallel import each
 from .policies import REPLAY, Policy, find
 from .pool import Pool, Row
@@ -36,7 +36,7 @@ class Settings:
     pool: str | list[str] = ""
     seeds: int = 20
     rollouts: int = 5
-    observations: list[str] = field(default_factory=lambda: list(PROPRIOCEPTION))
+    observations: list[str] | None = None
     width: int = 256
     height: int = 256
     workers: int = 1
@@ -54,7 +54,7 @@ class Settings:
 
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
-        check_names(self.observations)
+        check_names(self.observations or [])
         for name in ("seeds", "rollouts", "workers", "width", "height"):
             if getattr(self, name) < 1:
                 raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least 1")
@@ -97,8 +97,8 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
     rows = [row for pool in pools for row in _chosen(pool, settings.seeds)]
     jobs = [Job(r["task"], r["pool"], r["id"], k) for r in rows for k in range(settings.rollouts)]
     about = {(r["pool"], r["id"]): {k: r[k] for k in ("task", "category", "split")} for r in rows}
-    with _Log(settings.folder, _identity(settings, pools)) as log:
-        done = {(e["pool"], e["scenario"], e["rollout"]) for e in log.episodes}
+    with Log(settings.folder / "episodes.jsonl", _identity(settings, pools)) as log:
+        done = {(e["pool"], e["scenario"], e["rollout"]) for e in log.records}
         todo = [job for job in jobs if (job.pool, job.scenario, job.rollout) not in done]
         todo.sort(key=lambda job: job.task)  # a worker then changes its environment seldom
         progress(len(jobs) - len(todo), len(jobs))
@@ -108,7 +108,7 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
             progress(count, len(jobs))
         wanted = {(j.pool, j.scenario, j.rollout) for j in jobs}
         return sorted(
-            (e for e in log.episodes if (e["pool"], e["scenario"], e["rollout"]) in wanted),
+            (e for e in log.records if (e["pool"], e["scenario"], e["rollout"]) in wanted),
             key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
         )
 
@@ -241,44 +241,3 @@ def _training(folders: Sequence[str]) -> Iterator[Row]:
         for row in Pool.open(folder).rows(["id", "task", "split", "params", "witness"]):
             if row["split"] == ID:
                 yield {**row, "values": json.loads(row["params"])}
-
-
-class _Log:
-    """Finished rollouts in a file, one per line, safe against a kill at any moment."""
-
-    def __init__(self, folder: Path, identity: Mapping[str, Any]):
-        self.path, self.identity = folder / "episodes.jsonl", dict(identity)
-        self.episodes: list[dict[str, Any]] = []
-
-    def __enter__(self) -> "_Log":
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(self.path.with_suffix(".lock"))
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise BadConfig(f"another run is writing {self.path.parent}; wait for it or choose another to=") from None
-        except OSError as error:
-            raise BadConfig(f"{self.path.parent} cannot be written: {error.strerror}; choose another to=") from None
-        self._file = self._opened()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-        self._lock.release()
-
-    def add(self, episode: dict[str, Any]) -> None:
-        """Store one; once this returns it survives a kill."""
-        self._file.write(json.dumps(episode) + "\n")
-        self._file.flush()
-        self.episodes.append(episode)
-
-    def _opened(self) -> Any:
-        """The file, ready for more: a line that a kill cut short is dropped."""
-        lines = self.path.read_text().splitlines(keepends=True) if self.path.exists() else []
-        whole = [line for line in lines if line.endswith("\n")]
-        if whole and json.loads(whole[0]) != self.identity:
-            self._lock.release()
-            raise BadConfig(f"{self.path.parent} holds results of other pools or settings; choose another to=")
-        self.episodes = [json.loads(line) for line in whole[1:]]
-        self.path.write_text("".join(whole) or json.dumps(self.identity) + "\n")
-        return open(self.path, "a")

@@ -35,6 +35,11 @@ class Take:
         """The witness of a scenario in a pool."""
         return cls(scenario, row["scene_xml"], row["embodiment"], row["witness"])
 
+    @property
+    def seconds(self) -> float:
+        """How long it lasts [s]."""
+        return round(len(self.tape) * Loop.PERIOD, 2)
+
     def world(self) -> World:
         """Its world at the start, with everything that is only looked at."""
         return World.load(self.scene_xml, self.embodiment, visual=True)

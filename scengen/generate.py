@@ -16,6 +16,7 @@ from .errors import BadConfig, Infeasible
 from .journal import Journal, Record
 from .parallel import each
 from .params import canonical
+from .samplers.designs import Design
 from .samplers.task import ID, Draw, Task, load
 from .validate.certify import CHECKS, Certified, certify
 from .validate.identity import fingerprint, source_sha256, versions
@@ -38,6 +39,7 @@ class Settings:
     """Settings of `scengen generate`; meanings stand in conf/generate.yaml."""
 
     split: str = ID
+    sampler: str = "iid"
     n: int = 10
     seed: int = 0
     workers: int = 1
@@ -48,6 +50,7 @@ class Settings:
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         task.moves(self.split)
+        task.design(self.sampler)
         for name, low in (("n", 1), ("seed", 0), ("workers", 1), ("limit", 1)):
             value = getattr(self, name)
             if value is not None and value < low:
@@ -103,11 +106,13 @@ def generate(task: Task, node: Mapping[str, Any], level: Level, settings: Settin
         journal.close()
 
 
-def attempt(task: Task, split: str, seed: int, index: int, level: Level, keep: tuple[str, ...]) -> Record:
+def attempt(
+    task: Task, split: str, design: Design, seed: int, index: int, level: Level, keep: tuple[str, ...]
+) -> Record:
     """Draw and certify one index."""
     start = time.process_time()
     try:
-        draw = task.draw(split, seed, index)
+        draw = task.draw(split, seed, index, design)
     except Infeasible as error:
         why = max(error.reasons, key=error.reasons.__getitem__)
         return Record(
@@ -203,8 +208,10 @@ def _extend(
 ) -> None:
     """Add records in the order of indices until n are certified or the limit is reached."""
     limit = settings.limit or max(100, 20 * settings.n)
+    if size := task.design(settings.sampler).size:
+        limit = min(limit, size)
     missing = (i for i in range(limit) if i not in records)
-    job = (task.name, dict(node), level, settings.split, settings.seed, tuple(settings.keep))
+    job = (task.name, dict(node), level, settings.split, settings.sampler, settings.seed, tuple(settings.keep))
 
     verdicts = Counter(r.verdict for r in records.values())
 
@@ -228,12 +235,15 @@ _JOB: dict[str, Any] = {}
 """What this process works on, set by `_begin`: sent once per worker instead of once per index."""
 
 
-def _begin(name: str, node: dict[str, Any], level: Level, split: str, seed: int, keep: tuple[str, ...]) -> None:
-    _JOB.update(task=load(name, node), level=level, split=split, seed=seed, keep=keep)
+def _begin(
+    name: str, node: dict[str, Any], level: Level, split: str, sampler: str, seed: int, keep: tuple[str, ...]
+) -> None:
+    task = load(name, node)
+    _JOB.update(task=task, level=level, split=split, design=task.design(sampler), seed=seed, keep=keep)
 
 
 def _work(index: int) -> Record:
-    return attempt(_JOB["task"], _JOB["split"], _JOB["seed"], index, _JOB["level"], _JOB["keep"])
+    return attempt(_JOB["task"], _JOB["split"], _JOB["design"], _JOB["seed"], index, _JOB["level"], _JOB["keep"])
 
 
 def _finish(

@@ -99,7 +99,8 @@ def _corners(world: World) -> NDArray[np.float64]:
     geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     boxes = [
-        data.geom_xpos[g] + (model.geom_aabb[g, :3] + signs * model.geom_aabb[g, 3:]) @ data.geom_xmat[g].reshape(3, 3).T
+        data.geom_xpos[g]
+        + (model.geom_aabb[g, :3] + signs * model.geom_aabb[g, 3:]) @ data.geom_xmat[g].reshape(3, 3).T
         for g in geoms
     ]
     return np.vstack([*boxes, world.hand])

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from .ood.symmetry import Symmetry
 from .params import canonical, check_bounds
 from .sim.world import World
 
@@ -44,6 +45,8 @@ class Scenario(abc.ABC):
     """How long the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()
     """Bodies that are meant to move without anybody acting; they are exempt from the rest check."""
+    SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
+    """Changes of the parameters that give the same scene, besides the periods that parameters declare themselves."""
 
     def __post_init__(self) -> None:
         check_bounds(self)
@@ -73,6 +76,13 @@ class Scenario(abc.ABC):
 
     def without(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene with its intended means taken away, by name: there the witness must fail."""
+        return {}
+
+    def features(self) -> Mapping[str, float]:
+        """What the physics depends on, by name: ratios and heights rather than parameters. Proves and decides nothing.
+
+        Scenes that differ in every parameter may be equal in these, and then it takes no new insight to solve them.
+        """
         return {}
 
     @property

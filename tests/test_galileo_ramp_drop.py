@@ -1,7 +1,9 @@
 """The height of release decides, nothing else does, and what is no fair problem gets no certificate."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 from helpers import anywhere
 from hypothesis import given, settings
@@ -59,19 +61,36 @@ def test_where_the_ball_slips_and_rolls_equal_heights_fall_short():
     assert episode.outcome == "timeout"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Watched(GalileoRampDrop):
+    """Remembers, from period to period, whether the goal held, and how fast the ball was beyond the patch's edge."""
+
+    seen: list[bool] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+
+    def success(self, world):
+        edge = (self.resting(self.ramp.patch[0]) - self.middle) @ self.frame[:, 0]
+        if self.along(world) > edge:
+            self.speeds.append(float(np.linalg.norm(world.velocity("ball")[3:])))
+        self.seen.append(super().success(world))
+        return self.seen[-1]
+
+
 def test_a_ball_that_only_crosses_the_patch_never_counts():
     """It touches the patch on its way, which is the goal but for its duration."""
-    scenario, seen = GalileoRampDrop(), []
-    goal, w = GalileoRampDrop.success, world(scenario)
+    scenario = Watched()
+    episode = play(scenario, scenario.shortcuts()["as high as possible"])
+    assert any(scenario.seen) and episode.outcome == "failure"
 
-    @dataclass(frozen=True, kw_only=True)
-    class Watched(GalileoRampDrop):
-        def success(self, world):
-            seen.append(goal(self, world))
-            return seen[-1]
 
-    episode = run(Watched(), w, scenario.shortcuts()["as high as possible"], TASK.horizon)
-    assert any(seen) and episode.outcome == "failure"
+@pytest.mark.parametrize(("angle", "friction"), [(14.0, 0.0), (24.0, 0.0), (38.0, 0.0), (24.0, 0.4)])
+def test_the_ball_arrives_on_the_patch_at_the_speed_of_the_closed_form_and_turns_back_there(angle, friction):
+    """Aimed at the middle of the patch: sqrt(g band) at its lower edge if it slides, zero where it turns back."""
+    scenario = Watched(ramp=Ramp(angle=angle, friction=friction, band=0.006))
+    assert play(scenario, scenario.oracle).solved
+    arrival = math.sqrt(9.81 * 0.006) * math.sqrt(5 / 7 if friction else 1.0)
+    assert 0.5 * arrival < scenario.speeds[0] < 1.35 * arrival < scenario.ramp.arrival
+    assert min(scenario.speeds) < 0.06
 
 
 def test_the_ball_may_be_touched_on_the_near_side_and_not_on_the_far_side():
@@ -84,6 +103,7 @@ def test_the_ball_may_be_touched_on_the_near_side_and_not_on_the_far_side():
 @pytest.mark.parametrize(("split", "solved"), [("light_ball", True), ("high_patch", False), ("rubbing", False)])
 def test_a_memorised_release_serves_a_ball_of_another_weight_and_nothing_else(split, solved):
     trained, moved = (TASK.draw(name, 0, 2).scenario for name in ("id", split))
+    assert isinstance(trained, GalileoRampDrop)
     tape = run(trained, world(trained), trained.oracle, TASK.horizon).tape
     assert replay(moved, world(moved), tape, TASK.horizon, until_settled=True).solved == solved
 
@@ -148,16 +168,19 @@ class Misjudged(GalileoRampDrop):
 )
 def test_what_is_no_fair_problem_is_not_certified(scenario, check, verdict):
     certificate = certify(scenario, TASK.horizon, Level(), TASK.embodiment).certificate
-    assert (certificate.verdict, certificate.failed.name) == (verdict, check), certificate.reason
+    failed = certificate.failed
+    assert failed and (certificate.verdict, failed.name) == (verdict, check), certificate.reason
 
 
-def test_without_one_of_the_inclines_the_witness_misses_the_patch():
+def test_without_the_near_incline_the_witness_drops_the_ball_and_without_the_far_one_it_runs_across_the_patch():
     scenario = GalileoRampDrop()
     tape = play(scenario, scenario.oracle).tape
-    for scene in scenario.without().values():
+    ends = {}
+    for name, scene in scenario.without().items():
         maimed = World.load(scene_text.emit(scene)[0], TASK.embodiment)
-        assert not replay(scenario, maimed, tape, TASK.horizon, until_settled=True).solved
-        assert not maimed.touched("ball", "ramp/patch")
+        episode = replay(scenario, maimed, tape, TASK.horizon, until_settled=True)
+        ends[name] = episode.outcome, maimed.touched("ball", "ramp/patch")
+    assert ends == {"no near incline": ("timeout", False), "no far incline": ("failure", True)}
 
 
 @given(ramp=anywhere(Ramp), radius=st.floats(0.008, 0.035), heading=st.floats(-180.0, 180.0))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scengen.assets.ball import Ball
 from scengen.assets.ramp import GRAVITY, THICKNESS, Ramp
-from scengen.assets.scene import TABLE_TOP, place, table
+from scengen.assets.scene import TABLE_TOP, UP, place, table
 
 SLIPPERY, ROUGH = 0.0, 0.5
 angles = st.floats(12.0, 40.0)
@@ -28,7 +28,7 @@ class Run:
         scene.option.timestep = timestep
         place(scene, ramp, "ramp", [0, 0, TABLE_TOP], free=False)
         centre = ramp.floor(self.start) + self.ball.radius * ramp.normal(self.start)
-        place(scene, self.ball, "ball", [0, 0, TABLE_TOP] + centre)
+        place(scene, self.ball, "ball", TABLE_TOP * UP + centre)
         self.model = scene.compile()
         self.data = mujoco.MjData(self.model)
 
@@ -122,7 +122,7 @@ def test_the_floor_is_where_the_formulas_say_and_no_seam_stands_out(angle, bend,
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     point, hit = ramp.floor(at * ramp.top), np.zeros(1, np.int32)
-    above = mujoco.mj_ray(model, data, [point[0], 0.003, 1.0], [0, 0, -1.0], None, 1, -1, hit)
+    above = mujoco.mj_ray(model, data, np.array([point[0], 0.003, 1.0]), -UP, None, 1, -1, hit)
     assert 1.0 - above == pytest.approx(point[2], abs=2e-5)
 
 

@@ -26,7 +26,7 @@ from ..sim.loop import ACTION, Loop
 from ..sim.world import World
 from ..validate.identity import check_versions
 from ..validate.rollout import Judge
-from .observations import CAMERAS, PROPRIOCEPTION, STREAMS, Reading, check_names
+from .observations import CAMERAS, STREAMS, Reading, check_names, proprioception
 
 Observation = dict[str, Reading]
 
@@ -50,7 +50,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self,
         task: str,
         pool: str | Path | Sequence[str | Path],
-        observations: Sequence[str] = PROPRIOCEPTION,
+        observations: Sequence[str] | None = None,
         render_mode: str | None = None,
         width: int = 256,
         height: int = 256,
@@ -61,7 +61,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Args:
             task: name of the task; scenarios of others are refused.
             pool: folder of a pool, or several.
-            observations: names of streams and cameras; what is not asked for costs nothing.
+            observations: names of streams and cameras; what is not asked for costs nothing. Proprioception if None.
             render_mode: None or `rgb_array`.
             width: of all pictures [pixels].
             height: of all pictures [pixels].
@@ -70,10 +70,12 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown.
         """
-        check_names(observations)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
         self.task: Task = config.task(task)
+        if observations is None:
+            observations = proprioception(self.task.embodiment)
+        check_names(observations, self.task.embodiment)
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
         self.streams = {name: STREAMS[name] for name in observations if name in STREAMS}
         self.cameras = [name for name in observations if name in CAMERAS]
@@ -230,7 +232,7 @@ def _scenarios(folder: str | Path, task: str) -> list[Row]:
 
 
 def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
-    return np.clip(reading, -bound, bound).astype(np.float32)
+    return np.minimum(np.maximum(reading, -bound), bound, dtype=np.float32, casting="same_kind")
 
 
 for _name in config.tasks():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import UnknownName
 from ..robots.panda import JOINTS
-from ..sim.world import World
+from ..sim.world import JAW, World
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
@@ -39,20 +39,6 @@ def _hand_quat(world: World) -> NDArray[np.float64]:
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, world.hand_frame.ravel())
     return np.array([quat[1], quat[2], quat[3], quat[0]])
-
-
-def _joints(world: World) -> NDArray[np.int64]:
-    return np.array([world.model.joint(f"robot0_joint{i + 1}").qposadr[0] for i in range(JOINTS)])
-
-
-def _joint_velocities(world: World) -> NDArray[np.float64]:
-    dofs = [world.model.joint(f"robot0_joint{i + 1}").dofadr[0] for i in range(JOINTS)]
-    return world.data.qvel[dofs]
-
-
-def _fingers(world: World) -> NDArray[np.float64]:
-    joints = [world.model.joint(f"gripper0_right_finger_joint{i}").qposadr[0] for i in (1, 2)]
-    return world.data.qpos[joints]
 
 
 def wrench(world: World) -> NDArray[np.float64]:
@@ -101,9 +87,9 @@ def _tactile(pad: str) -> Callable[[World], NDArray[np.float64]]:
 STREAMS: dict[str, Stream] = {
     "robot0_eef_pos": Stream((3,), 3.0, lambda world: world.hand),
     "robot0_eef_quat": Stream((4,), 1.0, _hand_quat),
-    "robot0_joint_pos": Stream((JOINTS,), 7.0, lambda world: world.data.qpos[_joints(world)]),
-    "robot0_joint_vel": Stream((JOINTS,), 100.0, _joint_velocities),
-    "robot0_gripper_qpos": Stream((2,), 0.1, _fingers),
+    "robot0_joint_pos": Stream((JOINTS,), 7.0, lambda world: world.joint_pos),
+    "robot0_joint_vel": Stream((JOINTS,), 100.0, lambda world: world.joint_vel),
+    "robot0_gripper_qpos": Stream((2,), 0.1, lambda world: world.finger_pos),
     "force_torque": Stream((6,), 1e4, wrench),
     "force_torque_world": Stream((3,), 1e4, _world_force),
     **{name: Stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},
@@ -118,12 +104,23 @@ CAMERAS = {
 }
 """The paper's names of the cameras, and robosuite's."""
 
-PROPRIOCEPTION = tuple(name for name in STREAMS if name.startswith("robot0_") and name not in PADS)
+JAW_ONLY = ("robot0_gripper_qpos", *PADS)
+"""Streams that a robot without jaw does not have."""
 
 
-def check_names(names: Sequence[str]) -> None:
-    """Raise `UnknownName` for the first name that is neither a stream nor a camera."""
-    known = [*STREAMS, *CAMERAS]
+def streams_of(embodiment: str) -> dict[str, Stream]:
+    """All streams that this robot has."""
+    return {name: stream for name, stream in STREAMS.items() if embodiment == JAW or name not in JAW_ONLY}
+
+
+def proprioception(embodiment: str) -> tuple[str, ...]:
+    """Names of the streams about the robot's own pose."""
+    return tuple(name for name in streams_of(embodiment) if name.startswith("robot0_") and name not in PADS)
+
+
+def check_names(names: Sequence[str], embodiment: str = JAW) -> None:
+    """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera."""
+    known = [*streams_of(embodiment), *CAMERAS]
     for name in names:
         if name not in known:
             raise UnknownName("observation", name, known)

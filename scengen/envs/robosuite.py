@@ -8,11 +8,8 @@ the scene, the suction cup, the events of the scene, and the verdict, which is t
 """
 
 import json
-import logging
-import tempfile
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,29 +20,21 @@ from numpy.typing import NDArray
 
 from .. import config
 from ..assets.scene import TABLE_HALF
-from ..errors import BadConfig, PoolError, UnknownName
+from ..errors import BadConfig, PoolError
 from ..params import with_values
 from ..pool import Pool, Row
-from ..robots import suction
-from ..sim import scene_text
+from ..scenario import Scenario
 from ..sim.loop import Loop
 from ..sim.world import JAW, SUCTION, World
 from ..validate.identity import check_versions
 from ..validate.rollout import Judge, Outcome
+from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
-_advice = logging.getLogger("robosuite_logs")
-_advice.disabled = True  # on import, robosuite advises to install what nothing here needs
-import robosuite.environments.base  # noqa: E402
-from robosuite.environments.manipulation.manipulation_env import ManipulationEnv  # noqa: E402
-from robosuite.models.base import MujocoXML  # noqa: E402
-from robosuite.models.grippers import register_gripper  # noqa: E402
-from robosuite.models.grippers.gripper_model import GripperModel  # noqa: E402
-from robosuite.models.robots import RobotModel  # noqa: E402
-from robosuite.models.tasks import ManipulationTask  # noqa: E402
-from robosuite.utils.observables import Observable, sensor  # noqa: E402
-from robosuite.utils.transform_utils import convert_quat  # noqa: E402
-
-_advice.disabled = False
+# isort: split
+from robosuite.environments.base import REGISTERED_ENVS
+from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+from robosuite.utils.observables import Observable, sensor
+from robosuite.utils.transform_utils import convert_quat
 
 Observations = OrderedDict[str, Any]
 
@@ -53,56 +42,8 @@ ROBOT = "Panda"
 """robosuite's name of the robot that certificates speak of."""
 GRIPPERS = {JAW: "PandaGripper", SUCTION: "SuctionGripper"}
 """robosuite's names of the hands of our embodiments."""
-TEXT = ("compiler", "option", "visual")
-"""What the scene says about physics and light, in place of what robosuite puts into every model."""
 COLUMNS = ("id", "task", "split", "axes", "instruction", "horizon", "params", "embodiment", "scene_xml")
 """What an environment needs to know of a scenario."""
-
-
-@register_gripper
-class SuctionGripper(GripperModel):
-    """The suction cup of `scengen.robots.suction`: one action, suction on where it is positive.
-
-    Its command is what is asked for. Whether the cup pulls is decided in every physics step by `Loop.watch`.
-    """
-
-    def __init__(self, idn: int | str = 0):
-        with _file(suction.xml()) as path:
-            super().__init__(path, idn=idn)
-
-    def format_action(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
-        """-1 for off, 1 for on, which robosuite scales to the actuator's range of 0 to 1."""
-        self.current_action = np.where(np.asarray(action) > 0.0, 1.0, -1.0)
-        return self.current_action
-
-    @property
-    def init_qpos(self) -> NDArray[np.float64]:
-        """No joints."""
-        return np.zeros(0)
-
-
-class SceneModel(MujocoXML):
-    """The text of a scene, as robosuite holds models. Names stay as they are."""
-
-    def __init__(self, text: str):
-        scene_text.check(text)
-        with _file(text) as path:
-            super().__init__(path)
-        for geom in self.worldbody.iter("geom"):
-            # robosuite draws group 1 only; ours is drawn whole. A group has no effect on the physics.
-            if geom.get("group", "0") == "0":
-                geom.set("group", "1")
-
-
-class SceneTask(ManipulationTask):
-    """A scene and the robot, under the scene's own physics options."""
-
-    def __init__(self, scene: SceneModel, robot: RobotModel):
-        super().__init__(mujoco_arena=scene, mujoco_robots=[robot])
-        for tag in TEXT:
-            for theirs in self.root.findall(tag):
-                self.root.remove(theirs)
-            self.root.extend(scene.root.findall(tag))
 
 
 class ScenarioEnv(ManipulationEnv):
@@ -119,6 +60,12 @@ class ScenarioEnv(ManipulationEnv):
     SEARCH: ClassVar[tuple[str, ...]] = ()
     """Where else to look for its file, see `config.search_path`."""
 
+    sim: Any
+    """robosuite's simulation."""
+    row: Row
+    """The scenario as its pool tells it."""
+    scenario: Scenario
+    """The scenario itself. Privileged: a policy that reads it knows what it should find out."""
     outcome: Outcome | None
     """What has come of the episode; None as long as it is open. A success is lost by a later failure."""
     reason: str
@@ -133,7 +80,7 @@ class ScenarioEnv(ManipulationEnv):
         pool: str | Path | None = None,
         use_object_obs: bool = True,
         gripper_types: str = "default",
-        control_freq: float = 100,
+        control_freq: int = 100,
         horizon: int | None = None,
         **arguments: Any,
     ):
@@ -189,7 +136,7 @@ class ScenarioEnv(ManipulationEnv):
 
     def _load_model(self) -> None:
         super()._load_model()
-        self.row: Row = self._choice[0] if len(self._choice) == 1 else self.rng.choice(self._choice)
+        self.row = self._choice[int(self.rng.integers(len(self._choice)))]
         self.scenario = with_values(self.task.family(), json.loads(self.row["params"]))
         robot = self.robots[0].robot_model
         robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF))
@@ -285,7 +232,7 @@ class ScenarioEnv(ManipulationEnv):
         return {f"{name}_pos": pos, f"{name}_quat": quat}
 
 
-del robosuite.environments.base.REGISTERED_ENVS[ScenarioEnv.__name__]  # only its subclasses have a task
+del REGISTERED_ENVS[ScenarioEnv.__name__]  # only its subclasses have a task
 
 
 @cache
@@ -300,14 +247,14 @@ def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
         BadConfig: robosuite has another environment of that name.
     """
     name = "".join(part.capitalize() for part in task.split("_"))
-    if name in robosuite.environments.base.REGISTERED_ENVS:
+    if name in REGISTERED_ENVS:
         raise BadConfig(f"task {task}: robosuite has an environment {name} of its own; rename the task")
     about = f"Scenarios of the task {task}; see {ScenarioEnv.__name__}."
     return type(name, (ScenarioEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
 
 
 def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> list[Row]:
-    """The scenarios to draw from: one row, those of a pool whose ids begin with a text, or the whole pool.
+    """The scenarios to draw from: one row, the one of a pool whose id begins with a text, or the whole pool.
 
     Raises:
         ScengenError: there is none, or one of another task or made with other versions.
@@ -317,11 +264,8 @@ def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> l
         made = json.loads(scenario["certificate"]["versions"])
     elif pool is not None and not isinstance(scenario, dict):
         found = Pool.open(pool).check()
-        rows, where, made = list(found.rows(COLUMNS)), str(found.folder), found.manifest["versions"]
-        if scenario is not None:
-            rows = [row for row in rows if row["id"].startswith(scenario)]
-            if len(rows) != 1:
-                raise UnknownName(f"single scenario in {pool}", scenario, [row["id"] for row in found.rows(["id"])])
+        rows = list(found.rows(COLUMNS)) if scenario is None else [found.row(scenario)]
+        where, made = str(found.folder), found.manifest["versions"]
     else:
         raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
     check_versions(made, where)
@@ -330,15 +274,6 @@ def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> l
     if not rows:
         raise PoolError(f"{where} holds no scenario; see scengen generate")
     return rows
-
-
-@contextmanager
-def _file(text: str) -> Iterator[str]:
-    """Path of a file of that content for a moment: robosuite reads models from files only."""
-    with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
-        file.write(text)
-        file.flush()
-        yield file.name
 
 
 for _name in config.tasks():

@@ -25,6 +25,8 @@ of joint 7 and 0.2127 along it, measured on the collision meshes.
 """
 LEVER = 0.1
 """A turn of 1 rad counts as much as this distance [m]: about the length of the hand."""
+EXACT = 1e-6
+"""A posture this close to what is asked for ends the search [m]."""
 STARTS: NDArray[np.float64] = np.array(
     [
         panda.HOME,
@@ -52,6 +54,11 @@ class Nearest:
     turn: float
     """Angle left between the hand and the asked orientation [rad]; 0 where any orientation will do."""
 
+    @property
+    def left(self) -> float:
+        """Both in one [m]: what a search makes small."""
+        return self.residual + LEVER * self.turn
+
 
 def reach(target: ArrayLike, frame: NDArray[np.float64] | None = None) -> Nearest:
     """The posture that brings the grip site closest to `target`, in the least-squares sense.
@@ -60,9 +67,15 @@ def reach(target: ArrayLike, frame: NDArray[np.float64] | None = None) -> Neares
         target: world position [m], shape (3,).
         frame: orientation of the grip site, shape (3, 3); any orientation will do by default.
     """
-    goal = np.asarray(target, float)
-    found = [_descend(goal, frame, start) for start in STARTS]
-    return min(found, key=lambda n: n.residual + LEVER * n.turn)
+    goal, best = np.asarray(target, float), None
+    for start in STARTS:
+        found = _descend(goal, frame, start)
+        if best is None or found.left < best.left:
+            best = found
+        if best.left < EXACT:
+            break
+    assert best is not None
+    return best
 
 
 def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:

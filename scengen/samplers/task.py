@@ -1,5 +1,6 @@
 """Task: a scenario family plus the distributions that we test it on. One file each in conf/task/."""
 
+import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,17 +12,29 @@ from hydra.utils import get_class
 from ..errors import BadConfig, Infeasible, UnknownName, nearest
 from ..ood.axis import Axis, Proof
 from ..params import Parameter, Value, parameters, with_values
-from ..scenario import Scenario
+from ..scenario import Refutation, Scenario
 from ..sim.world import EMBODIMENTS, JAW
+from . import designs
+from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
-from .keyed import unit
 
 ID = "id"
 """Name of the split that policies train on."""
-TRIES = 100
-"""Draws of one index before the distribution is called infeasible."""
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
-OPTIONAL = ("axes", "certify", "embodiment")
+OPTIONAL = ("axes", "certify", "embodiment", "boundary")
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """One try at an index, feasible or not."""
+
+    attempt: int
+    scenario: Scenario
+    numbers: Mapping[str, float]
+    """What the design gave for each parameter that varies, in (0, 1)."""
+    refutation: Refutation | None
+    trained: Scenario | None
+    """The training scenario of the same index; None in the training split."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +48,8 @@ class Draw:
     attempt: int
     """Which try was the first feasible one."""
     scenario: Scenario
+    numbers: Mapping[str, float]
+    """See `Proposal`."""
     twin: str
     """Id of the training scenario with the same index: it differs in the parameters of the split's axes only."""
     moved: Mapping[str, Value]
@@ -68,6 +83,10 @@ class Task:
         """The family's parameters by name."""
         return {p.name: p for p in parameters(self.family())}
 
+    def scenario(self, params: str) -> Scenario:
+        """The scenario of a row: the family with these parameter values, given as JSON."""
+        return with_values(self.family(), json.loads(params))
+
     @cached_property
     def proofs(self) -> dict[str, list[Proof]]:
         """Why each axis lies outside the training support.
@@ -75,57 +94,109 @@ class Task:
         Raises:
             BadConfig: one does not.
         """
-        return {name: axis.prove(self.training, self.known) for name, axis in self.axes.items()}
+        return {name: self.prove(axis) for name, axis in self.axes.items()}
 
-    def moves(self, split: str) -> dict[str, Dist]:
-        """The distributions that a split replaces: none for `id`, those of all axes for `a+b`.
+    def prove(self, axis: Axis) -> list[Proof]:
+        """Why an axis lies outside the training support.
+
+        Raises:
+            BadConfig: it does not.
+        """
+        return axis.prove(self.training, self.known, self.family.SYMMETRIES)
+
+    def axis(self, part: str) -> Axis:
+        """The axis of that name, or `name@3` for its third level.
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: two of its axes move the same parameter.
+            BadConfig: it has no such level.
+        """
+        name, at, level = part.partition("@")
+        if name not in self.axes:
+            raise UnknownName(f"split of {self.name}", name, [ID, *self.axes])
+        if not at:
+            return self.axes[name]
+        if not level.isdecimal():
+            raise BadConfig(f"level {part}: after the @ stands a whole number, as in {name}@1")
+        return self.axes[name].at(int(level), self.training, self.known)
+
+    def moves(self, split: str) -> dict[str, Dist]:
+        """The distributions that a split replaces: none for `id`, those of all axes for `a+b`, levels as in `a@2+b`.
+
+        Raises:
+            UnknownName: there is no such axis.
+            BadConfig: it has no such level, or two axes move the same parameter.
         """
         moved: dict[str, Dist] = {}
-        for name in [] if split == ID else split.split("+"):
-            if name not in self.axes:
-                raise UnknownName(f"split of {self.name}", name, [ID, *self.axes])
-            if both := moved.keys() & self.axes[name].replace.keys():
+        for axis in [] if split == ID else map(self.axis, split.split("+")):
+            if both := moved.keys() & axis.replace.keys():
                 raise BadConfig(
                     f"split {split}: two of its axes move {', '.join(sorted(both))}; compose axes that differ"
                 )
-            moved.update(self.axes[name].replace)
+            moved.update(axis.replace)
         return moved
 
-    def draw(self, split: str, seed: int, index: int) -> Draw:
+    def design(self, spelled: str) -> Design:
+        """Where the numbers come from: `iid`, `sobol`, `lhs:50` or `grid:3`.
+
+        Raises:
+            BadConfig: it is none of these.
+        """
+        return designs.parse(spelled, self.name, self.training)
+
+    def draw(self, split: str, seed: int, index: int, design: Design | None = None) -> Draw:
         """Scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
 
         Every parameter has its own random stream. A split starts from the training scenario of the same index and
         draws only what its axes name, so that scenario 7 of `diagonal` is scenario 7 of `id`, turned.
 
+        Args:
+            design: where the numbers come from; independent draws without it.
+
         Raises:
             Infeasible: no try gave a feasible scenario.
         """
-        attempt, trained, rejected = self._first_feasible(ID, self.training, self.family(), seed, index)
-        if moves := self.moves(split):
-            attempt, scenario, rejected = self._first_feasible(split, moves, trained, seed, index)
-        else:
-            scenario = trained
+        *failed, last = self.proposals(split, seed, index, design)
+        rejected = Counter(p.refutation.reason for p in failed if p.refutation)
+        if last.refutation:
+            rejected[last.refutation.reason] += 1
+            raise Infeasible(f"{self.name}/{split}/{index}", rejected.total(), rejected)
+        scenario, moves = last.scenario, self.moves(split)
         moved = {p.name: p.nominal for p in parameters(scenario) if p.name in moves}
-        return Draw(self.name, split, seed, index, attempt, scenario, trained.id, moved, rejected)
+        twin = (last.trained or scenario).id
+        return Draw(self.name, split, seed, index, last.attempt, scenario, last.numbers, twin, moved, rejected)
 
-    def _first_feasible(
-        self, split: str, space: Mapping[str, Dist], start: Scenario, seed: int, index: int
-    ) -> tuple[int, Scenario, Counter[str]]:
-        rejected: Counter[str] = Counter()
-        for attempt in range(TRIES):
-            values = {n: d.quantile(unit(self.name, n, seed, index, attempt)) for n, d in space.items()}
-            scenario = with_values(start, values)
+    def proposals(self, split: str, seed: int, index: int, design: Design | None = None) -> Iterator[Proposal]:
+        """Every try at an index; the last one is feasible, if any is.
+
+        Raises:
+            Infeasible: there is no training scenario of this index that an axis could start from.
+        """
+        design = design or Independent(self.name)
+        if split == ID:
+            yield from self._tries(self.training, None, {}, seed, index, design)
+        else:
+            moves, trained = self.moves(split), self.draw(ID, seed, index, design)
+            kept = {name: u for name, u in trained.numbers.items() if name not in moves}
+            yield from self._tries(moves, trained.scenario, kept, seed, index, design)
+
+    def _tries(
+        self,
+        space: Mapping[str, Dist],
+        trained: Scenario | None,
+        kept: Mapping[str, float],
+        seed: int,
+        index: int,
+        design: Design,
+    ) -> Iterator[Proposal]:
+        start, varied = trained or self.family(), [n for n, d in space.items() if not isinstance(d, Fixed)]
+        for attempt in range(design.tries if varied else 1):  # without anything varied all tries are the same
+            numbers = {name: design.number(name, seed, index, attempt) for name in varied}
+            scenario = with_values(start, {n: d.quantile(numbers.get(n, 0.5)) for n, d in space.items()})
             refutation = scenario.infeasible()
+            yield Proposal(attempt, scenario, {**kept, **numbers}, refutation, trained)
             if refutation is None:
-                return attempt, scenario, rejected
-            rejected[refutation.reason] += 1
-            if all(isinstance(d, Fixed) for d in space.values()):
-                break  # every further try would be the same scenario
-        raise Infeasible(f"{self.name}/{split}/{index}", sum(rejected.values()), rejected)
+                return
 
 
 def load(name: str, node: Mapping[str, Any]) -> Task:
@@ -139,14 +210,16 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     known = {p.name: p for p in parameters(family())}
     training: dict[str, Dist] = {n: Fixed(p.nominal) for n, p in known.items()}
     training.update(_space(f"{name}.id", node["id"] or {}, known))
-    axes = {}
+    for symmetry in family.SYMMETRIES:
+        symmetry.check(known)
+    axes, limits = {}, dict(node.get("boundary") or {})
     for axis, inner in (node.get("axes") or {}).items():
         where = f"{name}.axes.{axis}"
         if axis == ID or not str(axis).isidentifier():
             raise BadConfig(f"{where}: {axis!r} cannot name an axis; use letters, digits and _, and not {ID!r}")
         if not isinstance(inner, Mapping):
             raise BadConfig(f"{where} = {inner!r}; expected why, source and replace")
-        _check_keys(where, inner, ("replace",), ("why", "source"))
+        _check_keys(where, inner, ("replace",), ("why", "source", "levels"))
         if not isinstance(inner["replace"], Mapping):
             raise BadConfig(f"{where}.replace = {inner['replace']!r}; expected parameters and their distributions")
         axes[axis] = Axis(
@@ -154,7 +227,11 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
             inner.get("why", ""),
             inner.get("source", ""),
             _space(f"{where}.replace", inner["replace"], known),
+            _levels(where, inner.get("levels", 0)),
+            _limits(name, axis, inner["replace"], limits.pop(axis, {}), known),
         )
+    if limits:
+        raise UnknownName(f"axis of {name} in its boundaries", next(iter(limits)), axes)
     task = Task(
         name,
         family,
@@ -167,6 +244,9 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         axes,
         node.get("certify") or {},
     )
+    for axis in task.axes.values():
+        for level in range(1, axis.levels + 1):
+            task.prove(axis.at(level, training, known))
     _ = task.proofs
     return task
 
@@ -208,6 +288,27 @@ def _space(where: str, nodes: Mapping[str, Any], known: Mapping[str, Parameter])
             known[name].check(f"{where}.{name}", end)
         space[name] = dist
     return space
+
+
+def _levels(where: str, levels: Any) -> int:
+    if isinstance(levels, bool) or not isinstance(levels, int) or levels < 0:
+        raise BadConfig(f"{where}.levels = {levels!r}; it must be a whole number, 0 for none")
+    return levels
+
+
+def _limits(
+    task: str, axis: str, replaced: Mapping[str, Any], nodes: Any, known: Mapping[str, Parameter]
+) -> dict[str, float]:
+    """Measured limits of the parameters of one axis, from conf/boundary/<task>.yaml."""
+    where, names = f"{task}.boundary.{axis}", dict(_leaves(replaced))
+    if not isinstance(nodes, Mapping):
+        raise BadConfig(f"{where} = {nodes!r}; expected parameters and the farthest values at which an oracle succeeds")
+    limits = dict(_leaves(nodes))
+    for name, value in limits.items():
+        if name not in names:
+            raise UnknownName(f"parameter of {where}", name, names)
+        known[name].check(f"{where}.{name}", value)
+    return limits
 
 
 def _positive(where: str, value: Any) -> float:

@@ -4,6 +4,7 @@ import functools
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -57,7 +58,7 @@ class World:
     """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
 
     @classmethod
-    def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> "World":
+    def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> Self:
         """Compile a scene text with the robot and put everything at its start.
 
         Args:
@@ -72,7 +73,7 @@ class World:
         return cls.of(spec.compile())
 
     @classmethod
-    def of(cls, model: mujoco.MjModel) -> "World":
+    def of(cls, model: mujoco.MjModel) -> Self:
         """A world at its start, around a compiled scene with robot."""
         data = mujoco.MjData(model)
         world = cls(model, data, Loop(model, data))
@@ -124,6 +125,21 @@ class World:
     def hand_frame(self) -> Mat3:
         """Orientation of the grip site; its z axis points out of the hand."""
         return self.data.site_xmat[self._grip_site].reshape(3, 3).copy()
+
+    @property
+    def joint_pos(self) -> NDArray[np.float64]:
+        """Angles of the arm's seven joints [rad]."""
+        return self.data.qpos[self._joints[0]]
+
+    @property
+    def joint_vel(self) -> NDArray[np.float64]:
+        """Speeds of the arm's seven joints [rad/s]."""
+        return self.data.qvel[self._joints[1]]
+
+    @property
+    def finger_pos(self) -> NDArray[np.float64]:
+        """Positions of the two finger joints [m]; empty without a jaw."""
+        return self.data.qpos[self._joints[2]]
 
     def pos(self, body: str) -> Vec3:
         """Origin of a body [m]."""
@@ -201,6 +217,12 @@ class World:
     @functools.cached_property
     def _bodies(self) -> dict[str, int]:
         return {self.model.body(i).name: i for i in range(self.model.nbody)}
+
+    @functools.cached_property
+    def _joints(self) -> tuple[list[int], list[int], list[int]]:
+        """Places of the arm's joints in qpos and in qvel, and of the fingers in qpos."""
+        arm = [self.model.joint(f"robot0_joint{i + 1}") for i in range(panda.JOINTS)]
+        return [j.qposadr[0] for j in arm], [j.dofadr[0] for j in arm], panda.fingers(self.model)
 
     @functools.cached_property
     def _grip_site(self) -> int:

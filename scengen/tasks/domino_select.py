@@ -13,16 +13,21 @@ the same: their first tiles stand in one row and so do their slabs, and only wha
 
 Decisions and deviations.
 
-* The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide without
-  standing in each other's way, and a chain that passes it by would run through the next one. Here every chain has a slab
-  of its own: a red one counts wherever it stands, a blue one never does. So colour tells the decoys and nothing else.
+* The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide
+  without standing in each other's way, and a chain that passes it by would run through the next one. Here every chain
+  has a slab of its own: a red one counts wherever it stands, a blue one never does. So colour tells the decoys and
+  nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth that repeats a kind.
 * One try: the robot may touch one first tile and nothing else. A second chain, a later tile or a slab is a latched
   failure. The paper notes that policies knock over tiles in the middle of a chain; and without the rule about the
   second chain, knocking over all five solves every scene. Touching a wrong first tile is no failure by itself: nothing
   can be won any more, and thus every wrong chain can be judged by physics alone. Each certificate topples each wrong
   chain as the oracle topples the right one, and watches until all is still.
-* A first tile may be toppled, not carried: a robot that pushes it up to the break, or takes it to the slab, needs no chain.
+* How hard a first tile is pushed does not matter. It gets 2 rad/s from the oracle and 8 from the fastest hand, but
+  11 from its own fall over a gap of 0.6 heights; a tile slides by no more than the 2 mm by which a drift of 1.05
+  heights exceeds its reach.
+* A first tile may be toppled, not carried: a robot that pushes it up to the break, or takes it to the slab, needs no
+  chain.
 """
 
 import itertools
@@ -33,7 +38,7 @@ from functools import cached_property
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from ..assets.domino import Domino
 from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
@@ -52,7 +57,7 @@ SLAB_MOVES = 0.05
 FINGERTIP = 0.012
 """How far the closed finger tips reach in front of the grip site when it points down [m], measured on the model."""
 CLEAR = 0.002
-"""Free space across the chains that pieces of neighbouring chains must leave [m]: the jitter of the robustness check."""
+"""Free space across the chains that neighbouring chains must leave [m]: the jitter of the robustness check."""
 CARRIED = 0.01
 """How far the foot of a first tile may have moved while the robot still touches it [m]. In a topple it moves less than
 1 mm; to fall across a gap in the chain the tile would have to be brought `2 * gap + thickness - height` closer."""
@@ -157,7 +162,11 @@ class DominoSelect(Scenario):
             return [self.gap] * self.count
         widest = defect.stretch * self.tile.height
         powers = np.arange(self.count)
-        shrink = float(brentq(lambda r: float(np.sum(r**powers)) - self.count * self.gap / widest, 0.0, 1.0))
+
+        def excess(ratio: float) -> float:
+            return float(np.sum(ratio**powers)) - self.count * self.gap / widest
+
+        shrink = root_scalar(excess, bracket=(0.0, 1.0)).root
         return [widest * shrink ** (self.count - 1 - i) for i in range(self.count)]
 
     @cached_property
@@ -227,7 +236,7 @@ class DominoSelect(Scenario):
         return scene
 
     def without(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the intact chain the first tile falls on nothing; one tile less may still be bridged by the others."""
+        """Without the intact chain its first tile falls on nothing; one tile less might be bridged by the others."""
         scene = self.build()
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{self.intact}_{i}"))

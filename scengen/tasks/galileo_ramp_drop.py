@@ -194,15 +194,19 @@ class GalileoRampDrop(Scenario):
             )
 
     def without(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it.
-
-        The patch, which loses its support then, lies below its place with its lower edge on the table.
-        """
+        """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it."""
         near, far = self.build(), self.build()
         _clear(near, "ramp/near")
         _clear(far, "ramp/far", "ramp/beyond")
-        far.body("ramp/patch").pos = [0.0, 0.0, -float(self.ramp.floor(self.ramp.patch[0])[2])]
+        self._lay_down(far.body("ramp/patch"))
         return {"no near incline": near, "no far incline": far}
+
+    def _lay_down(self, patch: mujoco.MjsBody) -> None:
+        """Put the patch, which has lost its support, flat below its place, flush with the table top."""
+        c, s = math.cos(self.ramp.slope), math.sin(self.ramp.slope)
+        x, _, z = self.ramp.floor(sum(self.ramp.patch) / 2)
+        patch.quat = np.array([math.cos(self.ramp.slope / 2), 0.0, math.sin(self.ramp.slope / 2), 0.0])
+        patch.pos = np.array([x - (c * x + s * z), 0.0, s * x - c * z])
 
     # --- goal -----------------------------------------------------------------------------
 

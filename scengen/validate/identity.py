@@ -61,8 +61,8 @@ def fingerprint() -> str:
 def source_sha256(family: type[Scenario]) -> str:
     """Hash of the code that gives a family its meaning: its module and the assets that it uses.
 
-    Comments, docstrings, formatting and the `oracle` method do not count: a certificate rests on the witness, not on
-    how it was found.
+    Comments, docstrings, formatting and the methods `oracle` and `features` do not count: a certificate rests on the
+    witness, not on how it was found or how its scene is described.
     """
     text = "".join(_essence(path) for path in _sources(inspect.getmodule(family)))
     return hashlib.sha256(text.encode()).hexdigest()
@@ -102,7 +102,7 @@ def _find(name: str) -> Path | None:
 
 
 def _essence(path: Path) -> str:
-    """The code of a file without comments, docstrings and `oracle`."""
+    """The code of a file without comments, docstrings, `oracle` and `features`."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -113,4 +113,4 @@ def _essence(path: Path) -> str:
 
 def _beside_the_point(statement: ast.stmt) -> bool:
     documents = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-    return documents or (isinstance(statement, ast.FunctionDef) and statement.name == "oracle")
+    return documents or (isinstance(statement, ast.FunctionDef) and statement.name in ("oracle", "features"))

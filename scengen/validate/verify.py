@@ -113,11 +113,8 @@ def _wrong_names(row: Row, scenario: Scenario) -> list[str]:
 
 def _replayed(row: Row, scenario: Scenario) -> tuple[list[str], bool]:
     """Why the witness no longer holds, and whether it ends in other bits on a machine that rounds otherwise."""
-    settle = next(
-        (json.loads(c["settings"]).get("settle") for c in row["certificate"]["checks"] if c["name"] == "witness"),
-        None,
-    )
-    if not isinstance(settle, (int, float)):
+    settle = settling_time(row)
+    if settle is None:
         return ["the certificate does not say how long the goal must hold"], False
     episode = replay(scenario, World.load(row["scene_xml"], row["embodiment"]), row["witness"], row["horizon"], settle)
     if not episode.solved:
@@ -126,6 +123,13 @@ def _replayed(row: Row, scenario: Scenario) -> tuple[list[str], bool]:
     if not same and row["certificate"]["fingerprint"] == fingerprint():
         return ["the witness ends in another state, although this machine rounds as the certificate's did"], False
     return [], not same
+
+
+def settling_time(row: Row) -> float | None:
+    """How long the goal had to hold when the witness was certified [s], or None if the certificate does not say."""
+    witness = (json.loads(c["settings"]) for c in row["certificate"]["checks"] if c["name"] == "witness")
+    settle = next(witness, {}).get("settle")
+    return settle if isinstance(settle, (int, float)) else None
 
 
 def _readable(pool: Pool, failed: list[dict[str, str]]) -> Iterator[Row]:

@@ -1,0 +1,68 @@
+"""replay every witness in robosuite and report where it differs"""
+
+from collections import defaultdict
+from dataclasses import asdict, dataclass
+
+from rich.table import Table
+
+from ..config import read, search_path, typed
+from ..errors import BadConfig
+from ..pool import Pool
+from ..progress import Bar
+from . import FAILED, OK, Arguments, err, out, several, write_json
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen robosuite`; meanings stand in conf/robosuite.yaml."""
+
+    pool: str | list[str] = ""
+    first: int | None = None
+    bar: float = 0.98
+    json: str | None = None
+    workers: int = 1
+
+    def check(self) -> None:
+        """Raise `BadConfig` for a value that means nothing."""
+        if not 0.0 <= self.bar <= 1.0:
+            raise BadConfig(f"bar = {self.bar:g}; it is a share, between 0 and 1")
+        for name, value in (("first", self.first), ("workers", self.workers)):
+            if value is not None and value < 1:
+                raise BadConfig(f"{name} = {value}; it must be at least 1")
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("robosuite", arguments).settings)
+    settings.check()
+    pools = [Pool.open(folder) for folder in several(settings.pool)]
+    total = sum(min(len(pool), settings.first or len(pool)) for pool in pools)
+    if not total:
+        raise BadConfig(f"pool = {', '.join(several(settings.pool))}; it holds no scenario, see scengen generate")
+
+    from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
+
+    with Bar(err, "robosuite", total) as bar:
+        found = compare_all(pools, settings.workers, bar.show, settings.first, search_path(arguments))
+    tasks = defaultdict(list)
+    for comparison in found:
+        tasks[comparison.task].append(comparison)
+        if not comparison.agrees:
+            told = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
+            err.print(f"DIFFERS {comparison.id} of {comparison.task}: {told}", style="red", highlight=False)
+    table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdict later by at most (s)")
+    for task, those in tasks.items():
+        apart, later = max(c.apart for c in those), max((c.later for c in those), key=abs)
+        table.add_row(task, str(len(those)), str(sum(c.agrees for c in those)), f"{1000 * apart:.4f}", f"{later:.2f}")
+    out.print(table)
+    same = sum(comparison.agrees for comparison in found)
+    holds = same >= settings.bar * total
+    if settings.json:
+        hashes = {str(pool.folder): pool.sha256 for pool in pools}
+        plain = [asdict(comparison) for comparison in found]
+        write_json(settings.json, {"pools": hashes, "bar": settings.bar, "same": same, "scenarios": plain})
+    verdict = "reached" if holds else "MISSED"
+    out.print(
+        f"{same} of {total} scenarios have the same verdict in robosuite; the bar of {settings.bar:.0%} is {verdict}",
+        highlight=False,
+    )
+    return OK if holds else FAILED

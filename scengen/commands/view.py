@@ -1,0 +1,27 @@
+"""a scenario in MuJoCo's viewer, still or with its witness in real time"""
+
+from dataclasses import dataclass
+
+from .. import config
+from ..config import read, search_path, typed
+from ..pool import Pool
+from ..view import check_display, view
+from . import OK, Arguments, one
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen view`; meanings stand in conf/view.yaml."""
+
+    pool: str | list[str] = ""
+    id: str = ""
+    replay: bool = False
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("view", arguments).settings)
+    row = Pool.open(one(settings.pool)).check().row(settings.id)
+    scenario = config.task(row["task"], search_path(arguments)).scenario(row["params"])
+    check_display()
+    view(row, scenario, settings.replay)
+    return OK

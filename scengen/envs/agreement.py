@@ -1,0 +1,125 @@
+"""Whether certificates hold in robosuite too: a witness is played there and here, and the ends are compared."""
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parallel import each
+from ..pool import Pool, Row
+from ..sim.loop import Loop
+from ..sim.world import Vec3, World
+from ..validate.moves import idle
+from ..validate.rollout import Outcome, Tape, replay
+from ..validate.verify import settling_time
+from .robosuite import ScenarioEnv, environment
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One witness, played here and in robosuite."""
+
+    task: str
+    id: str
+    ours: Outcome
+    theirs: Outcome
+    reason: str
+    """Why robosuite's is no success; empty for a success."""
+    apart: float
+    """Largest distance of the two grip sites at equal times [m]."""
+    later: float
+    """How much later robosuite's episode was decided [s]."""
+
+    @property
+    def agrees(self) -> bool:
+        return self.ours == self.theirs
+
+
+def compare_all(
+    pools: Sequence[Pool],
+    workers: int,
+    progress: Callable[[int], None],
+    first: int | None = None,
+    search: tuple[str, ...] = (),
+) -> list[Comparison]:
+    """Compare every scenario of some pools, or the `first` so many of each; ordered by task and id.
+
+    Args:
+        progress: told how many scenarios have been compared.
+        search: folders of other packages with tasks, see `config.search_path`.
+
+    Raises:
+        ScengenError: a pool is damaged, or was made with another version of MuJoCo or robosuite.
+    """
+    found = []
+    for comparison in each(partial(compare, search=search), _rows(pools, first), workers):
+        found.append(comparison)
+        progress(len(found))
+    return sorted(found, key=lambda comparison: (comparison.task, comparison.id))
+
+
+def compare(row: Row, search: tuple[str, ...] = ()) -> Comparison:
+    """Play one witness here and in robosuite."""
+    logging.getLogger("robosuite_logs").setLevel(logging.ERROR)  # it tells of every controller that it loads
+    env = environment(row["task"], search)(
+        scenario=row,
+        use_object_obs=False,
+        use_camera_obs=False,
+        has_offscreen_renderer=False,
+        hard_reset=False,
+        ignore_done=True,
+    )
+    settle = settling_time(row) or 0.0
+    world = _Traced.load(row["scene_xml"], row["embodiment"])
+    ours = replay(env.scenario, world, row["witness"], row["horizon"], settle)
+    theirs, reason, seconds, path = _played(env, row["witness"], settle)
+    env.close()
+    together = min(len(path), len(world.path))
+    apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=1)
+    return Comparison(
+        row["task"], row["id"], ours.outcome, theirs, reason, float(apart.max()), round(seconds - ours.seconds, 6)
+    )
+
+
+@dataclass
+class _Traced(World):
+    """A world that remembers where its hand was."""
+
+    path: list[Vec3] = field(default_factory=list)
+
+    def follow(self, filtered: NDArray[np.float32]) -> None:
+        super().follow(filtered)
+        self.path.append(self.hand)
+
+
+def _played(env: ScenarioEnv, tape: Tape, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
+    """Outcome of a tape in robosuite, its reason, when it was decided [s], and the path of the hand.
+
+    As in `rollout.replay`: the robot is idle when the tape has ended, and the goal must hold for `settle` seconds.
+    """
+    rows, path = iter(tape), list[Vec3]()
+
+    def step() -> None:
+        row = next(rows, None)
+        env.step(idle(env.world) if row is None else row)
+        path.append(env.world.hand)
+
+    env.reset()
+    while env.outcome is None:
+        step()
+    reached = env.world.time
+    if env.outcome == "success":
+        for _ in range(round(settle / Loop.PERIOD)):
+            step()
+    if env.outcome == "success" and not env.scenario.success(env.world):
+        return "timeout", f"the goal was reached but did not hold for {settle:g} s", reached, path
+    return env.outcome, env.reason, reached, path
+
+
+def _rows(pools: Sequence[Pool], first: int | None) -> Iterator[Row]:
+    for pool in pools:
+        yield from islice(pool.check().rows(), first)

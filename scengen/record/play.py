@@ -1,0 +1,81 @@
+"""A witness lived through again, row by row."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..envs.observations import PROPRIOCEPTION, Stream
+from ..pool import Row
+from ..render import Picture
+from ..scenario import Scenario
+from ..sim.world import World
+from ..validate.moves import idle
+from ..validate.rollout import Judge, Tape
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One row: what is seen, then what is done until the next row."""
+
+    streams: Mapping[str, NDArray[np.float32]]
+    pictures: Mapping[str, Picture]
+    tape: Tape
+    """What the controller received in the control periods of the row, shape (periods, 7)."""
+    success: bool
+    """Whether the goal was reached in them."""
+    done: bool
+    """Whether the episode was over then."""
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The columns of the row: the paper's streams, the tape, and what LeRobot looks for."""
+        return {
+            **self.streams,
+            "observation.state": np.concatenate([self.streams[n] for n in PROPRIOCEPTION if n in self.streams]),
+            "action": self.action,
+            "tape": self.tape,
+            "reward": np.float32(self.success),
+            "next.reward": np.float32(self.success),
+            "next.done": self.done,
+            "next.success": self.success,
+        }
+
+    @property
+    def action(self) -> NDArray[np.float32]:
+        """The one action that, held for the whole row, asks for the same motion: the mean; the gripper's last command."""
+        return np.append(self.tape[:, :6].mean(axis=0), self.tape[-1, 6]).astype(np.float32)
+
+
+def play(
+    world: World,
+    scenario: Scenario,
+    row: Row,
+    every: int,
+    streams: Mapping[str, Stream],
+    pictures: Callable[[], dict[str, Picture]],
+) -> Iterator[Moment]:
+    """Play the witness of a pool's row until the episode is over, as the Gymnasium environment would.
+
+    After the last recorded action the robot is idle. The control periods of the last row are all lived through.
+
+    Args:
+        every: control periods in a row.
+        streams: what is read at the beginning of each row.
+        pictures: takes the pictures of that moment.
+    """
+    world.reset()
+    judge, verdict, actions = Judge(scenario, row["horizon"]), None, iter(row["witness"])
+    while verdict is None:
+        seen = {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
+        taken, tape = pictures(), []
+        for _ in range(every):
+            tape.append(next(actions, None))
+            if tape[-1] is None:
+                tape[-1] = idle(world).astype(np.float32)
+            scenario.script(world)
+            world.follow(tape[-1])
+            verdict = verdict or judge.look(world)
+        yield Moment(seen, taken, np.array(tape), verdict is not None and verdict[0] == "success", verdict is not None)

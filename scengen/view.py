@@ -1,0 +1,44 @@
+"""MuJoCo's passive viewer on a scenario of a pool."""
+
+import os
+import sys
+import time
+from itertools import chain, repeat
+
+import numpy as np
+
+from .errors import ScengenError
+from .film import Take
+from .pool import Row
+from .scenario import Scenario
+from .sim.loop import Loop
+from .validate.moves import idle
+
+
+class NoDisplay(ScengenError):
+    """There is no screen to open a window on."""
+
+
+def check_display() -> None:
+    """Raise `NoDisplay` where no window can be opened: trying it would end the process."""
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        raise NoDisplay("no display to open a window on; scengen film draws the same into a file")
+
+
+def view(row: Row, scenario: Scenario, replay: bool) -> None:
+    """Show a scenario in real time until the window is closed. After its witness, or without, the robot is idle."""
+    import mujoco.viewer
+
+    world = Take.witness(row, scenario).world()
+    tape = row["witness"] if replay else []
+    with mujoco.viewer.launch_passive(world.model, world.data, show_left_ui=False, show_right_ui=False) as window:
+        due = time.monotonic()
+        for action in chain(tape, repeat(None)):
+            if not window.is_running():
+                return
+            with window.lock():
+                scenario.script(world)
+                world.follow(idle(world).astype(np.float32) if action is None else action)
+            window.sync()
+            due += Loop.PERIOD
+            time.sleep(max(0.0, due - time.monotonic()))
