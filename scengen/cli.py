@@ -10,7 +10,24 @@ from .config import conf_dir
 from .errors import BadConfig, ScengenError, nearest
 from .sim import native
 
-VERBS = ("generate", "verify", "show", "film", "view", "export", "record", "tasks", "evaluate", "robosuite", "bench")
+VERBS = (
+    "generate",
+    "verify",
+    "show",
+    "film",
+    "view",
+    "export",
+    "record",
+    "tasks",
+    "evaluate",
+    "robosuite",
+    "plan",
+    "bias",
+    "compare",
+    "subset",
+    "shrink",
+    "bench",
+)
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from scengen import config
+from scengen.assets.scene import UP
 from scengen.robots import ik, panda
 from scengen.tasks.tool_retrieve import ARM, ToolRetrieve
 from scengen.validate.moves import facing_down, turn_between
@@ -88,7 +89,7 @@ def test_residual_and_turn_are_those_of_the_posture_that_is_returned_and_it_keep
 
 @pytest.mark.parametrize(("away", "reached"), [(ARM, True), (0.76, True), (0.80, False)])
 def test_a_hand_that_points_down_reaches_760_mm_and_not_800_mm(away, reached):
-    place = panda.BASE + [away, 0, -0.092]
+    place = panda.BASE + np.array([away, 0, -0.092])
     nearest = ik.reach(place, facing_down())
     assert (nearest.residual < 0.002 and nearest.turn < 0.02) == reached
 
@@ -105,14 +106,14 @@ def test_no_posture_leads_the_grip_site_or_the_gripper_beyond_its_bound(angles):
 
 def test_the_bounds_are_not_idle():
     """A stretched arm comes within 4 cm of what they allow."""
-    farthest = panda.SHOULDER + [2.0, 0.0, 0.0]
+    farthest = panda.SHOULDER + np.array([2.0, 0.0, 0.0])
     stretched = ik.reach(farthest)
     assert -0.04 < ik.shortfall(grip_site(stretched.angles)[0]) < 0
     assert ik.TOUCH - 0.04 < farthest_of_gripper(stretched.angles) < ik.TOUCH
 
 
 @given(direction=st.tuples(*[st.floats(-1, 1)] * 3), away=st.floats(0.0, 0.5))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_the_search_never_comes_nearer_than_the_bound(direction, away):
     assume(np.linalg.norm(direction) > 0.1)
     target = panda.SHOULDER + (panda.REACH + away) * np.array(direction) / np.linalg.norm(direction)
@@ -120,12 +121,12 @@ def test_the_search_never_comes_nearer_than_the_bound(direction, away):
     assert ik.reach(target).residual >= away
 
 
-@pytest.mark.parametrize("split", ["id", *config.task("tool_retrieve").axes])
+@pytest.mark.parametrize("split", ["id", "far_corner"])  # the others have the cubes of id
 def test_no_cube_that_is_drawn_can_be_touched_without_the_hook(split):
     """Two proofs that share nothing but the robot: the bound, and a search from eight postures."""
     for index in range(2):
         scenario = config.task("tool_retrieve").draw(split, 0, index).scenario
-        middle = scenario.spot + [0, 0, scenario.half]
+        middle = scenario.spot + scenario.half * UP
         assert scenario.out_of_touch > 0
         assert ik.reach(middle).residual > max(0.07, ik.shortfall(middle))
 
@@ -133,4 +134,4 @@ def test_no_cube_that_is_drawn_can_be_touched_without_the_hook(split):
 def test_a_cube_that_the_arm_can_grasp_is_refuted_for_that():
     scenario = ToolRetrieve(distance=0.75)
     assert scenario.infeasible().reason == "the arm may touch the cube without the hook"
-    assert ik.reach(scenario.spot + [0, 0, scenario.half], facing_down()).residual < 0.001
+    assert ik.reach(scenario.spot + scenario.half * UP, facing_down()).residual < 0.001

@@ -14,6 +14,7 @@ joined make an L. Two ways of cutting leave no rectangle over:
 Lengths are whole numbers or fractions in any unit: edges close and areas add up exactly, or `closes` says no.
 """
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -170,7 +171,7 @@ def _steps(outline: Sequence[tuple], marks: Sequence[Fraction]) -> Iterator[tupl
     for (xa, ya), (xb, yb) in zip(outline, [*outline[1:], outline[0]], strict=True):
         axis, (a, b) = (0, (xa, xb)) if ya == yb else (1, (ya, yb))
         stops = [m for m in marks if min(a, b) <= m <= max(a, b)]
-        for low, high in zip(stops, stops[1:], strict=False):
+        for low, high in itertools.pairwise(stops):
             start, end = ((low, ya), (high, ya)) if axis == 0 else ((xa, low), (xa, high))
             yield (start, end) if a < b else (end, start)
 

@@ -23,8 +23,11 @@ from .scene import PRIORITY, STIFF, show
 
 Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
 """Two ends of a straight stretch in the plane [m], shape (2,) each, and how far the box goes on beyond both [m]."""
-BEND_PARTS = 12
-"""Bars of a half circle: its outside then is off the circle by 1 / cos(7.5 deg) - 1 = 0.9 % of the radius."""
+BEND_PARTS = 16
+"""Bars of a half circle: its outside then overshoots the circle by at most 1 / cos(5.6 deg) - 1 = 0.5 % of the outer
+radius, 0.46 mm for the widest bend."""
+SHORTEST = 1e-6
+"""A barb shorter than this is none [m]: MuJoCo refuses boxes without extent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +111,7 @@ class JHook:
         start = self.length / 2
         straight = [(_point(-start, 0), _point(start, 0), 0.0)]
         back = self.side * 2 * self.radius
-        barb = [(_point(start, back), _point(start - self.barb, back), 0.0)] if self.barb > 0 else []
+        barb = [(_point(start, back), _point(start - self.barb, back), 0.0)] if self.barb > SHORTEST else []
         return straight + self._bend() + barb
 
     def _bend(self) -> list[Bar]:

@@ -14,7 +14,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class LPiece:
-    """A rectangle `width` by `height` without its upper right corner. The origin is the middle of that rectangle's foot.
+    """A rectangle `width` by `height` without its upper right corner. The origin is the middle of its foot.
 
         +--+            y
         |  |            |     The upright arm is `upright` wide,

@@ -49,10 +49,8 @@ def command(arguments: Arguments) -> int:
     take = Take.witness(row, scenario)
     if settings.plan != WITNESS:
         take, episode = shortcut(row, scenario, settings.plan)
-        told = "reaches the goal" if episode.solved else episode.reason
-        out.print(
-            f"{settings.plan}: {episode.outcome} after {episode.seconds:g} s: {told}", highlight=False, markup=False
-        )
+        told = f"{episode.outcome} after {episode.seconds:g} s{': ' if episode.reason else ''}{episode.reason}"
+        out.print(f"{settings.plan}: {told}", highlight=False, markup=False)
     target, size = Path(settings.to), (settings.width, settings.height)
     if target.suffix == ".png":
         write(target, encode(strip(take, settings.frames, *size, settings.eye), "png"))

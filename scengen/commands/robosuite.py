@@ -49,9 +49,9 @@ def command(arguments: Arguments) -> int:
         if not comparison.agrees:
             told = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
             err.print(f"DIFFERS {comparison.id} of {comparison.task}: {told}", style="red", highlight=False)
-    table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdict later by at most (s)")
+    table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdicts apart at most (s)")
     for task, those in tasks.items():
-        apart, later = max(c.apart for c in those), max((c.later for c in those), key=abs)
+        apart, later = max(c.apart for c in those), max(abs(c.later) for c in those)
         table.add_row(task, str(len(those)), str(sum(c.agrees for c in those)), f"{1000 * apart:.4f}", f"{later:.2f}")
     out.print(table)
     same = sum(comparison.agrees for comparison in found)

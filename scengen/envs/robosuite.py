@@ -10,7 +10,6 @@ the scene, the suction cup, the events of the scene, and the verdict, which is t
 import json
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -235,7 +234,6 @@ class ScenarioEnv(ManipulationEnv):
 del REGISTERED_ENVS[ScenarioEnv.__name__]  # only its subclasses have a task
 
 
-@cache
 def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
     """The environment of a task, which robosuite then knows under the task's name in CamelCase.
 
@@ -247,8 +245,11 @@ def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
         BadConfig: robosuite has another environment of that name.
     """
     name = "".join(part.capitalize() for part in task.split("_"))
-    if name in REGISTERED_ENVS:
+    known = REGISTERED_ENVS.get(name, ScenarioEnv)
+    if not issubclass(known, ScenarioEnv):
         raise BadConfig(f"task {task}: robosuite has an environment {name} of its own; rename the task")
+    if (known.NAME, known.SEARCH) == (task, search):
+        return known
     about = f"Scenarios of the task {task}; see {ScenarioEnv.__name__}."
     return type(name, (ScenarioEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
 

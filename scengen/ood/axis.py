@@ -72,8 +72,18 @@ class Axis:
         if not 1 <= level <= self.levels:
             has = f"has levels 1 to {self.levels}" if self.levels else "has none: give it `levels: N` in the task file"
             raise BadConfig(f"level {self.name}@{level}: the axis {has}")
-        dists = {n: self._on_the_way(level, known[n], d, training[n].support) for n, d in self.replace.items()}
+        dists = self.along(level / self.levels, training, known)
         return replace(self, name=f"{self.name}@{level}", replace=dists, levels=0)
+
+    def along(
+        self, fraction: float, training: Mapping[str, Dist], known: Mapping[str, Parameter]
+    ) -> dict[str, Fixed | Choice]:
+        """Where the axis' parameters are at a fraction of the way: 0 the edge of training, 1 the far end.
+
+        Raises:
+            BadConfig: a whole number would have to be a fraction.
+        """
+        return {n: self._on_the_way(fraction, known[n], d, training[n].support) for n, d in self.replace.items()}
 
     def _prove(self, parameter: Parameter, there: Dist, here: Dist) -> Proof:
         gap = distance(here.support, there.support, parameter.period)
@@ -109,19 +119,19 @@ class Axis:
                     f"they do not take back, or drop the axis (~task.axes.{self.name})"
                 )
 
-    def _on_the_way(self, level: int, parameter: Parameter, dist: Dist, training: Support) -> Dist:
+    def _on_the_way(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:
         whole = isinstance(dist, Integer)  # its values are separate, but lie on one way
         ways = (Interval(dist.low, dist.high),) if whole else dist.support
         listed = [Interval(v, v) for v in dist.options] if isinstance(dist, Choice) else ways
-        values = [self._value(level, parameter, way, training) for way in listed]
+        values = [self._value(fraction, parameter, way, training) for way in listed]
         return Fixed(values[0]) if len(set(values)) == 1 else Choice(tuple(values))
 
-    def _value(self, level: int, parameter: Parameter, way: Interval, training: Support) -> Value:
+    def _value(self, fraction: float, parameter: Parameter, way: Interval, training: Support) -> Value:
         period = parameter.period
         far = max(way.low, way.high, key=lambda v: abs(nearest(training, v, period) - v))
         edge = nearest(training, far, period)
         far = self.limits.get(parameter.name, far)
-        value = edge + level / self.levels * (far - edge)
+        value = edge + fraction * (far - edge)
         if period:
             while value < parameter.low:
                 value += period
@@ -131,7 +141,7 @@ class Axis:
             return value
         if abs(value - round(value)) > 1e-9:
             raise BadConfig(
-                f"axis {self.name}: level {level} of {self.levels} puts {parameter.name} at {value:g}, which must be a "
+                f"axis {self.name}: {fraction:.0%} of its way puts {parameter.name} at {value:g}, which must be a "
                 f"whole number; from {edge:g} to {far:g} there are {abs(far - edge):g} steps"
             )
         return round(value)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
 
-from ..envs.observations import CAMERAS, PROPRIOCEPTION, Stream, streams_of
+from ..envs.observations import CAMERAS, Stream, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName
 from ..film import periods_between
 from ..pool import Pool, Row
@@ -109,7 +109,7 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
     except OSError as error:
         raise BadConfig(f"{settings.unfinished} cannot be written: {error.strerror}") from None
     try:
-        size, features = (settings.width, settings.height), _features(settings, streams)
+        size, features = (settings.width, settings.height), _features(settings, robot)
         failed = []
         with DataSet(settings.unfinished, settings.fps, robot, features, settings.eyes, size) as data:
             for row in islice(chain.from_iterable(pool.rows() for pool in pools), count):
@@ -134,7 +134,7 @@ def _episode(data: DataSet, row: Row, scenario: Scenario, settings: Settings, st
         for name in settings.eyes:
             data.calibrate(name, calibration(world, CAMERAS[name], settings.width, settings.height), row["id"])
         for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
-            data.add(moment.values, moment.pictures)
+            data.add(moment.values(proprioception(row["embodiment"])), moment.pictures)
             success = moment.success
     about = {f"scengen/{name}": row[name] for name in ABOUT}
     data.end_episode(row["instruction"], {**about, "scengen/success": success})
@@ -150,10 +150,10 @@ def _camera(stack: ExitStack, world: World, settings: Settings) -> Callable[[], 
     return lambda: {name: camera.take(CAMERAS[name]) for name in settings.eyes}
 
 
-def _features(settings: Settings, streams: dict[str, Stream]) -> dict[str, Feature]:
+def _features(settings: Settings, robot: str) -> dict[str, Feature]:
     """The columns of `Moment.values`."""
-    seen = {name: Feature("float32", stream.shape) for name, stream in streams.items()}
-    state = sum(streams[name].shape[0] for name in streams if name in PROPRIOCEPTION)
+    seen = {name: Feature("float32", stream.shape) for name, stream in streams_of(robot).items()}
+    state = sum(seen[name].shape[0] for name in proprioception(robot))
     return {
         **seen,
         "observation.state": Feature("float32", (state,)),
@@ -175,7 +175,5 @@ def _robot(pools: list[Pool]) -> str:
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
     if len(robots) > 1:
-        raise BadConfig(
-            f"the pools are for {' and '.join(sorted(robots))}; a data set has one robot: record them apart"
-        )
+        raise BadConfig(f"pools for {' and '.join(sorted(robots))}; a data set has one robot: record them apart")
     return robots.pop()

@@ -279,7 +279,7 @@ def _place(what: str, file: int) -> dict[str, int]:
 
 
 def _task_table(tasks: Mapping[str, int]) -> pa.Table:
-    """Instructions and their numbers. pandas takes the former for the index, as LeRobot wants, if the schema says so."""
+    """Instructions and their numbers. LeRobot wants the former as pandas' index, and pandas asks the schema for it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
         for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

@@ -1,13 +1,13 @@
 """A witness lived through again, row by row."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.observations import PROPRIOCEPTION, Stream
+from ..envs.observations import Stream
 from ..pool import Row
 from ..render import Picture
 from ..scenario import Scenario
@@ -29,12 +29,15 @@ class Moment:
     done: bool
     """Whether the episode was over then."""
 
-    @property
-    def values(self) -> dict[str, Any]:
-        """The columns of the row: the paper's streams, the tape, and what LeRobot looks for."""
+    def values(self, state: Sequence[str]) -> dict[str, Any]:
+        """The columns of the row: the paper's streams, the tape, and what LeRobot looks for.
+
+        Args:
+            state: names of the streams that make up `observation.state`.
+        """
         return {
             **self.streams,
-            "observation.state": np.concatenate([self.streams[n] for n in PROPRIOCEPTION if n in self.streams]),
+            "observation.state": np.concatenate([self.streams[name] for name in state]),
             "action": self.action,
             "tape": self.tape,
             "reward": np.float32(self.success),
@@ -45,7 +48,7 @@ class Moment:
 
     @property
     def action(self) -> NDArray[np.float32]:
-        """The one action that, held for the whole row, asks for the same motion: the mean; the gripper's last command."""
+        """The one action that, held for the whole row, asks for the same motion: the mean, and the last grip."""
         return np.append(self.tape[:, :6].mean(axis=0), self.tape[-1, 6]).astype(np.float32)
 
 

@@ -2,14 +2,14 @@
 
 A design answers with a number in (0, 1) for each parameter of each index. Whichever it is, index 731 can be made alone,
 an axis moves what it names and nothing else, and another parameter or worker moves no number. A later try at an index,
-after an infeasible one, is always independent of the first: a better place of its own in the design it has not.
+after an infeasible one, is independent of the first in every design: only first tries have a place in it.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +23,6 @@ TRIES = 100
 """Draws of one index before the distribution is called infeasible."""
 
 
-class Design(Protocol):
-    """A source of numbers."""
-
-    tries: ClassVar[int]
-    """Draws of one index before it is called infeasible."""
-
-    @property
-    def size(self) -> int | None:
-        """How many indices there are; None if there is no end."""
-        ...
-
-    def number(self, name: str, seed: int, index: int, attempt: int) -> float:
-        """The number in (0, 1) for parameter `name` in try `attempt` at scenario `index`."""
-        ...
-
-
 @dataclass(frozen=True)
 class Independent:
     """Every number by itself: the design that a statement about a whole distribution needs."""
@@ -46,9 +30,12 @@ class Independent:
     key: str
     """Name of the task."""
     tries: ClassVar[int] = TRIES
+    """Draws of one index before it is called infeasible."""
     size: ClassVar[None] = None
+    """How many indices there are; None if there is no end."""
 
     def number(self, name: str, seed: int, index: int, attempt: int) -> float:
+        """The number in (0, 1) for parameter `name` in try `attempt` at scenario `index`."""
         return unit(self.key, name, seed, index, attempt)
 
 
@@ -122,6 +109,9 @@ class Grid:
                 break
             place //= count
         return (place % self.sizes[name] + 0.5) / self.sizes[name]
+
+
+Design = Independent | Sobol | Latin | Grid
 
 
 SPELLED = "iid, sobol, lhs:STRATA (such as lhs:50), grid:VALUES (such as grid:3)"

@@ -10,13 +10,14 @@
     +----------+
 
 Bottleneck: no piece has a place of its own in sight; positions and quarter turns of all pieces depend on each other,
-and any that is wrong leaves a piece lying on the others. Suction grips from above alone, so no piece can be turned over.
+and any that is wrong leaves a piece lying on the others. Suction grips from above alone: no piece can be turned over.
 
 Decisions, where the paper (App. B, T33) says no more than "L-shaped pieces", "bin" and "zero gaps":
 
 * Zero gaps means: all pieces lie flat on the bin's floor. They cannot overlap there, so that the uncovered area is the
   floor's minus theirs; what remains is the clearance around each piece, of about a millimetre, which a real joint
-  needs. Any arrangement that does this counts, not the planned one alone.
+  needs. Nothing else can lie between them: a gap would be at least a unit wide, and there is no area left for one. Any
+  arrangement that does this counts, not the planned one alone; `solutions` says how many there are.
 * Cuts fall on a grid. Lengths of strips between cuts are the parameters, so that every combination closes exactly.
 * The bin is fixed to the table and lower than the pieces, so that the cup never meets a wall.
 * Table 3 of the paper (line 512) lists the task under "jaw"; its description says suction, and a jaw could not let go
@@ -56,12 +57,21 @@ APART = 0.008
 """Least distance of two things on the table at the start [m]: a cup may be a little off, a piece a little turned."""
 TRANSIT = 0.05
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
+RIM = 0.6
+"""Depth of the bin by the thickness of the pieces."""
+AIM = 0.5
+"""Error with which a piece hangs over its slot before it is lowered, by the clearance: half of the room is left."""
+LOWERING = 60.0
+"""Speed at which it is lowered, by the clearance [1/s]: 60 mm/s at 1 mm. The hand wavers more the faster it moves."""
 CAUGHT = math.radians(0.7)
-SP = 60
+"""A piece that tilts this far while it is lowered stands on an edge [rad]; held by the cup alone it tilts 0.3 deg."""
 CALM = 0.01
+"""Speed below which a piece over its slot no longer swings [m/s]."""
 FIRMLY = 0.15
-W = 0.5
+"""How long the cup must hold on before a piece is lifted [s]."""
 PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
+"""Carrying slows down at `PACE` [1/s] by the distance left; shares of the errors in place and turn that are asked for,
+near the 2.5 from which on the hand rings: the friction of the joints holds the last millimetre back."""
 NEAR, INTEGRAL, LEVER = 0.003, 1.5, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
@@ -135,7 +145,8 @@ class Packing(Scenario):
 
     @cached_property
     def bin(self) -> Bin:
-        return Bin(width=self.unit * float(self.footprint.width), height=self.unit * float(self.footprint.height))
+        width, height = (self.unit * float(side) for side in (self.footprint.width, self.footprint.height))
+        return Bin(width=width, height=height, depth=RIM * self.thickness)
 
     @cached_property
     def pieces(self) -> tuple[LPiece, ...]:
@@ -180,9 +191,9 @@ class Packing(Scenario):
         return np.array([spot.x, spot.y, TABLE_TOP]), self.goal(i)[1] - math.radians(spot.turn)
 
     def infeasible(self) -> Refutation | None:
-        areas = sum(slot.area for slot in self.slots), self.footprint.area
-        if areas[0] != areas[1]:
-            return Refutation("areas do not match", {"pieces": float(areas[0]), "bin": float(areas[1])})
+        if not guillotine.closes(self.slots, self.footprint):
+            areas = {"pieces": float(sum(slot.area for slot in self.slots)), "bin": float(self.footprint.area)}
+            return Refutation("the pieces do not close the bin's footprint", areas)
         narrow = min(min(piece.upright, piece.lying) for piece in self.pieces)
         if narrow < 2 * REACHES:
             return Refutation("an arm is too narrow for the cup", {"arm": narrow, "cup": 2 * REACHES})
@@ -280,22 +291,28 @@ class Packing(Scenario):
         for i in range(self.count):
             yield from self.pack(world, i, *self.goal(i))
 
-    def pack(self, world: World, i: int, pos: Vec3, yaw: float, lies: Callable[[], bool] | None = None) -> Plan:
-        """Bring piece `i` to a position [m] and yaw [rad] in the bin, and let go once it lies there."""
+    def pack(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
+        """Bring piece `i` to a position [m] and yaw [rad] in the bin, and let go once it lies there.
+
+        A piece that stands on an edge is lifted and lowered again.
+        """
         name = f"piece_{i}"
         yield from self.lift(world, i, yaw)
-        over = pos + (self.thickness + 0.006) * UP
-        yield from carry(world, name, np.array([pos[0], pos[1], TABLE_TOP + TRANSIT]), yaw, within=0.02)
-        lies = lies or (lambda: self.lies(world, i))
-        while not lies():
-            yield from carry(world, name, over, yaw, within=W * self.clearance)
-            caught = lambda: lies() or world.tilt(name) > CAUGHT
-            yield from carry(world, name, pos - 0.002 * UP, yaw, speed=SP * self.clearance, until=caught)
-        yield from release(world, seconds=0.1)
-        yield from go_to(world, world.hand + 0.04 * UP, within=0.01)
+        yield from carry(world, name, _above(pos), yaw, within=0.02)
+        while not self.lies(world, i):
+            yield from carry(world, name, pos + (self.thickness + 0.006) * UP, yaw, within=AIM * self.clearance)
+            yield from carry(
+                world,
+                name,
+                pos - 0.002 * UP,
+                yaw,
+                speed=LOWERING * self.clearance,
+                until=lambda: self.lies(world, i) or world.tilt(name) > CAUGHT,
+            )
+        yield from let_go(world)
 
     def lift(self, world: World, i: int, yaw: float) -> Plan:
-        """Take piece `i` up by suction, the wrist turned so that half of the way to `yaw` [rad] is left on each side."""
+        """Take piece `i` up by suction, the wrist turned away by half of the turn that will bring it to `yaw` [rad]."""
         name = f"piece_{i}"
         turn = float(turn_between(world.frame(name), _upright(yaw))[2])
         spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), _yaw_of(world.frame(name)))
@@ -327,8 +344,15 @@ class Packing(Scenario):
 
     def drop(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
         """Lower piece `i` at a position [m] and yaw [rad] until it meets anything, and let go."""
-        others = ["bin", *(f"piece_{k}" for k in range(self.count) if k != i)]
-        yield from self.pack(world, i, pos, yaw, lies=lambda: any(world.touching(f"piece_{i}", o) for o in others))
+        name, others = f"piece_{i}", ["bin", *(f"piece_{k}" for k in range(self.count) if k != i)]
+
+        def met() -> bool:
+            return any(world.touching(name, other) for other in others)
+
+        yield from self.lift(world, i, yaw)
+        yield from carry(world, name, _above(pos), yaw, within=0.005, until=met)
+        yield from carry(world, name, pos, yaw, speed=0.06, until=met)
+        yield from let_go(world)
 
     def _all_but_one(self, world: World) -> Plan:
         """The packing without its last piece."""
@@ -351,6 +375,12 @@ def suck(world: World, spot: Vec3, frame: Mat3, speed: float = 0.08, give_up: fl
         yield firm(world, setpoint, -speed * UP * (not world.sealed), turn_between(world.hand_frame, frame))
 
 
+def let_go(world: World) -> Plan:
+    """Suction off, and straight up."""
+    yield from release(world, seconds=0.1)
+    yield from go_to(world, world.hand + 0.04 * UP, within=0.01)
+
+
 def firm(world: World, setpoint: Vec3, velocity: Vec3, turn: Vec3) -> Action:
     """As `steer` with suction on, but stiffer: for the last millimetres of slow moves, where friction holds back."""
     return steer(world, world.hand + FIRM * (setpoint - world.hand), velocity, FIRM_TURN * turn, CLOSED)
@@ -362,15 +392,15 @@ def carry(
     target: Vec3,
     yaw: float,
     speed: float = 0.25,
-    within: float = 0.003,
-    until: Callable[[], bool] | None = None,
+    within: float = 0.0,
+    until: Callable[[], bool] = lambda: False,
     give_up: float = 5.0,
 ) -> Plan:
     """Bring a body that hangs on the hand to `target` [m], upright and turned to `yaw` [rad], looking at the body.
 
     The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
-    against the weight and the friction of the joints. Ends when every point near the body is `within` [m] of its place,
-    or when `until` says so.
+    against the weight and the friction of the joints. Ends when every point of the body is `within` [m] of its place
+    and the body is calm, or when `until` says so.
 
     Raises:
         GaveUp: that took longer than `give_up` [s].
@@ -378,10 +408,10 @@ def carry(
     end, goal, frame, setpoint = world.time + give_up, np.asarray(target, float), _upright(yaw), world.hand
     turned = frame @ world.frame(body).T
     aim, aim_frame = goal + turned @ (world.hand - world.pos(body)), turned @ world.hand_frame
-    while not (until and until()):
+    while not until():
         left, askew = goal - world.pos(body), turn_between(world.frame(body), frame)
         error, angle, pace = (math.sqrt(v @ v) for v in (left, askew, world.velocity(body)[3:]))
-        if until is None and error < within and angle * LEVER < within and pace < CALM:
+        if error < within and angle * LEVER < within and pace < CALM:
             return
         if world.time > end:
             raise GaveUp(f"{body} stayed {1000 * error:.1f} mm and {math.degrees(angle):.1f} deg off for {give_up:g} s")
@@ -392,6 +422,11 @@ def carry(
         velocity = ahead * (min(speed, PACE * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
         yield firm(world, setpoint, velocity, turn_between(world.hand_frame, aim_frame))
+
+
+def _above(pos: Vec3) -> Vec3:
+    """The place at which a piece is carried over `pos` [m]."""
+    return np.array([pos[0], pos[1], TABLE_TOP + TRANSIT])
 
 
 def _upright(yaw: float) -> Mat3:
@@ -413,9 +448,10 @@ def _turned(point: tuple[float, float], yaw: float) -> Vec3:
 
 def _corners(box: Box, x: float, y: float, yaw: float) -> Corners:
     """Corners of a box of a body that stands at (x, y), shape (4, 2)."""
-    signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    signs = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
     c, s = math.cos(yaw), math.sin(yaw)
-    return (np.array(box[:2]) + signs * np.array(box[2:])) @ np.array([[c, s], [-s, c]]) + np.array([x, y])
+    turn = np.array([[c, s], [-s, c]])
+    return np.asarray((box[:2] + signs * box[2:]) @ turn + (x, y), float)
 
 
 def _distance(one: Corners, other: Corners) -> float:

@@ -54,8 +54,9 @@ HAND_AT = 0.65
 """How far out the hand is when the tip is behind the cube, if the handle is long enough [m]."""
 DRAWN_TO = 0.60
 """Where the cube is drawn to, if the handle is short enough: its distance from the robot's first axis [m]."""
-NEAREST_HAND = 0.39
-"""How near to the robot's first axis the hand draws [m]: at 0.36 joint 6 of a hand that points down is at its limit."""
+NEAREST_HAND = 0.41
+"""How near to the robot's first axis the hand draws [m]: at 0.36 joint 6 of a hand that points down is at its limit,
+and a hook that has slipped in the jaw asks for more."""
 GRASP_FROM_END = 0.035
 """Least distance from the handle's end to where it is held [m]: the pads are 16 mm wide."""
 GRASP_HEIGHT = 0.014

@@ -1,0 +1,94 @@
+"""how far pools are from training and from each other, and what leaks from one to the other"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..config import read, typed
+from ..errors import BadConfig
+from ..ood.coverage import evenness
+from ..ood.distance import CLOSE, energy, near_duplicates, per_parameter
+from ..ood.redraw import proposed, scenarios_of, task_of
+from ..ood.space import of_features
+from ..ood.tables import pairs_table
+from ..pool import Pool
+from ..samplers.task import Task
+from ..scenario import Scenario
+from . import FAILED, OK, Arguments, out, several, write_json
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen compare`; meanings stand in conf/compare.yaml."""
+
+    pool: str | list[str] = ""
+    within: float = CLOSE
+    permutations: int = 999
+    json: str | None = None
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("compare", arguments).settings)
+    pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+    task, names = task_of(pools[0]), {task_of(pool).name for pool in pools}
+    if len(names) > 1:
+        raise BadConfig(f"pool = {','.join(several(settings.pool))}; these are pools of {', '.join(sorted(names))}")
+    if settings.within <= 0 or settings.permutations < 1:
+        raise BadConfig(f"within = {settings.within:g}, permutations = {settings.permutations}; both must be positive")
+    first, *others = ((pool, scenarios_of(task, pool)) for pool in pools)
+    result = [_alone(task, *first, settings)]
+    for pool, scenarios in others:
+        result += [_alone(task, pool, scenarios, settings), _pair(task, first, (pool, scenarios), settings)]
+    if settings.json:
+        write_json(settings.json, result)
+    return FAILED if any(r["near_duplicates"] for r in result) else OK
+
+
+def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: Settings) -> dict[str, Any]:
+    """How far one pool is from training, how even it is, and whether it repeats itself."""
+    away = per_parameter(task, list(scenarios.values()))
+    told = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
+    out.print(f"{pool.folder}: {len(scenarios)} scenarios", highlight=False)
+    out.print(f"  outside training by [training widths]: {told or 'nothing'}", highlight=False)
+    even = None
+    if "subset" not in pool.manifest and scenarios:
+        certified = [list(p.numbers.values()) for p in proposed(pool) if p.certified]
+        if certified[0]:
+            even = evenness(np.array(certified))
+            out.print(f"  discrepancy: {even.relative:.2f} times that of as many independent draws", highlight=False)
+    pairs = near_duplicates(task, scenarios, within=settings.within)
+    if pairs:
+        out.print(pairs_table(pairs, "in the pool", "again"))
+    return {
+        "pool": str(pool.folder),
+        "outside": {name: {"least": least, "mean": mean} for name, (least, mean) in away.items()},
+        "evenness": asdict(even) if even else None,
+        "near_duplicates": [asdict(p) for p in pairs],
+    }
+
+
+Side = tuple[Pool, Mapping[str, Scenario]]
+
+
+def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, Any]:
+    """How far a pool is from the first one, and what they share."""
+    (pool, here), (beside, there) = one, other
+    space = of_features(task, list(here.values()), list(there.values()))
+    apart = energy(space.points(here.values()), space.points(there.values()), settings.permutations)
+    out.print(
+        f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
+        f"[training ranges], p = {apart.pvalue:.3f}",
+        highlight=False,
+    )
+    pairs = near_duplicates(task, here, there, settings.within)
+    if pairs:
+        out.print(pairs_table(pairs, str(pool.folder), str(beside.folder)))
+    out.print(f"  shared but for {settings.within:g} training widths: {len(pairs)} pairs", highlight=False)
+    return {
+        "pools": [str(pool.folder), str(beside.folder)],
+        "over": space.names,
+        "energy": asdict(apart),
+        "near_duplicates": [asdict(p) for p in pairs],
+    }

@@ -1,0 +1,40 @@
+"""choose the scenarios of a pool that cover most of it, as a pool of their own"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..config import read, typed
+from ..errors import BadConfig, PoolError
+from ..ood.coverage import farthest_points
+from ..ood.redraw import scenarios_of, task_of
+from ..ood.space import of_parameters
+from ..pool import MANIFEST, Pool, write
+from . import OK, Arguments, one, out
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen subset`; meanings stand in conf/subset.yaml."""
+
+    pool: str | list[str] = ""
+    n: int = 20
+    to: str = ""
+
+
+def command(arguments: Arguments) -> int:
+    settings = typed("", Settings, read("subset", arguments).settings)
+    pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
+    if not 1 <= settings.n <= len(pool):
+        raise BadConfig(f"n = {settings.n}; it must lie in [1, {len(pool)}], the size of {pool.folder}")
+    if (target / MANIFEST).exists():
+        raise PoolError(f"{target} holds a pool already; choose another to=")
+    task = task_of(pool)
+    scenarios = scenarios_of(task, pool)
+    space = of_parameters(task, list(scenarios.values()))
+    chosen = {list(scenarios)[i] for i in farthest_points(space.points(scenarios.values()), settings.n)}
+    kept = {k: v for k, v in pool.manifest.items() if k not in ("format", "shards", "rejected")}
+    manifest = {**kept, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
+    subset = write(target, manifest, (row for row in pool.rows() if row["id"] in chosen))
+    out.print(f"wrote {settings.n} of {len(pool)} scenarios to {target}", highlight=False)
+    out.print(f"pool sha256: {subset.sha256}", highlight=False)
+    return OK

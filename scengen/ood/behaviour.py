@@ -1,0 +1,114 @@
+"""What a shift does to behaviour: tapes that solve training scenarios are played in their OOD twins."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache, partial
+
+from ..errors import Infeasible
+from ..parallel import each
+from ..samplers.task import ID, Task
+from ..scenario import Scenario
+from ..sim import scene_text
+from ..sim.world import World
+from ..statistics import wilson
+from ..validate.rollout import Episode, Tape, replay, run
+
+EXTRAPOLATION = "true extrapolation"
+COSMETIC = "cosmetic"
+UNKNOWN = "unknown or refuted"
+BUG = "oracle bug"
+KINDS: dict[tuple[bool, bool], str] = {
+    (False, True): EXTRAPOLATION,
+    (True, True): COSMETIC,
+    (False, False): UNKNOWN,
+    (True, False): BUG,
+}
+"""What it means whether (the tape of the ID twin, the oracle) solves an OOD scenario."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One OOD scenario, tried twice."""
+
+    index: int
+    tape: bool
+    """Whether the actions that solve its ID twin solve it."""
+    oracle: bool
+    """Whether its oracle solves it; False too if the scenario is infeasible."""
+    reason: str
+    """Why the tape failed; or why there is no scenario."""
+
+    @property
+    def kind(self) -> str:
+        """One of the values of `KINDS`."""
+        return KINDS[self.tape, self.oracle]
+
+
+@dataclass(frozen=True)
+class Share:
+    """How often one kind occurred, with Wilson's 95 % interval of its share."""
+
+    kind: str
+    count: int
+    value: float
+    low: float
+    high: float
+
+
+def try_twins(
+    task: Task, split: str, seed: int, indices: Iterable[int], workers: int, progress: Callable[[int], None]
+) -> list[Trial]:
+    """Draw scenarios of a split, play their ID twins' tapes and their own oracles.
+
+    Twins that their own oracle cannot solve have no tape and are left out.
+
+    Args:
+        progress: told how many twins are done.
+    """
+    trials: list[Trial] = []
+    for done, trial in enumerate(each(partial(_try_twin, task, split, seed), indices, workers), 1):
+        trials += [trial] if trial else []
+        progress(done)
+    return trials
+
+
+def shares(trials: Iterable[Trial]) -> list[Share]:
+    """How often each kind occurred, in the order of `KINDS`."""
+    kinds = [trial.kind for trial in trials]
+    n = len(kinds)
+    counts = {kind: kinds.count(kind) for kind in KINDS.values()}
+    return [Share(kind, k, k / n, *wilson(k / n, n)) for kind, k in counts.items()] if n else []
+
+
+def attempt(task: Task, tape: Tape, scenario: Scenario) -> tuple[bool, bool, str]:
+    """Whether a tape and whether the oracle solve a scenario, and why the tape does not."""
+    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    played = replay(scenario, world, tape, task.horizon, until_settled=True)
+    return played.solved, _solution(scenario, world, task.horizon).solved, played.reason
+
+
+def twin_tape(task: Task, seed: int, index: int) -> Tape | None:
+    """Actions with which the oracle solves a training scenario, or None."""
+    return _tape(task.draw(ID, seed, index).scenario, task.horizon, task.embodiment)
+
+
+@cache
+def _tape(scenario: Scenario, horizon: float, embodiment: str) -> Tape | None:
+    world = World.load(scene_text.emit(scenario.build())[0], embodiment)
+    episode = _solution(scenario, world, horizon)
+    return episode.tape if episode.solved else None
+
+
+def _solution(scenario: Scenario, world: World, horizon: float) -> Episode:
+    return run(scenario, world, scenario.oracle, horizon, until_settled=True)  # type: ignore[attr-defined]
+
+
+def _try_twin(task: Task, split: str, seed: int, index: int) -> Trial | None:
+    tape = twin_tape(task, seed, index)
+    if tape is None:
+        return None
+    try:
+        scenario = task.draw(split, seed, index).scenario
+    except Infeasible as error:
+        return Trial(index, False, False, str(error))
+    return Trial(index, *attempt(task, tape, scenario))

@@ -1,0 +1,195 @@
+"""How far along an axis memorised tapes live, and how far the oracle: a search in the axis' own direction.
+
+A place on the way is a fraction: 0 is the edge of training, 1 the axis' far end, and beyond 1 the way goes on to the
+bounds of the parameters. Twin i is scenario i of training with the axis' parameters put at that place.
+
+The chance of success is taken to fall along the way as a logistic curve, 1 / (1 + exp((x - middle) / spread)); what
+is known of middle and spread is kept as a posterior on a grid. Looking at the median of the middle is bisection that
+bears noise; after some rounds of it the search looks where success is between 30 and 70 percent.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BadConfig, OutOfBounds
+from ..log import Log
+from ..params import Value, with_values
+from ..samplers.dists import Choice, Fixed
+from ..samplers.keyed import unit
+from ..samplers.task import ID, Task
+from .axis import Axis
+from .behaviour import attempt, twin_tape
+
+TAPE, ORACLE = "tape", "oracle"
+BATCH = 4
+"""Twins that are tried at one place before the search moves on; a round."""
+BISECTIONS = 4
+"""Rounds at the most likely middle, for each of tape and oracle, before the band is sampled."""
+BAND = 0.7
+"""The band of interest: chances of success from 1 - BAND to BAND."""
+FARTHEST, STEP = 10.0, 0.02
+"""A way ends at the bounds of its parameters, found in these steps, and at the latest after ten times its length."""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Where success falls to one half."""
+
+    who: str
+    """`tape`: actions that solved the ID twin; `oracle`: the task's own solution."""
+    middle: float
+    """The place on the way, as a fraction: posterior median."""
+    low: float
+    high: float
+    """95 % credible interval."""
+    end: float
+    """How far the way goes."""
+    values: Mapping[str, Value]
+    """The axis' parameters at the middle; empty if it lies off the way or a parameter takes several values there."""
+    trials: int
+
+    @property
+    def verdict(self) -> str:
+        """What the boundary means, in words."""
+        if self.middle >= self.end:
+            return "alive at the end of the way"
+        return "dead at the edge of training" if self.middle <= 0 else "dies on the way"
+
+
+def search(
+    task: Task,
+    axis: str,
+    folder: Path,
+    seed: int = 0,
+    rounds: int = 16,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Boundary]:
+    """Find both boundaries of an axis, continuing what stands in `folder`.
+
+    Args:
+        rounds: how many places are looked at, with 4 twins each.
+        progress: told how many trials are done, and how many there are to be.
+
+    Raises:
+        BadConfig: the axis has no way, only separate values.
+    """
+    way = Way(task, task.axes[axis])
+    identity = {"task": task.name, "axis": axis, "seed": seed, "way": way.spelled}
+    with Log(folder / "boundary.jsonl", identity) as log:
+        for number in range(rounds):
+            place = _next(number, log.records[: number * BATCH], way.end)
+            for index in range(len(log.records), (number + 1) * BATCH):
+                log.add(_try(way, seed, place, index))
+                progress(index + 1, rounds * BATCH)
+        trials = log.records[: rounds * BATCH]
+    return {who: _boundary(who, trials, way) for who in (TAPE, ORACLE)}
+
+
+class Way:
+    """The line that an axis moves its parameters along."""
+
+    def __init__(self, task: Task, axis: Axis):
+        self.task, self.axis = task, axis
+        separate = [n for n in axis.replace if task.known[n].integer]
+        if separate:
+            raise BadConfig(
+                f"axis {axis.name} of {task.name} moves {', '.join(separate)}, which takes separate values: "
+                "there is no way along which to look for a boundary"
+            )
+        self.end = self._end()
+
+    @property
+    def spelled(self) -> str:
+        """What the way depends on, in words."""
+        return str({n: (self.task.training[n].support, d.support) for n, d in self.axis.replace.items()})
+
+    def values(self, place: float, seed: int, index: int) -> dict[str, Value]:
+        """The axis' parameters of one twin at one place; a keyed one where there are several."""
+        return {
+            name: dist.quantile(unit(self.task.name, name, seed, index, 0)) for name, dist in self._at(place).items()
+        }
+
+    def single(self, place: float) -> dict[str, Value]:
+        """The axis' parameters at one place, where each takes one value."""
+        return {name: dist.value for name, dist in self._at(place).items() if isinstance(dist, Fixed)}
+
+    def _at(self, place: float) -> Mapping[str, Fixed | Choice]:
+        return self.axis.along(place, self.task.training, self.task.known)
+
+    def _end(self) -> float:
+        """The largest fraction whose values lie in the bounds of their parameters."""
+        places = np.arange(1.0, FARTHEST + STEP, STEP)
+        outside = [i for i, place in enumerate(places) if not self._inside(float(place))]
+        return float(places[outside[0] - 1 if outside else -1])
+
+    def _inside(self, place: float) -> bool:
+        try:
+            for name, dist in self._at(place).items():
+                for interval in dist.support:
+                    self.task.known[name].check(name, interval.low)
+        except OutOfBounds:
+            return False
+        return True
+
+
+def _try(way: Way, seed: int, place: float, index: int) -> dict[str, Any]:
+    """One twin at one place; None for a twin whose own oracle fails, and so says nothing about the axis."""
+    task = way.task
+    scenario = task.draw(ID, seed, index).scenario
+    tape = twin_tape(task, seed, index)
+    found: tuple[bool | None, bool | None] = (None, None)
+    if tape is not None:
+        moved = with_values(scenario, way.values(place, seed, index))
+        found = (False, False) if moved.infeasible() else attempt(task, tape, moved)[:2]
+    return {"index": index, "place": place, TAPE: found[0], ORACLE: found[1]}
+
+
+def _next(number: int, trials: list[dict[str, Any]], end: float) -> float:
+    """Where to look in round `number`, given all earlier trials."""
+    if number < 2:
+        return (end, 0.0)[number]
+    who = (TAPE, ORACLE)[number % 2]
+    middle, spread = _Posterior(trials, who, end).centre
+    if number >= 2 + 2 * BISECTIONS:
+        logit = math.log(BAND / (1 - BAND))
+        middle += spread * logit * (2 * unit("band", number) - 1)
+    return round(min(max(middle, 0.0), end), 6)
+
+
+def _boundary(who: str, trials: list[dict[str, Any]], way: Way) -> Boundary:
+    low, middle, high = _Posterior(trials, who, way.end).quantiles
+    values = way.single(middle) if 0 < middle < way.end else {}
+    return Boundary(who, middle, low, high, way.end, values, sum(t[who] is not None for t in trials))
+
+
+class _Posterior:
+    """What trials say about middle and spread of the logistic curve; priors are flat, that of the spread in log."""
+
+    def __init__(self, trials: list[dict[str, Any]], who: str, end: float):
+        tried = [t for t in trials if t[who] is not None]
+        places = np.array([t["place"] for t in tried])
+        solved = np.array([t[who] for t in tried], bool)
+        self.middles = np.linspace(-0.5 * end, 1.5 * end, 401)
+        self.spreads = end * np.geomspace(0.005, 0.5, 25)
+        z = (places - self.middles[:, None, None]) / self.spreads[None, :, None]
+        chance = -np.logaddexp(0.0, np.where(solved, z, -z)).sum(axis=2)
+        weight = np.exp(chance - chance.max())
+        self.weight: NDArray[np.float64] = weight / weight.sum()
+
+    @property
+    def quantiles(self) -> tuple[float, float, float]:
+        """The middle: 2.5 %, 50 % and 97.5 %."""
+        total = self.weight.sum(axis=1).cumsum()
+        low, middle, high = np.interp([0.025, 0.5, 0.975], total, self.middles)
+        return float(low), float(middle), float(high)
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Median of the middle, mean of the spread."""
+        return self.quantiles[1], float((self.weight.sum(axis=0) * self.spreads).sum())

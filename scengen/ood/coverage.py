@@ -1,0 +1,57 @@
+"""How evenly a pool covers what it was drawn from, and how to choose the few that cover most."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+from scipy.stats import qmc
+
+from .space import Points
+
+
+@dataclass(frozen=True)
+class Evenness:
+    """Centred discrepancy of a pool's numbers in the unit cube."""
+
+    discrepancy: float
+    """Squared centred L2 discrepancy (Hickernell 1998), as `scipy.stats.qmc.discrepancy` gives it."""
+    independent: float
+    """What as many independent draws have on average."""
+
+    @property
+    def relative(self) -> float:
+        """Below 1: more even than independent draws. Far above: parts of the distribution are missing."""
+        return self.discrepancy / self.independent
+
+
+def evenness(numbers: Points) -> Evenness:
+    """How evenly numbers fill the unit cube.
+
+    For independent draws the expected value is ((5/4)^d - (13/12)^d) / n: all mixed terms of the discrepancy average to
+    (13/12)^d, the n^-2 diagonal ones to (5/4)^d.
+
+    Args:
+        numbers: shape (n, d), what the design gave for each parameter that varies.
+    """
+    n, d = numbers.shape
+    return Evenness(float(qmc.discrepancy(numbers, method="CD")), ((5 / 4) ** d - (13 / 12) ** d) / n)
+
+
+def farthest_points(points: Points, count: int) -> NDArray[np.int64]:
+    """Choose points so that the least distance between two of them is large, in the order in which they are chosen.
+
+    Greedy: begin in the middle, then always take the point that is farthest from all taken ones (Gonzalez 1985: at
+    least half the best possible distance). The first m of the n chosen are what would be chosen for m.
+
+    Args:
+        points: shape (n, d).
+        count: how many to choose, n at most.
+    """
+    chosen = [int(np.argmin(np.linalg.norm(points - np.median(points, axis=0), axis=1)))]
+    away = cdist(points, points[chosen])[:, 0]
+    while len(chosen) < count:
+        away[chosen] = -1.0  # equal points may all be chosen, but none twice
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, cdist(points, points[chosen[-1:]])[:, 0])
+    return np.array(chosen)

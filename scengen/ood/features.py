@@ -1,0 +1,122 @@
+"""Sampled proofs: what interval arithmetic cannot say, draws say with a bound."""
+
+from dataclasses import dataclass
+
+from scipy.stats import beta
+
+from ..errors import BadConfig, Infeasible
+from ..params import values
+from ..samplers.task import ID, Task
+from ..scenario import Scenario
+
+CONFIDENCE = 0.95
+DRAWS = 300
+"""Draws of a sampled proof: none of 300 inside training is at most 1 % inside, at 95 % confidence (rule of three)."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How far one feature of a split leaves what training shows of it."""
+
+    feature: str
+    training: tuple[float, float]
+    """Least and largest training draw."""
+    here: tuple[float, float]
+    """Least and largest draw of the split."""
+    draws: int
+    inside: int
+    """Draws of the split that lie between the two training ends."""
+    bound: float
+    """At most this share of the split lies there: one-sided Clopper-Pearson bound at 95 % confidence."""
+    beyond: float
+    """At most this share of training lies outside its two ends, at the same confidence (Wilks 1941)."""
+
+    @property
+    def kind(self) -> str:
+        """The kind of proof; an interval proof, as for parameters, needs no draws."""
+        return f"sampled, {self.draws} draws"
+
+    @property
+    def leaves(self) -> bool:
+        """Whether no draw of the split lies within training."""
+        return self.inside == 0
+
+    @property
+    def gap(self) -> float | None:
+        """Free space between the two ranges in widths of the training range; None if training is one value."""
+        free = max(0.0, self.here[0] - self.training[1], self.training[0] - self.here[1])
+        span = self.training[1] - self.training[0]
+        return free / span if span > 0 else None
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What draws say about a split."""
+
+    departures: tuple[Departure, ...]
+    """One for each feature that the family declares."""
+    strays: tuple[str, ...]
+    """Parameters that differ between twins although no axis names them. There are none, or the sampler is wrong."""
+    stuck: tuple[str, ...]
+    """Parameters that an axis names and that equal their twin's in some draw."""
+
+    @property
+    def same_physics(self) -> bool:
+        """Whether features are declared and not one of them leaves training: other numbers, the same problem."""
+        return bool(self.departures) and not any(d.leaves for d in self.departures)
+
+
+def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Evidence:
+    """Draw a split and its training twins, and compare.
+
+    Raises:
+        BadConfig: no index is feasible.
+    """
+    twins = _twins(task, split, draws, seed)
+    if not twins:
+        raise BadConfig(f"{task.name}/{split}: none of {draws} indices is feasible; widen the distributions")
+    moved = task.moves(split)
+    before, after = [values(t) for t, _ in twins], [values(s) for _, s in twins]
+    differ = [{n for n in a if a[n] != b[n]} for a, b in zip(before, after, strict=True)]
+    here = [dict(s.features()) for _, s in twins]
+    there = [dict(t.features()) for t, _ in twins]
+    return Evidence(
+        tuple(departure(name, [f[name] for f in there], [f[name] for f in here]) for name in here[0]),
+        tuple(sorted(set[str]().union(*differ) - moved.keys())),
+        tuple(sorted(n for n in moved if any(n not in d for d in differ))),
+    )
+
+
+def departure(feature: str, training: list[float], here: list[float]) -> Departure:
+    """Compare draws of one feature."""
+    low, high = min(training), max(training)
+    inside = sum(low <= value <= high for value in here)
+    return Departure(
+        feature,
+        (low, high),
+        (min(here), max(here)),
+        len(here),
+        inside,
+        at_most(inside, len(here)),
+        unseen(len(training)),
+    )
+
+
+def at_most(hits: int, draws: int) -> float:
+    """One-sided Clopper-Pearson upper bound of a share at 95 % confidence."""
+    return float(beta.ppf(CONFIDENCE, hits + 1, draws - hits)) if hits < draws else 1.0
+
+
+def unseen(draws: int) -> float:
+    """Largest share of a distribution outside the ends of a sample, at 95 % confidence: Beta(2, n - 1), Wilks 1941."""
+    return float(beta.ppf(CONFIDENCE, 2, draws - 1)) if draws > 1 else 1.0
+
+
+def _twins(task: Task, split: str, draws: int, seed: int) -> list[tuple[Scenario, Scenario]]:
+    found = []
+    for index in range(draws):
+        try:
+            found.append((task.draw(ID, seed, index).scenario, task.draw(split, seed, index).scenario))
+        except Infeasible:
+            continue  # an infeasible index is no scenario; it is counted where scenarios are generated
+    return found
