@@ -20,6 +20,7 @@ VERBS = (
     "record",
     "tasks",
     "evaluate",
+    "axis",
     "robosuite",
     "plan",
     "bias",

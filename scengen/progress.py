@@ -36,11 +36,11 @@ class Bar:
         if self.console.is_terminal:
             self._progress.stop()
 
-    def of(self, done: int, total: int) -> None:
+    def of(self, done: int, total: int, note: str = "") -> None:
         """Say that `done` of a total are done that was not known before."""
         self.total = total
         self._progress.update(self._task, total=total)
-        self.show(done)
+        self.show(done, note)
 
     def show(self, done: int, note: str = "") -> None:
         """Say that `done` of the total are done."""

@@ -1,11 +1,27 @@
 """What several tests need."""
 
+from pathlib import Path
+
 from hypothesis import strategies as st
 
+from scengen import render
 from scengen.params import parameters, with_values
+from scengen.pool import Pool
+
+REFERENCE = Path(__file__).parents[1] / "generated" / "reference"
 
 
 def anywhere(cls):
     """Any instance within its own bounds."""
     values = {p.name: (st.integers if p.integer else st.floats)(p.low, p.high) for p in parameters(cls())}
     return st.fixed_dictionaries(values).map(lambda drawn: with_values(cls(), drawn))
+
+
+def pictures_are_possible():
+    """Whether this machine has OpenGL."""
+    row = next(Pool.open(REFERENCE).rows())
+    try:
+        with render.camera(row["scene_xml"], row["embodiment"]):
+            return True
+    except render.NoPictures:
+        return False

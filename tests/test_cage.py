@@ -18,14 +18,14 @@ FACES = {"bottom": BOTTOM, "end": END, "side": SIDE, "top": TOP}
 
 
 def fitted(cage):
-    """The cage with its hole and sill moved to where they fit."""
+    """The cage with its hole and sill moved to where they fit, within their own bounds."""
     axis = {BOTTOM: 2, END: 0, SIDE: 1, TOP: 2}[cage.face]
     along = 1 if cage.face == END else 0
     room = cage.cavity / 2
-    hole = min(cage.hole, 0.95 * room[3 - axis - along], 0.4 * room[along])
-    sill_x = -0.9 * room[0] + cage.wall
+    hole = max(0.005, min(cage.hole, 0.95 * room[3 - axis - along], 0.4 * room[along]))
+    sill_x = max(-0.08, cage.wall - 0.9 * room[0])
     low = sill_x + cage.wall if cage.face == BOTTOM else -room[along]
-    offset = min(max(cage.offset, low + hole), room[along] - hole)
+    offset = min(max(cage.offset, low + hole), room[along] - hole, 0.08)
     return replace(cage, hole=hole, offset=offset, sill_x=sill_x, sill=min(cage.sill, room[2]))
 
 
@@ -49,8 +49,11 @@ def union(cage):
     return sum(pieces(cage), Manifold())
 
 
-def vertices(solid):
-    return np.asarray(solid.to_mesh().vert_properties)[:, :3]
+def bore(cage, radius):
+    """A cylinder through the holed plate and no other."""
+    cylinder = Manifold.cylinder(2 * cage.wall, radius, circular_segments=1024, center=True)
+    turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[cage.face]
+    return cylinder.rotate(turn).translate((cage.hole_centre + cage.wall / 2 * cage.normal).tolist())
 
 
 @given(cage=anywhere(HoledCage).map(fitted))
@@ -61,23 +64,19 @@ def test_no_collision_geometry_lies_in_the_cavity_or_in_the_hole(cage):
     cavity = Manifold.cube((cage.cavity - 2 * shrink).tolist(), True).translate(cage.middle.tolist())
     for centre, size in cage._sill():
         cavity -= Manifold.cube((size + 2 * shrink).tolist(), True).translate(centre.tolist())
-    bore = Manifold.cylinder(2 * cage.wall, cage.hole - shrink, circular_segments=1024, center=True)
-    turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[cage.face]
-    bore = bore.rotate(turn).translate((cage.hole_centre + cage.wall / 2 * cage.normal).tolist())
     touched = union(cage)
     assert (touched ^ cavity).volume() < 1e-15
-    assert (touched ^ bore).volume() < 1e-15
+    assert (touched ^ bore(cage, cage.hole - shrink)).volume() < 1e-15
 
 
 @given(cage=anywhere(HoledCage).map(fitted))
 @settings(max_examples=30, deadline=None)
-def test_all_that_the_collision_geometry_lacks_is_a_thin_ring_round_the_hole(cage):
-    """What is missing lies between circle and polygon, so the largest error is that of the polygon's corners."""
-    missing = cage.solid() - union(cage)
+def test_collision_geometry_and_picture_differ_by_a_thin_ring_round_the_hole_alone(cage):
+    """What is missing lies between the circle and the corners of the polygon. Seams of single precision are ignored."""
+    seams = 1e-7 * float(cage.size.sum()) ** 2
+    solid, touched = cage.solid(), union(cage)
     polygons = WEDGES * math.tan(math.pi / WEDGES) - SEGMENTS / 2 * math.sin(2 * math.pi / SEGMENTS)
-    assert missing.volume() == pytest.approx(polygons * cage.hole**2 * cage.wall, rel=1e-3)
-    ring = max(missing.decompose(), key=lambda part: part.volume())
-    from_centre = vertices(ring) - cage.hole_centre
-    radius = np.linalg.norm(from_centre - np.outer(from_centre @ cage.normal, cage.normal), axis=1)
-    assert radius.max() - cage.hole < BAR
-    assert missing.volume() - ring.volume() < 1e-12
+    missing = solid - touched
+    assert missing.volume() == pytest.approx(polygons * cage.hole**2 * cage.wall, abs=seams)
+    assert (missing - bore(cage, cage.hole + BAR)).volume() < seams
+    assert (touched - solid).volume() < seams

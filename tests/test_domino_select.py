@@ -55,7 +55,7 @@ def strike(scenario, k, spin):
 # --- the law of the task ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("split", "spin"), [("id", 5.5), ("subtle", 5.5), *((split, 8.0) for split in SPLITS)])
+@pytest.mark.parametrize(("split", "spin"), [("subtle", 5.5), *((split, 8.0) for split in SPLITS)])
 def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_a_red_slab(split, spin):
     """The hand gives 2 rad/s, and 8 if it moves as fast as it can; below 5 a tile may rock back."""
     scenario = TASK.draw(split, 0, 1).scenario
@@ -230,7 +230,7 @@ NEGATIVES = {
 @pytest.mark.parametrize("name", NEGATIVES)
 def test_what_is_no_fair_choice_is_not_certified(name):
     scenario, check, verdict, says = NEGATIVES[name]
-    certificate = certify(scenario, 7.0, Level(), TASK.embodiment).certificate
+    certificate = certify(scenario, 6.0, Level(), TASK.embodiment).certificate
     assert (certificate.verdict, certificate.failed.name) == (verdict, check), certificate.reason
     assert says in certificate.reason
 

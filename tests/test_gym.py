@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from helpers import pictures_are_possible
 
-from scengen import config, render
+from scengen import config
 from scengen.envs import observations
 from scengen.envs.gym import ScenarioEnv
 from scengen.errors import PoolError, UnknownName
@@ -25,15 +26,6 @@ EVERYTHING = (*observations.STREAMS,)
 def env():
     with gymnasium.make("scengen/domino_single-v0", pool=REFERENCE) as made:
         yield made
-
-
-def pictures_are_possible():
-    row = next(Pool.open(REFERENCE).rows())
-    try:
-        with render.camera(row["scene_xml"], row["embodiment"]):
-            return True
-    except render.NoPictures:
-        return False
 
 
 def test_gymnasiums_own_checker_has_nothing_to_say():

@@ -2,11 +2,11 @@
 
 import json
 import logging
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from helpers import REFERENCE, pictures_are_possible
 
 from scengen import config
 from scengen.cli import run as scengen
@@ -25,7 +25,6 @@ from scengen.validate.rollout import Judge
 # isort: split
 import robosuite
 
-REFERENCE = Path(__file__).parents[1] / "generated" / "reference"
 BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
 LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}
 """Numbers that may differ: what things look like, where strings lie in memory, and how much memory there is."""
@@ -316,6 +315,26 @@ def test_scenarios_of_other_tasks_or_versions_are_refused(row):
     old = {"versions": json.dumps({**versions(), "mujoco": "2.0"})}
     with pytest.raises(PoolError, match="with mujoco 2.0"):
         environment("domino_single")(scenario={**row, "certificate": old})
+
+
+@pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
+def test_cameras_show_the_things_of_the_scene(row):
+    env = robosuite.make(
+        "DominoSingle",
+        robots="Panda",
+        scenario=row,
+        camera_names="agentview",
+        camera_heights=64,
+        camera_widths=64,
+        camera_segmentations="instance",
+    )
+    with_slab = env._get_observations(force_update=True)
+    image = with_slab["agentview_image"].astype(int)
+    assert image.shape == (64, 64, 3)
+    slab = 1 + list(env.model.instances_to_ids).index("slab")
+    red = image[with_slab["agentview_segmentation_instance"][..., 0] == slab].mean(axis=0)
+    assert red[0] > red[1] + 50 and red[0] > red[2] + 50
+    env.close()
 
 
 # --- the command --------------------------------------------------------------------------

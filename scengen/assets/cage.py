@@ -31,6 +31,9 @@ WEDGES = 20
 SEGMENTS = 64
 """Sides of the circle in the picture; 0.02 mm from the true one at the nominal radius."""
 
+SHORTEST = 1e-6
+"""Sills lower and strips of plate narrower than this are left out [m]: MuJoCo refuses boxes without extent."""
+
 BOTTOM, END, SIDE, TOP = range(4)
 """Values of `face`. The other end and the other side are these in a cage that is turned round."""
 FACES = {BOTTOM: (2, -1, 0), END: (0, 1, 1), SIDE: (1, 1, 0), TOP: (2, 1, 0)}
@@ -104,7 +107,7 @@ class HoledCage:
         """Least distance from the rim of the hole to what stands on its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]
         free = [self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2]
-        if self.face == BOTTOM and self.sill > 0:
+        if self.face == BOTTOM and self._sill():
             free.append(abs(self.offset - self.sill_x) - self.wall / 2)
         return min(free) - self.hole
 
@@ -170,7 +173,7 @@ class HoledCage:
         return prisms
 
     def _sill(self) -> list[Box]:
-        if self.sill == 0:
+        if self.sill < SHORTEST:
             return []
         centre = np.array([self.sill_x, 0, self.wall + self.sill / 2])
         return [(centre, np.array([self.wall, self.cavity[1], self.sill]))]
@@ -188,7 +191,7 @@ class HoledCage:
         start, stop, _ = self._patch()
         half, boxes = self.size[along] / 2, []
         for low, high in ((-half - self.offset, start), (stop, half - self.offset)):
-            if high > low:
+            if high - low > SHORTEST:
                 centre, size = self.hole_centre.copy(), self.size.copy()
                 centre[along] += (low + high) / 2
                 size[axis], size[along] = self.wall, high - low
@@ -213,7 +216,7 @@ class HoledCage:
     # --- body -----------------------------------------------------------------------------
 
     def solid(self) -> "Manifold":
-        """The true body, by constructive solid geometry: what is shown, and what the decomposition is tested against."""
+        """The true body by constructive solid geometry: what is shown, and what the decomposition is tested against."""
         from manifold3d import Manifold
 
         def block(centre: NDArray[np.float64], size: NDArray[np.float64]) -> Manifold:
@@ -221,7 +224,7 @@ class HoledCage:
 
         body = block(self.middle, self.size) - block(self.middle, self.cavity)
         for centre, size in self._sill():  # let into floor and walls by half a wall, so that the parts are one
-            body += block(centre - [0, 0, self.wall / 4], size + [0, self.wall, self.wall / 2])
+            body += block(centre - self.wall / 4 * np.eye(3)[2], size + self.wall * np.array([0, 1, 0.5]))
         if self.closed:
             return body
         bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
@@ -233,7 +236,7 @@ class HoledCage:
         body = spec.worldbody.add_body(name="body")
         com, inertia = self.inertial()
         body.explicitinertial, body.mass, body.ipos = True, self.mass, com
-        body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        body.fullinertia = np.array([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
         for i, (centre, size) in enumerate(self.boxes()):
             geom = self._touchable(body, f"box_{i}")
             geom.type, geom.pos, geom.size = mujoco.mjtGeom.mjGEOM_BOX, centre, size / 2

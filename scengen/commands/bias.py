@@ -37,7 +37,8 @@ def command(arguments: Arguments) -> int:
     for name, (title, among) in stages.items():
         table, accepted = _table(among), np.array([getattr(p, name) for p in among])
         found = bias(table, accepted)
-        out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
+        if not accepted.all():
+            out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
         if len(found.marginals) > 1 and not accepted.all():
             first, second, *_ = found.marginals
             out.print(map_table(acceptance_map((first.name, second.name), table, accepted)))

@@ -50,14 +50,18 @@ def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: 
     """How far one pool is from training, how even it is, and whether it repeats itself."""
     away = per_parameter(task, list(scenarios.values()))
     told = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
-    out.print(f"{pool.folder}: {len(scenarios)} scenarios", highlight=False)
-    out.print(f"  outside training by [training widths]: {told or 'nothing'}", highlight=False)
+    out.print(f"{pool.folder}: {len(scenarios)} scenarios", highlight=False, markup=False)
+    out.print(f"  outside training by [training widths]: {told or 'nothing'}", highlight=False, markup=False)
     even = None
     if "subset" not in pool.manifest and scenarios:
         certified = [list(p.numbers.values()) for p in proposed(pool) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
-            out.print(f"  discrepancy: {even.relative:.2f} times that of as many independent draws", highlight=False)
+            out.print(
+                f"  discrepancy: {even.relative:.2f} times that of as many independent draws",
+                highlight=False,
+                markup=False,
+            )
     pairs = near_duplicates(task, scenarios, within=settings.within)
     if pairs:
         out.print(pairs_table(pairs, "in the pool", "again"))
@@ -81,11 +85,14 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
         f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
         f"[training ranges], p = {apart.pvalue:.3f}",
         highlight=False,
+        markup=False,
     )
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
         out.print(pairs_table(pairs, str(pool.folder), str(beside.folder)))
-    out.print(f"  shared but for {settings.within:g} training widths: {len(pairs)} pairs", highlight=False)
+    out.print(
+        f"  shared but for {settings.within:g} training widths: {len(pairs)} pairs", highlight=False, markup=False
+    )
     return {
         "pools": [str(pool.folder), str(beside.folder)],
         "over": space.names,

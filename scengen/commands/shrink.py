@@ -1,11 +1,12 @@
 """the two or three parameters that make a scenario fail its certificate"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from ..config import read, typed
 from ..errors import BadConfig
 from ..ood.shrink import centre, shrink
+from ..ood.space import scale
 from ..ood.tables import shrunk_table
 from ..params import Value, values, with_values
 from ..progress import Bar
@@ -40,8 +41,9 @@ def command(arguments: Arguments) -> int:
     if failed is None:
         raise BadConfig(f"{where} passes every check at level {level.level}; there is nothing to shrink")
     out.print(f"{where} fails {failed.name}: {failed.reason}", highlight=False)
+    scales = {name: scale(task, name) for name in task.known}
     with Bar(err, f"shrink {where}", 0) as bar:
-        found = shrink(values(scenario), centre(task.training), task.known, _fails(task, level, failed, bar.of))
+        found = shrink(values(scenario), centre(task.training), scales, _fails(task, level, failed, bar.of))
     out.print(shrunk_table(found, {name: p.unit for name, p in task.known.items()}))
     nearest = with_values(scenario, found.values)
     out.print(f"{len(found.causes)} of {len(task.known)} parameters matter; {found.tries} scenarios were judged")
@@ -49,7 +51,7 @@ def command(arguments: Arguments) -> int:
         write_json(
             settings.json,
             {"check": failed.name, "reason": failed.reason, "tries": found.tries, "values": values(nearest)}
-            | {"causes": [{**vars(cause), "share": cause.share} for cause in found.causes]},
+            | {"causes": [asdict(cause) for cause in found.causes]},
         )
     return OK
 

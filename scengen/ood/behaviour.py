@@ -3,14 +3,18 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, partial
+from pathlib import Path
+from typing import Any
 
 from ..errors import Infeasible
+from ..log import Log
 from ..parallel import each
 from ..samplers.task import ID, Task
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
 from ..statistics import wilson
+from ..validate.identity import source_sha256
 from ..validate.rollout import Episode, Tape, replay, run
 
 EXTRAPOLATION = "true extrapolation"
@@ -56,20 +60,30 @@ class Share:
 
 
 def try_twins(
-    task: Task, split: str, seed: int, indices: Iterable[int], workers: int, progress: Callable[[int], None]
+    task: Task,
+    split: str,
+    folder: Path,
+    n: int,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> list[Trial]:
-    """Draw scenarios of a split, play their ID twins' tapes and their own oracles.
+    """Play ID tapes in the first n scenarios of a split, continuing what stands in `folder`.
 
     Twins that their own oracle cannot solve have no tape and are left out.
 
     Args:
         progress: told how many twins are done.
     """
-    trials: list[Trial] = []
-    for done, trial in enumerate(each(partial(_try_twin, task, split, seed), indices, workers), 1):
-        trials += [trial] if trial else []
-        progress(done)
-    return trials
+    moves = {name: str(dist) for name, dist in task.moves(split).items()}
+    identity = {"task": task.name, "split": split, "moves": moves, "seed": seed, "source": source_sha256(task.family)}
+    with Log(folder / "behaviour.jsonl", identity) as log:
+        todo = sorted(set(range(n)) - {r["index"] for r in log.records})
+        for trial in each(partial(_try_twin, task, split, seed), todo, workers):
+            log.add(trial)
+            progress(len(log.records))
+        records = sorted((r for r in log.records if r["index"] < n), key=lambda r: r["index"])
+    return [Trial(**r) for r in records if r["tape"] is not None]
 
 
 def shares(trials: Iterable[Trial]) -> list[Share]:
@@ -103,12 +117,13 @@ def _solution(scenario: Scenario, world: World, horizon: float) -> Episode:
     return run(scenario, world, scenario.oracle, horizon, until_settled=True)  # type: ignore[attr-defined]
 
 
-def _try_twin(task: Task, split: str, seed: int, index: int) -> Trial | None:
+def _try_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+    """One trial as plain data; `tape` is None where there is no tape to try."""
+    found: tuple[bool | None, bool, str]
     tape = twin_tape(task, seed, index)
-    if tape is None:
-        return None
     try:
         scenario = task.draw(split, seed, index).scenario
+        found = attempt(task, tape, scenario) if tape is not None else (None, False, "")
     except Infeasible as error:
-        return Trial(index, False, False, str(error))
-    return Trial(index, *attempt(task, tape, scenario))
+        found = False, False, str(error)
+    return {"index": index, **dict(zip(("tape", "oracle", "reason"), found, strict=True))}

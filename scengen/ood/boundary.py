@@ -23,6 +23,7 @@ from ..params import Value, with_values
 from ..samplers.dists import Choice, Fixed
 from ..samplers.keyed import unit
 from ..samplers.task import ID, Task
+from ..validate.identity import source_sha256
 from .axis import Axis
 from .behaviour import attempt, twin_tape
 
@@ -80,7 +81,8 @@ def search(
         BadConfig: the axis has no way, only separate values.
     """
     way = Way(task, task.axes[axis])
-    identity = {"task": task.name, "axis": axis, "seed": seed, "way": way.spelled}
+    source = source_sha256(task.family)
+    identity = {"task": task.name, "axis": axis, "seed": seed, "way": way.spelled, "source": source}
     with Log(folder / "boundary.jsonl", identity) as log:
         for number in range(rounds):
             place = _next(number, log.records[: number * BATCH], way.end)
@@ -91,17 +93,21 @@ def search(
     return {who: _boundary(who, trials, way) for who in (TAPE, ORACLE)}
 
 
+def no_way(task: Task, axis: Axis) -> str:
+    """Why there is no line along which to look for a boundary; empty if there is one."""
+    separate = [n for n in axis.replace if task.known[n].integer]
+    if not separate:
+        return ""
+    return f"axis {axis.name} of {task.name} moves {', '.join(separate)}, which takes separate values: there is no way"
+
+
 class Way:
     """The line that an axis moves its parameters along."""
 
     def __init__(self, task: Task, axis: Axis):
         self.task, self.axis = task, axis
-        separate = [n for n in axis.replace if task.known[n].integer]
-        if separate:
-            raise BadConfig(
-                f"axis {axis.name} of {task.name} moves {', '.join(separate)}, which takes separate values: "
-                "there is no way along which to look for a boundary"
-            )
+        if reason := no_way(task, axis):
+            raise BadConfig(reason)
         self.end = self._end()
 
     @property

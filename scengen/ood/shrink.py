@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..errors import BadConfig
-from ..params import Parameter, Value
+from ..params import Value
 from ..samplers.dists import Dist
 
 STEPS = 5
@@ -24,11 +24,8 @@ class Cause:
     """The value nearest to the centre with which it was seen to fail."""
     began: Value
     """The value before shrinking."""
-
-    @property
-    def share(self) -> float:
-        """How much of the way from the centre is needed: near 0 means that a touch of it makes the scenario fail."""
-        return (self.value - self.centre) / (self.began - self.centre)
+    departure: float
+    """How far the value is from the centre [training widths]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Shrunk:
 
     values: Mapping[str, Value]
     causes: tuple[Cause, ...]
-    """Put any one of them alone to its centre, the others being what they were: no failure. Most telling first."""
+    """Put any one of them alone to its centre, the others being what they were: no failure. Farthest first."""
     tries: int
     """How many scenarios were judged."""
 
@@ -48,7 +45,7 @@ def centre(training: Mapping[str, Dist]) -> dict[str, Value]:
 
 
 def shrink(
-    begin: Mapping[str, Value], middle: Mapping[str, Value], known: Mapping[str, Parameter], fails: Fails
+    begin: Mapping[str, Value], middle: Mapping[str, Value], scales: Mapping[str, float], fails: Fails
 ) -> Shrunk:
     """Move a failing scenario towards a centre while it still fails.
 
@@ -58,7 +55,7 @@ def shrink(
 
     Args:
         begin, middle: values of all parameters of a failing scenario and of the centre.
-        known: the family's parameters.
+        scales: what to measure the departure of each parameter in, as `scengen.ood.space.scale` has it.
         fails: judged often; the cheaper the better.
 
     Raises:
@@ -80,9 +77,9 @@ def shrink(
     needed = _fewest(differ, lambda kept: failing({**middle, **{n: begin[n] for n in kept}}))
     values = {**middle, **{n: begin[n] for n in needed}}
     for name in needed:
-        values = _nearer(values, name, middle[name], known[name].integer, failing)
-    causes = [Cause(n, middle[n], values[n], begin[n]) for n in needed]
-    return Shrunk(values, tuple(sorted(causes, key=lambda c: c.share)), len(judged))
+        values = _nearer(values, name, middle[name], failing)
+    causes = [Cause(n, middle[n], values[n], begin[n], abs(values[n] - middle[n]) / scales[n]) for n in needed]
+    return Shrunk(values, tuple(sorted(causes, key=lambda c: -c.departure)), len(judged))
 
 
 def _fewest(items: Sequence[str], fails: Callable[[Sequence[str]], bool]) -> list[str]:
@@ -108,12 +105,12 @@ def _split(items: Sequence[str], parts: int) -> Iterator[list[str]]:
         yield list(items[i * len(items) // parts : (i + 1) * len(items) // parts])
 
 
-def _nearer(values: Mapping[str, Value], name: str, middle: Value, whole: bool, failing: Fails) -> dict[str, Value]:
+def _nearer(values: Mapping[str, Value], name: str, middle: Value, failing: Fails) -> dict[str, Value]:
     """Halve the way of one parameter between a value that fails and one that does not."""
     good, bad = middle, values[name]
     for _ in range(STEPS):
         between = (good + bad) / 2
-        if whole:
+        if isinstance(bad, int):
             between = round(between)
             if between in (good, bad):
                 break

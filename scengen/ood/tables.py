@@ -69,10 +69,12 @@ def plan_table(plan: Plan) -> Table:
 
 def shrunk_table(shrunk: Shrunk, units: dict[str, str]) -> Table:
     """The parameters that matter."""
-    table = Table("parameter", "centre", "fails at", "was", "of the way", title="what matters", title_justify="left")
+    table = Table(
+        "parameter", "centre", "fails at", "was", "training widths", title="what matters", title_justify="left"
+    )
     for c in shrunk.causes:
         unit = units[c.parameter]
-        table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.began:.4g}", f"{c.share:.0%}")
+        table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.began:.4g}", f"{c.departure:.2f}")
     return table
 
 

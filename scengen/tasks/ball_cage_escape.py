@@ -47,7 +47,7 @@ STEEPEST = math.radians(72.0)
 """Tilt that the hand reaches low over the table at every heading that `present` may choose [rad], tried on the model
 between x = -0.2 and 0 m."""
 SPARE = math.radians(13.0)
-"""How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives a few degrees."""
+"""How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives some degrees."""
 KEEP = 0.25
 """For a hole in a side: component of gravity that keeps the ball at the hole's end meanwhile, over the other ones."""
 HANDLE = 0.030
@@ -57,8 +57,8 @@ ROOM = 0.040
 ASIDE = 0.19
 """How far from the stool the cage is emptied [m]: the tilted cage and the stool reach 0.07 m each."""
 WIDEST = math.radians(55.0)
-"""The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can lean
-far, and the ball has half a metre to run out."""
+"""The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can
+lean far, and the ball has half a metre to run out."""
 YAW_LEAST, YAW_MOST = math.radians(-100.0), math.radians(190.0)
 """Turns of the downward hand that joint 7 allows with 10 deg and more to spare [rad]: its limits are +-2.897 rad, and
 it is at pi / 4 where the hand is not turned."""
@@ -246,7 +246,7 @@ class BallCageEscape(Scenario):
         return next(y for y in (math.radians(self.yaw) + half for half in HALF_TURNS) if YAW_LEAST <= y <= YAW_MOST)
 
     def present(self, world: World, down: Vec3) -> Plan:
-        """Carry the cage level to a free place, low over the table, and turn it until `down` can be made to point down."""
+        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down."""
         steep = math.acos(-down[2])
         low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
         side = -1.0 if self.y > 0 else 1.0

@@ -1,0 +1,50 @@
+"""all the evidence about one OOD axis on one page: the axis card"""
+
+from pathlib import Path
+
+from rich.table import Table
+
+from ..config import read, typed
+from ..ood.card import Card, Settings, make
+from ..progress import Bar
+from . import OK, Arguments, err, out
+
+
+def command(arguments: Arguments) -> int:
+    composed = read("axis", arguments)
+    settings, task = typed("", Settings, composed.settings), composed.task
+    assert task is not None
+    settings.check(task)
+    folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
+    with Bar(err, f"axis {task.name}/{settings.axis}", settings.n) as bar:
+
+        def progress(what: str, done: int, total: int) -> None:
+            bar.of(min(done, total), total, what)
+
+        card, remark = make(task, composed.resolved, composed.level, settings, folder, progress)
+    out.print(_table(card))
+    if remark:
+        err.print(f"scengen: the card has no pictures: {remark}", highlight=False, markup=False)
+    out.print(f"wrote {folder / 'card.html'} and card.json", highlight=False)
+    return OK
+
+
+def _table(card: Card) -> Table:
+    """The card in a few lines."""
+    table = Table(title=f"{card.task}: axis {card.axis}", title_justify="left", show_header=False)
+    for proof in card.proofs:
+        relative = f" = {proof.relative:.2g} training ranges" if proof.relative else ""
+        table.add_row("outside", f"{proof.parameter}: gap {proof.gap:.3g}{relative} ({proof.kind})")
+    table.add_row("solvable", f"{card.funnel['certified']} of {card.funnel['proposed']} draws certified")
+    for share in card.behaviour:
+        if share.count:
+            told = f"{share.value:.0%}, 95 % interval {share.low:.0%} to {share.high:.0%}"
+            table.add_row("behaviour", f"{share.kind}: {share.count} ({told})")
+    for who, found in card.boundaries.items():
+        at = ", ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
+        way = f"{found.middle:.2f} from {found.low:.2f} to {found.high:.2f}, way ends at {found.end:.2f}"
+        table.add_row(f"boundary of {who}", f"{found.verdict}: {way}" + (f" ({at})" if at else ""))
+    if card.no_way:
+        table.add_row("boundary", card.no_way)
+    table.add_row("energy distance", f"{card.energy.distance:.3g} training ranges, p = {card.energy.pvalue:.3g}")
+    return table

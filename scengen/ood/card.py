@@ -1,0 +1,238 @@
+"""The axis card: everything that is known about one OOD axis, on one page."""
+
+import base64
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from matplotlib.figure import Figure
+
+from .. import film, generate, render
+from ..errors import BadConfig, UnknownName
+from ..pool import Pool, Row
+from ..report import thumbnail
+from ..samplers.task import ID, Task
+from ..sim import scene_text
+from ..validate.level import Level
+from . import behaviour, boundary, distance, features
+from .axis import Proof, spell
+from .space import of_features
+from .support import Support
+
+SHOWN = 4
+"""Twins whose pictures are shown side by side."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen axis`; meanings stand in conf/axis.yaml."""
+
+    axis: str = ""
+    n: int = 50
+    seed: int = 0
+    rounds: int = 16
+    workers: int = 1
+    to: str | None = None
+
+    def check(self, task: Task) -> None:
+        """Raise `ScengenError` for a setting that makes no sense for this task."""
+        if self.axis not in task.axes:
+            raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
+        for name, low in (("n", 2), ("seed", 0), ("rounds", 2), ("workers", 1)):
+            if getattr(self, name) < low:
+                raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least {low}")
+
+
+@dataclass(frozen=True)
+class Card:
+    """The evidence about one axis."""
+
+    task: str
+    axis: str
+    why: str
+    source: str
+    proofs: list[Proof]
+    features: list[features.Departure]
+    same_physics: bool
+    """Whether features are declared and none of them leaves training."""
+    funnel: Mapping[str, int]
+    reasons: Mapping[str, int]
+    first_draws: int
+    """How many of the first n indices were certified."""
+    behaviour: list[behaviour.Share]
+    boundaries: dict[str, boundary.Boundary]
+    no_way: str
+    """Why there are no boundaries; empty if there are."""
+    energy: distance.Energy
+    """Between the features of the first n twins in and out of distribution, in ranges of training."""
+
+    def plain(self) -> dict[str, Any]:
+        """The card as plain data, for JSON."""
+        told = asdict(self)
+        told["boundaries"] = {k: {**asdict(b), "verdict": b.verdict} for k, b in self.boundaries.items()}
+        return told
+
+
+def make(
+    task: Task,
+    node: Mapping[str, Any],
+    level: Level,
+    settings: Settings,
+    folder: Path,
+    progress: Callable[[str, int, int], None],
+) -> tuple[Card, str]:
+    """Gather all evidence and write `card.html` and `card.json`, continuing what stands in `folder`.
+
+    Args:
+        node: the resolved configuration, as for `generate`.
+        progress: told what is being done, how far it is, and how much there is.
+
+    Returns:
+        The card, and why it has no pictures, or nothing.
+    """
+    name, n, seed = settings.axis, settings.n, settings.seed
+    wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
+    made = generate.generate(task, node, level, wanted, lambda done, *_: progress("certify twins", done, n))
+    trials = behaviour.try_twins(
+        task, name, folder, n, seed, settings.workers, lambda done: progress("play ID tapes", done, n)
+    )
+    boundaries, no_way = _boundaries(task, name, folder, seed, settings.rounds, progress)
+    twins = [(task.draw(ID, seed, row["index"]).scenario, task.scenario(row["params"])) for row in made.pool.rows()]
+    training, here = [t for t, _ in twins], [s for _, s in twins]
+    space = of_features(task, training, here)
+    evidence = features.sampled(task, name)
+    axis = task.axes[name]
+    card = Card(
+        task.name,
+        name,
+        axis.why,
+        axis.source,
+        task.proofs[name],
+        list(evidence.departures),
+        evidence.same_physics,
+        made.funnel,
+        made.reasons,
+        made.first_draws,
+        behaviour.shares(trials),
+        boundaries,
+        no_way,
+        distance.energy(space.points(training), space.points(here)),
+    )
+    (folder / "card.json").write_text(json.dumps(card.plain(), indent=1) + "\n")
+    return card, _page(task, card, made.pool, seed, folder / "card.html")
+
+
+def _boundaries(
+    task: Task, name: str, folder: Path, seed: int, rounds: int, progress: Callable[[str, int, int], None]
+) -> tuple[dict[str, boundary.Boundary], str]:
+    """Both boundaries, or why there are none."""
+    if reason := boundary.no_way(task, task.axes[name]):
+        return {}, reason
+    found = boundary.search(
+        task, name, folder, seed, rounds, lambda done, total: progress("search boundaries", done, total)
+    )
+    return found, ""
+
+
+# --- the page -----------------------------------------------------------------------------------
+
+
+def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
+    """Write the page, with pictures where they are possible. Returns why they are not, or nothing."""
+    remark, pairs, strips = "", [], []
+    try:
+        rows = [row for row, _ in zip(pool.rows(), range(SHOWN), strict=False)]
+        pairs = [(row["index"], _picture(task, seed, row["index"]), thumbnail(row)) for row in rows]
+        strips = [*_strips(task, rows[0])] if rows else []
+    except render.NoPictures as error:
+        remark = str(error)
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "templates"), autoescape=True)
+    page = environment.get_template("axis_card.html").render(
+        card=card,
+        task=task,
+        axis=task.axes[card.axis],
+        spell=spell,
+        steps=("proposed", *generate.STAGES),
+        bars=_svg(_bars(task, card)),
+        way=_svg(_way(card)) if card.boundaries else "",
+        pairs=pairs,
+        strips=strips,
+        remark=remark,
+    )
+    path.write_text(page)
+    return remark
+
+
+def _picture(task: Task, seed: int, index: int) -> str:
+    """The training twin, as a data address for HTML."""
+    scene = scene_text.emit(task.draw(ID, seed, index).scenario.build())[0]
+    return thumbnail({"scene_xml": scene, "embodiment": task.embodiment})
+
+
+def _strips(task: Task, row: Row) -> list[tuple[str, str]]:
+    """Film strips of a witness, and of the shortcut that comes closest: the one whose episode lasts longest."""
+    scenario = task.scenario(row["params"])
+    tried = {name: film.shortcut(row, scenario, name) for name in scenario.shortcuts()}
+    takes = [("the witness", film.Take.witness(row, scenario))]
+    if tried:
+        name, (take, episode) = max(tried.items(), key=lambda item: item[1][1].seconds)
+        takes.append((f"the shortcut “{name}”: {episode.reason}", take))
+    return [(title, _data(render.encode(film.strip(take)), "webp")) for title, take in takes]
+
+
+def _data(content: bytes, kind: str) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _svg(figure: Figure) -> str:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
+    return _data(buffer.getvalue(), "svg+xml")
+
+
+def _bars(task: Task, card: Card) -> Figure:
+    """Both supports of every parameter that moves, each in its own range."""
+    moved = task.axes[card.axis].replace
+    figure = Figure(figsize=(7.5, 0.5 + 0.55 * len(moved)))
+    axes = figure.subplots(len(moved), 1, squeeze=False)[:, 0]
+    for plot, (name, dist) in zip(axes, moved.items(), strict=True):
+        _support(plot, task.training[name].support, 0.62, "#4a7fb5")
+        _support(plot, dist.support, 0.38, "#b5524a")
+        plot.set(yticks=[], ylim=(0.1, 0.9))
+        unit = f" [{task.known[name].unit}]" if task.known[name].unit else ""
+        plot.set_ylabel(name + unit, rotation=0, ha="right", va="center")
+        plot.spines[["left", "right", "top"]].set_visible(False)
+    figure.subplots_adjust(hspace=0.9)
+    return figure
+
+
+def _support(plot: Any, support: Support, y: float, colour: str) -> None:
+    for part in support:
+        if part.low == part.high:
+            plot.plot(part.low, y, "o", color=colour, markersize=7)
+        else:
+            plot.plot([part.low, part.high], [y, y], color=colour, linewidth=7, solid_capstyle="butt")
+
+
+def _way(card: Card) -> Figure:
+    """Where tape and oracle die on the way of the axis."""
+    figure = Figure(figsize=(7.5, 1.5))
+    plot = figure.subplots()
+    end = max(b.end for b in card.boundaries.values())
+    plot.axvspan(0, 1, color="#b5524a", alpha=0.12, lw=0)
+    for y, found in enumerate(card.boundaries.values()):
+        low, middle, high = (min(max(v, 0.0), end) for v in (found.low, found.middle, found.high))
+        plot.plot([0, middle], [y, y], color="#555", linewidth=2)
+        plot.plot([low, high], [y, y], color="#555", linewidth=7, alpha=0.35, solid_capstyle="butt")
+        plot.plot(middle, y, "x" if middle < end else ">", color="#222", markersize=8)
+    plot.set(yticks=range(len(card.boundaries)), yticklabels=list(card.boundaries), ylim=(-0.6, 1.6), xlim=(0, end))
+    plot.set_xlabel("way: 0 the edge of training, 1 the far end of the axis, on to the bounds of the parameters")
+    plot.spines[["right", "top"]].set_visible(False)
+    if not math.isclose(end, 1.0):
+        plot.axvline(1.0, color="#b5524a", lw=1)
+    return figure
