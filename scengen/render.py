@@ -43,11 +43,11 @@ class Camera:
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
-        self._view = _fitted(world, width / height)
+        self._view = fitted(world, width / height)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
-        self._hide_hulls()
+        hide_hulls(world.model)
 
     def take(self, name: str | None = None) -> Picture:
         """A picture of the world as it is now, from a named camera or in a view fitted to the scene as it began.
@@ -58,18 +58,12 @@ class Camera:
         cameras = [self.world.model.camera(i).name for i in range(self.world.model.ncam)]
         if name is not None and name not in cameras:
             raise UnknownName("camera", name, cameras)
+        mujoco.mj_camlight(self.world.model, self.world.data)  # the control loop leaves them one physics step behind
         self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
         return self._renderer.render()
 
     def close(self) -> None:
         self._renderer.close()
-
-    def _hide_hulls(self) -> None:
-        """Make the robot's collision hulls invisible; its visual meshes lie in the same places."""
-        model = self.world.model
-        robot = model.body_rootid == model.body("robot0_base").id
-        hulls = robot[model.geom_bodyid] & (model.geom_group == 0)
-        model.geom_rgba[hulls, 3] = 0.0
 
 
 AZIMUTH, ELEVATION = 140.0, -28.0
@@ -80,8 +74,19 @@ CLOSEST = 0.55
 """It does not come closer than this [m], or one could not tell where on the table things are."""
 
 
-def _fitted(world: World, aspect: float) -> mujoco.MjvCamera:
-    """A view that just holds the scene's things and the robot's hand; the table and the floor go on beyond it."""
+def hide_hulls(model: mujoco.MjModel) -> None:
+    """Make the robot's collision hulls invisible; its visual meshes lie in the same places."""
+    robot = model.body_rootid == model.body("robot0_base").id
+    hulls = robot[model.geom_bodyid] & (model.geom_group == 0)
+    model.geom_rgba[hulls, 3] = 0.0
+
+
+def fitted(world: World, aspect: float) -> mujoco.MjvCamera:
+    """A view that just holds the scene's things and the robot's hand; the table and the floor go on beyond it.
+
+    Args:
+        aspect: width of the picture over its height.
+    """
     view = mujoco.MjvCamera()
     view.azimuth, view.elevation = AZIMUTH, ELEVATION
     turn, dip = np.radians(AZIMUTH), np.radians(ELEVATION)

@@ -5,13 +5,16 @@ import sys
 import time
 from itertools import chain, repeat
 
+import mujoco.viewer
 import numpy as np
 
 from .errors import ScengenError
 from .film import Take
 from .pool import Row
+from .render import fitted, hide_hulls
 from .scenario import Scenario
 from .sim.loop import Loop
+from .sim.world import World
 from .validate.moves import idle
 
 
@@ -27,11 +30,11 @@ def check_display() -> None:
 
 def view(row: Row, scenario: Scenario, replay: bool) -> None:
     """Show a scenario in real time until the window is closed. After its witness, or without, the robot is idle."""
-    import mujoco.viewer
-
     world = Take.witness(row, scenario).world()
+    hide_hulls(world.model)
     tape = row["witness"] if replay else []
     with mujoco.viewer.launch_passive(world.model, world.data, show_left_ui=False, show_right_ui=False) as window:
+        _look(window, world)
         due = time.monotonic()
         for action in chain(tape, repeat(None)):
             if not window.is_running():
@@ -42,3 +45,12 @@ def view(row: Row, scenario: Scenario, replay: bool) -> None:
             window.sync()
             due += Loop.PERIOD
             time.sleep(max(0.0, due - time.monotonic()))
+
+
+def _look(window: mujoco.viewer.Handle, world: World) -> None:
+    """Begin with the view of the pictures, without marks."""
+    view = fitted(world, 4 / 3)
+    with window.lock():
+        window.cam.lookat[:] = view.lookat
+        window.cam.distance, window.cam.azimuth, window.cam.elevation = view.distance, view.azimuth, view.elevation
+        window.opt.sitegroup[:] = 0

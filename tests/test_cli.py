@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from test_pool import QUICKLY, make
 
-from scengen import cli, config, render
+from scengen import cli, config, film, render
 from scengen.errors import BadConfig
 from scengen.pool import Pool
 from scengen.sim import scene_text
@@ -172,7 +172,8 @@ def test_a_contact_sheet_shows_every_scene_or_says_why_not(made, tmp_path):
 def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys, tmp_path):
     row = next(Pool.open(made).rows())
     try:
-        picture = render.strip(row["scene_xml"], row["embodiment"], row["witness"], frames=4)
+        scenario = config.task(row["task"]).scenario(row["params"])
+        picture = film.strip(film.Take.witness(row, scenario), frames=4)
     except render.NoPictures as error:
         assert "libegl1" in str(error)
     else:

@@ -229,7 +229,8 @@ class HoledCage:
             return body
         bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
         turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[self.face]
-        return body - bore.rotate(turn).translate(self.hole_centre.tolist())
+        outwards = self.hole_centre + self.wall / 2 * self.normal  # the bore begins at the cavity, and spares the sill
+        return body - bore.rotate(turn).translate(outwards.tolist())
 
     def spec(self) -> mujoco.MjSpec:
         spec = mujoco.MjSpec()

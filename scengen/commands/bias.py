@@ -39,9 +39,9 @@ def command(arguments: Arguments) -> int:
         found = bias(table, accepted)
         if not accepted.all():
             out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
-        if len(found.marginals) > 1 and not accepted.all():
-            first, second, *_ = found.marginals
-            out.print(map_table(acceptance_map((first.name, second.name), table, accepted)))
+            if len(found.marginals) > 1:
+                first, second, *_ = found.marginals
+                out.print(map_table(acceptance_map((first.name, second.name), table, accepted)))
         result[name] = {**asdict(found), "flagged": found.flagged, "effective": found.effective}
         out.print(_verdict(name, found), highlight=False)
     if settings.json:

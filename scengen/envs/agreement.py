@@ -80,9 +80,8 @@ def compare(row: Row, search: tuple[str, ...] = ()) -> Comparison:
     env.close()
     together = min(len(path), len(world.path))
     apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=1)
-    return Comparison(
-        row["task"], row["id"], ours.outcome, theirs, reason, float(apart.max()), round(seconds - ours.seconds, 6)
-    )
+    later = round(seconds - ours.seconds, 6) + 0.0  # never -0.0
+    return Comparison(row["task"], row["id"], ours.outcome, theirs, reason, float(apart.max()), later)
 
 
 @dataclass

@@ -61,8 +61,11 @@ class Evidence:
     """Parameters that an axis names and that equal their twin's in some draw."""
 
     @property
-    def same_physics(self) -> bool:
-        """Whether features are declared and not one of them leaves training: other numbers, the same problem."""
+    def features_stay(self) -> bool:
+        """Whether features are declared and not one of them leaves training.
+
+        Then the raw numbers alone are new, and only behaviour can tell whether the problem is.
+        """
         return bool(self.departures) and not any(d.leaves for d in self.departures)
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ def calibration(world: World, name: str, width: int, height: int) -> dict[str, A
     4 x 4 matrix that takes points from the camera's frame (x right, y down, z ahead) to `frame` [m].
     """
     model, data = world.model, world.data
+    mujoco.mj_camlight(model, data)  # the control loop leaves cameras one physics step behind
     camera = model.camera(name)
     focal = height / 2 / np.tan(np.radians(float(camera.fovy[0])) / 2)
     pose = _pose(data.cam_xpos[camera.id], data.cam_xmat[camera.id].reshape(3, 3) @ TO_OPENCV)

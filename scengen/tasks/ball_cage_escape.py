@@ -62,6 +62,8 @@ lean far, and the ball has half a metre to run out."""
 YAW_LEAST, YAW_MOST = math.radians(-100.0), math.radians(190.0)
 """Turns of the downward hand that joint 7 allows with 10 deg and more to spare [rad]: its limits are +-2.897 rad, and
 it is at pi / 4 where the hand is not turned."""
+RUN_UP = 0.05
+"""Distance behind the cage from which it is pushed [m]: half the thickness of a closed jaw, and air."""
 LAPS = (-2 * math.pi, 0.0, 2 * math.pi)
 HALF_TURNS = (0.0, -math.pi, math.pi)
 
@@ -302,9 +304,10 @@ class BallCageEscape(Scenario):
     def _knock_off(self, world: World) -> Plan:
         """Push the cage over the end of the stool with closed fingers, the holed end first."""
         u = self.axes[:, 0]
-        behind = self.foot + HANDLE * UP - (self.cage.length / 2 + 0.03) * u
-        yield from go_to(world, behind + 0.08 * UP, facing_down(math.radians((self.yaw + 90.0) % 180.0)), grip=CLOSED)
-        yield from go_to(world, behind)
+        behind = self.foot + HANDLE * UP - (self.cage.length / 2 + RUN_UP) * u
+        across = facing_down(math.radians((self.yaw + 90.0) % 180.0))
+        yield from go_to(world, behind + 0.08 * UP, across, grip=CLOSED, within=0.01)
+        yield from go_to(world, behind, within=0.01)
         yield from push(world, 0.15 * u, until=lambda: world.touched("cage", "table"))
 
 

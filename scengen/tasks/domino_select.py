@@ -324,3 +324,10 @@ class DominoSelect(Scenario):
         over = (self.slab.height + FINGERTIP + 0.009) * UP
         yield from go_to(world, slab + over - 0.04 * self.u)
         yield from push(world, 0.15 * self.u, until=lambda: self.success(world))
+
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How far a tile leans when it strikes the next one, and the room between chains."""
+        gap = self.gap_ratio * self.tile.width
+        return {"gap over height": gap / self.tile.height, "lane over slab width": self.lane / self.slab.width}

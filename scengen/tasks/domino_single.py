@@ -159,3 +159,13 @@ class DominoSingle(Scenario):
         yield from go_to(world, beside + 0.12 * UP, grip=CLOSED)
         yield from go_to(world, beside)
         yield from push(world, -0.15 * side, until=lambda: self.success(world))
+
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How far a tile leans when it strikes the next one, what the last one must move, and the first push [rad]."""
+        return {
+            "gap over height": self.gap / self.tile.height,
+            "slab over tile mass": self.slab.mass / self.tile.mass,
+            "tipping angle of the starter": self.starter.tipping_angle,
+        }

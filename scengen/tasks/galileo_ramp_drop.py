@@ -267,6 +267,13 @@ class GalileoRampDrop(Scenario):
         """Straight to the target: put the ball down on the patch."""
         yield from self.let_go(world, sum(self.ramp.patch) / 2)
 
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How high the ball must start [m], and whether it slips: from 2/7 on it rolls."""
+        slope = math.tan(math.radians(self.ramp.angle))
+        return {"release height": self.ramp.height(self.start), "friction over slope": self.ramp.friction / slope}
+
 
 def _clear(scene: mujoco.MjSpec, *bodies: str) -> None:
     """Take all geoms of some bodies away."""

@@ -61,11 +61,11 @@ RIM = 0.6
 """Depth of the bin by the thickness of the pieces."""
 AIM = 0.5
 """Error with which a piece hangs over its slot before it is lowered, by the clearance: half of the room is left."""
-LOWERING = 60.0
-"""Speed at which it is lowered, by the clearance [1/s]: 60 mm/s at 1 mm. The hand wavers more the faster it moves."""
+LOWERING = 40.0
+"""Speed at which it is lowered, by the clearance [1/s]: 40 mm/s at 1 mm. The hand wavers more the faster it moves."""
 CAUGHT = math.radians(0.7)
 """A piece that tilts this far while it is lowered stands on an edge [rad]; held by the cup alone it tilts 0.3 deg."""
-CALM = 0.01
+CALM = 0.008
 """Speed below which a piece over its slot no longer swings [m/s]."""
 FIRMLY = 0.15
 """How long the cup must hold on before a piece is lifted [s]."""
@@ -294,21 +294,22 @@ class Packing(Scenario):
     def pack(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
         """Bring piece `i` to a position [m] and yaw [rad] in the bin, and let go once it lies there.
 
-        A piece that stands on an edge is lifted and lowered again.
+        A piece that stands on an edge is raised and lowered again, one that came off the cup is taken up again.
         """
-        name = f"piece_{i}"
-        yield from self.lift(world, i, yaw)
-        yield from carry(world, name, _above(pos), yaw, within=0.02)
+        name, over = f"piece_{i}", pos + (self.thickness + 0.006) * UP
+
+        def lost() -> bool:
+            return not world.sealed
+
+        def down() -> bool:
+            return lost() or self.lies(world, i) or world.tilt(name) > CAUGHT
+
         while not self.lies(world, i):
-            yield from carry(world, name, pos + (self.thickness + 0.006) * UP, yaw, within=AIM * self.clearance)
-            yield from carry(
-                world,
-                name,
-                pos - 0.002 * UP,
-                yaw,
-                speed=LOWERING * self.clearance,
-                until=lambda: self.lies(world, i) or world.tilt(name) > CAUGHT,
-            )
+            if lost():
+                yield from self.lift(world, i, yaw)
+                yield from carry(world, name, _above(pos), yaw, within=0.02, until=lost)
+            yield from carry(world, name, over, yaw, within=AIM * self.clearance, until=lost)
+            yield from carry(world, name, pos - 0.002 * UP, yaw, speed=LOWERING * self.clearance, until=down)
         yield from let_go(world)
 
     def lift(self, world: World, i: int, yaw: float) -> Plan:

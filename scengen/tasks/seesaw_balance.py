@@ -61,9 +61,9 @@ PALM = 0.110
 """Half the width of the hand across the fingers, and 8 mm of air [m]: robosuite's panda_gripper.xml, hull of the hand."""
 RIM = 0.004
 """Least deck beyond a block [m]."""
-EXPECTED_BEAM, EXPECTED_TARGET, EXPECTED_WEIGHT = 0.35, 0.22, 0.27
-"""Masses that one would expect without having tried [kg]: the middles of the training ranges."""
-EXPECTED_MARGIN = 0.014
+EXPECTED_BEAM, EXPECTED_BLOCK = 0.28, 0.22
+"""Masses that one would expect without having tried [kg]: a common beam, and blocks that look alike weighing alike."""
+EXPECTED_MARGIN = 0.013
 """`margin` for these masses and the nominal seesaw [m]."""
 TRANSIT = TABLE_TOP + 0.25
 """Height of the hand when it carries a block across [m]: 40 mm over a block on the raised end of the longest arm."""
@@ -177,8 +177,8 @@ class SeesawBalance(Scenario):
 
     def expected(self, side: int) -> float:
         """The place that would balance, were all masses as one expects; as far as that arm has it [m]."""
-        moment = EXPECTED_TARGET * self.offset - EXPECTED_BEAM * self.seesaw.pivot_offset
-        return self.nearest(side, -moment / EXPECTED_WEIGHT)
+        moment = EXPECTED_BLOCK * self.offset - EXPECTED_BEAM * self.seesaw.pivot_offset
+        return self.nearest(side, -moment / EXPECTED_BLOCK)
 
     def infeasible(self) -> Refutation | None:
         return self._misplaced() or self._unbalanceable() or self._too_easy()

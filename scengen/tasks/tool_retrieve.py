@@ -328,6 +328,15 @@ class ToolRetrieve(Scenario):
         yield from go_to(world, world.hand + 0.12 * UP, within=0.02)
         yield from release(world)
 
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How much of the handle is needed to reach the cube, and how far the tip reaches past it."""
+        return {
+            "shortfall over handle": self.out_of_touch / self.hook.length,
+            "tip over edge": self.hook.tip / self.cube.edge,
+        }
+
 
 def _leaning(tilt: float) -> Mat3:
     """The rotation by `tilt` [rad] that turns down towards x."""

@@ -1,0 +1,64 @@
+"""Tapes of ID twins, played out of distribution, and the card that tells of it."""
+
+import json
+
+import pytest
+
+from scengen import cli, config
+from scengen.ood import behaviour
+from scengen.ood.behaviour import BUG, COSMETIC, EXTRAPOLATION, UNKNOWN, Trial, shares, try_twins
+from scengen.statistics import wilson
+
+TASK = config.task("domino_single")
+
+
+def test_the_four_verdicts_are_what_their_names_say():
+    kinds = [Trial(0, tape, oracle, "").kind for tape, oracle in ((0, 1), (1, 1), (0, 0), (1, 0))]
+    assert kinds == [EXTRAPOLATION, COSMETIC, UNKNOWN, BUG]
+
+
+def test_shares_add_up_and_carry_wilsons_interval():
+    found = shares([Trial(k, False, k < 6, "") for k in range(8)])
+    assert sum(s.value for s in found) == 1.0 and [s.count for s in found] == [6, 0, 2, 0]
+    assert (found[0].low, found[0].high) == wilson(0.75, 8)
+
+
+def test_a_stout_first_tile_defeats_memory_and_a_light_tile_does_not(tmp_path):
+    assert {t.kind for t in try_twins(TASK, "stout_starter", tmp_path / "stout", 2)} == {EXTRAPOLATION}
+    assert {t.kind for t in try_twins(TASK, "light_tiles", tmp_path / "light", 2)} == {COSMETIC}
+
+
+def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
+    first = try_twins(TASK, "light_tiles", tmp_path, 1)
+
+    def never(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(behaviour, "_try_twin", never)
+    assert try_twins(TASK, "light_tiles", tmp_path, 1) == first
+
+
+def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
+    argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "rounds=2", f"to={tmp_path}")
+    assert cli.run((*argv, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0
+    card = json.loads((tmp_path / "card.json").read_text())
+    assert card["proofs"][0]["parameter"] == "starter.thickness" and card["proofs"][0]["gap"] == pytest.approx(0.014)
+    assert card["funnel"]["certified"] == 2 and card["behaviour"][0]["count"] == 2
+    assert card["boundaries"]["tape"]["trials"] == 8 and card["energy"]["distance"] > 1
+    page = (tmp_path / "card.html").read_text()
+    assert "true extrapolation" in page and 'src="http' not in page and "<script" not in page
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        (("axis=wide_gap",), "did you mean 'wide_gaps'"),
+        (("axis=id",), "no axis of domino_single named 'id'"),
+        (("axis=diagonal", "n=1"), "n = 1; it must be at least 2"),
+        ((), "axis needs axis=..."),
+    ],
+)
+def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
+    status = cli.run(("axis", "task=domino_single", f"to={tmp_path}", *argv))
+    told = capsys.readouterr().err
+    assert status == 2 and says in told and told.count("\n") == 1
