@@ -49,8 +49,8 @@ def view(row: Row, scenario: Scenario, replay: bool) -> None:
 
 def _look(window: mujoco.viewer.Handle, world: World) -> None:
     """Begin with the view of the pictures, without marks."""
-    view = fitted(world, 4 / 3)
+    eye = fitted(world, 4 / 3)
     with window.lock():
-        window.cam.lookat[:] = view.lookat
-        window.cam.distance, window.cam.azimuth, window.cam.elevation = view.distance, view.azimuth, view.elevation
+        window.cam.lookat[:] = eye.lookat
+        window.cam.distance, window.cam.azimuth, window.cam.elevation = eye.distance, eye.azimuth, eye.elevation
         window.opt.sitegroup[:] = 0

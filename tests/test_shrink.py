@@ -82,10 +82,17 @@ def test_the_command_explains_an_infeasible_scenario(tmp_path, capsys):
     assert "1 of" in capsys.readouterr().out
 
 
-def test_the_command_explains_a_scene_that_solves_itself(capsys):
-    """A slab of 12 by 1.5 cm whose foot is thinner still falls over by itself: the rest check fails, and nothing else matters."""
-    thin = "+task.axes.thin={replace: {slab: {thickness: 0.003}, tile: {mass: 0.08}}}"
-    assert cli.run(("shrink", "task=domino_single", thin, "split=thin", "index=0", "sampler=nonsense")) == 2
+def test_the_command_finds_two_parameters_that_only_together_make_a_scene_overlap(tmp_path):
+    """A slab turned by 90 deg reaches 22 mm farther towards the last tile, which matters only where the gap is smaller."""
+    told = tmp_path / "shrunk.json"
+    crowded = "+task.axes.crowded={replace: {gap_ratio: [uniform, 0.3, 0.4], slab_yaw: 90.0, starter: {mass: 0.1}}}"
+    assert cli.run(("shrink", "task=domino_single", crowded, "split=crowded", f"json={told}")) == 0
+    result = json.loads(told.read_text())
+    assert result["check"] == "overlap" and {c["parameter"] for c in result["causes"]} == {"gap_ratio", "slab_yaw"}
+
+
+def test_a_sampler_that_does_not_exist_is_refused(capsys):
+    assert cli.run(("shrink", "task=domino_single", "sampler=nonsense")) == 2
     assert "known: iid" in capsys.readouterr().err
 
 

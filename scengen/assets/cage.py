@@ -60,7 +60,7 @@ class HoledCage:
     """Radius of the hole."""
     offset: float = param(0.043, "m", -0.08, 0.08)
     """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
-    sill: float = param(0.005, "m", 0.0, 0.015)
+    sill: float = param(0.003, "m", 0.0, 0.015)
     """Height of the bar across the floor; it is as thick as the walls. At 0 there is none."""
     sill_x: float = param(-0.012, "m", -0.08, 0.08)
     """Where the sill stands, from the middle of the floor."""

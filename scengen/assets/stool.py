@@ -14,7 +14,7 @@ class Stool:
 
     length: float = param(0.085, "m", 0.03, 0.25)
     width: float = param(0.040, "m", 0.03, 0.25)
-    height: float = param(0.060, "m", 0.02, 0.20)
+    height: float = param(0.080, "m", 0.02, 0.20)
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: tuple[float, float, float, float] = (0.45, 0.33, 0.22, 1.0)
 

@@ -13,11 +13,7 @@ def command(arguments: Arguments) -> int:
     settings = typed("", Settings, read("record", arguments).settings)
     with Bar(err, f"record to {settings.to}", 0) as bar:
         try:
-            summary = record(
-                settings,
-                partial(config.task, search=search_path(arguments)),
-                lambda done, total, rows: bar.of(done, total),
-            )
+            summary = record(settings, partial(config.task, search=search_path(arguments)), bar.of)
         except KeyboardInterrupt:
             err.print("scengen: interrupted; nothing was written", highlight=False)
             return INTERRUPTED

@@ -10,7 +10,7 @@ bears noise; after some rounds of it the search looks where success is between 3
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,7 @@ class Way:
     """The line that an axis moves its parameters along."""
 
     def __init__(self, task: Task, axis: Axis):
-        self.task, self.axis = task, axis
+        self.task, self.axis = task, replace(axis, limits={})  # limits are what a search is to find
         if reason := no_way(task, axis):
             raise BadConfig(reason)
         self.end = self._end()

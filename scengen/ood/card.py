@@ -58,7 +58,7 @@ class Card:
     source: str
     proofs: list[Proof]
     features: list[features.Departure]
-    same_physics: bool
+    features_stay: bool
     """Whether features are declared and none of them leaves training."""
     funnel: Mapping[str, int]
     reasons: Mapping[str, int]
@@ -114,7 +114,7 @@ def make(
         axis.source,
         task.proofs[name],
         list(evidence.departures),
-        evidence.same_physics,
+        evidence.features_stay,
         made.funnel,
         made.reasons,
         made.first_draws,

@@ -89,12 +89,12 @@ class Summary:
     """Scenarios whose witness did not reach the goal here; their episodes say so."""
 
 
-def record(settings: Settings, find_task: Callable[[str], Task], progress: Callable[[int, int, int], None]) -> Summary:
+def record(settings: Settings, find_task: Callable[[str], Task], progress: Callable[[int, int], None]) -> Summary:
     """Write the data set that the settings describe; its folder appears when it is complete.
 
     Args:
         find_task: gives the task of a name.
-        progress: told the number of episodes that are done, of all, and of rows.
+        progress: told how many episodes are done and how many there are.
 
     Raises:
         ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.
@@ -116,7 +116,7 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
                 scenario = find_task(row["task"]).scenario(row["params"])
                 if not _episode(data, row, scenario, settings, streams):
                     failed.append(row["id"])
-                progress(len(data.episodes), count, data.rows)
+                progress(len(data.episodes), count)
         source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
         (settings.unfinished / "meta" / "scengen.json").write_text(json.dumps(source, indent=1) + "\n")
         settings.unfinished.rename(settings.to)

@@ -157,7 +157,9 @@ _BLOCK = 1024
 def _sobol(dimensions: int, block: int) -> NDArray[np.int64]:
     """Points `block * _BLOCK` and following of the plain sequence as whole numbers of 53 bits, (_BLOCK, dimensions)."""
     sequence = qmc.Sobol(dimensions, scramble=False, bits=30)
-    return (sequence.fast_forward(block * _BLOCK).random(_BLOCK) * 2**53).astype(np.int64)
+    if block:  # scipy cannot go forward by nothing
+        sequence.fast_forward(block * _BLOCK)
+    return (sequence.random(_BLOCK) * 2**53).astype(np.int64)
 
 
 @cache

@@ -8,7 +8,7 @@
 
 Bottleneck: two things keep the ball in, and each hides the other. The stool blocks the hole, so that no tilt helps
 before the cage is lifted; the sill holds the ball, so that no lift helps before the cage is tilted, towards the right
-end, past the angle at which the ball rolls over the sill: cos(tilt) = 1 - sill / radius (48.2 deg nominally).
+end, past the angle at which the ball rolls over the sill: cos(tilt) = 1 - sill / radius (36.9 deg nominally).
 
 Decisions. The paper gives the story, no numbers. (1) The sill is ours. On a bare floor the ball lies wherever the last
 jerk has left it, lifting alone empties the cage as soon as it rolls across the hole, and "the reorientation must
