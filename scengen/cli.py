@@ -21,6 +21,7 @@ VERBS = (
     "tasks",
     "evaluate",
     "axis",
+    "report",
     "robosuite",
     "plan",
     "bias",

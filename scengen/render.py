@@ -1,5 +1,6 @@
 """Pictures of scenes and film strips of rollouts. Needs OpenGL: EGL or OSMesa without a display."""
 
+import base64
 import io
 import itertools
 import os
@@ -145,3 +146,8 @@ def encode(picture: Picture, kind: str = "webp") -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, kind, quality=85)
     return buffer.getvalue()
+
+
+def address(content: bytes, kind: str) -> str:
+    """A picture as a data address, text that stands in an HTML file."""
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,6 +1,5 @@
 """What people see of a run and of a pool: the funnel, tables, and a contact sheet in one HTML file."""
 
-import base64
 import json
 from collections.abc import Mapping
 from itertools import islice
@@ -144,7 +143,7 @@ def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
 def thumbnail(row: Row, width: int = 320, height: int = 240) -> str:
     """A picture of the start of a scenario, as a data address for HTML."""
     with render.camera(row["scene_xml"], row["embodiment"], width, height) as view:
-        return "data:image/webp;base64," + base64.b64encode(render.encode(view.take())).decode()
+        return render.address(render.encode(view.take()), "webp")
 
 
 def _numbers(numbers: Mapping[str, Any]) -> str:

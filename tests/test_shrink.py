@@ -83,7 +83,7 @@ def test_the_command_explains_an_infeasible_scenario(tmp_path, capsys):
 
 
 def test_the_command_finds_two_parameters_that_only_together_make_a_scene_overlap(tmp_path):
-    """A slab turned by 90 deg reaches 22 mm farther towards the last tile, which matters only where the gap is smaller."""
+    """A slab turned by 90 deg reaches 22 mm farther towards the last tile: too far only where the gap is smaller."""
     told = tmp_path / "shrunk.json"
     crowded = "+task.axes.crowded={replace: {gap_ratio: [uniform, 0.3, 0.4], slab_yaw: 90.0, starter: {mass: 0.1}}}"
     assert cli.run(("shrink", "task=domino_single", crowded, "split=crowded", f"json={told}")) == 0

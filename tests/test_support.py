@@ -241,7 +241,7 @@ def test_a_limit_that_makes_no_sense_is_refused(boundary, error):
 def test_recorded_limits_are_found_beside_the_task_files_of_any_package(tmp_path):
     (tmp_path / "boundary").mkdir()
     (tmp_path / "boundary" / "domino_single.yaml").write_text("wide_gaps:\n  gap_ratio: 1.55\n")
-    levels = ["task=domino_single", "task.axes.wide_gaps={levels: 5, replace: {gap_ratio: [uniform, 1.25, 1.4]}}"]
-    composed = config.read("generate", [*levels, f"hydra.searchpath=[file://{tmp_path}]"])
+    asked = ["task=domino_single", "++task.axes.wide_gaps.levels=5", f"hydra.searchpath=[file://{tmp_path}]"]
+    composed = config.read("generate", asked)
     assert composed.task and composed.task.moves("wide_gaps@5") == {"gap_ratio": Fixed(1.55)}
     assert composed.resolved["task"]["boundary"] == {"wide_gaps": {"gap_ratio": 1.55}}, "the manifest records it"

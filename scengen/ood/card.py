@@ -1,11 +1,9 @@
 """The axis card: everything that is known about one OOD axis, on one page."""
 
-import base64
 import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from matplotlib.figure import Figure
 
 from .. import film, generate, render
 from ..errors import BadConfig, UnknownName
+from ..plots import svg
 from ..pool import Pool, Row
 from ..report import thumbnail
 from ..samplers.task import ID, Task
@@ -158,8 +157,8 @@ def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
         axis=task.axes[card.axis],
         spell=spell,
         steps=("proposed", *generate.STAGES),
-        bars=_svg(_bars(task, card)),
-        way=_svg(_way(card)) if card.boundaries else "",
+        bars=svg(_bars(task, card)),
+        way=svg(_way(card)) if card.boundaries else "",
         pairs=pairs,
         strips=strips,
         remark=remark,
@@ -182,17 +181,7 @@ def _strips(task: Task, row: Row) -> list[tuple[str, str]]:
     if tried:
         name, (take, episode) = max(tried.items(), key=lambda item: item[1][1].seconds)
         takes.append((f"the shortcut “{name}”: {episode.reason}", take))
-    return [(title, _data(render.encode(film.strip(take)), "webp")) for title, take in takes]
-
-
-def _data(content: bytes, kind: str) -> str:
-    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def _svg(figure: Figure) -> str:
-    buffer = BytesIO()
-    figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
-    return _data(buffer.getvalue(), "svg+xml")
+    return [(title, render.address(render.encode(film.strip(take)), "webp")) for title, take in takes]
 
 
 def _bars(task: Task, card: Card) -> Figure:

@@ -10,7 +10,7 @@ Bottleneck: the place of the counterweight follows from three masses that nobody
 The seesaw is a balance, not a plank on an edge (assets/seesaw.py): axle above the deck, stops at 10 deg. Between the
 stops its tilt is proportional to the excess moment, and the counterweight may stand within
 
-    margin = tan(5 deg) * (stiffness / g) / (mass of the counterweight),    some 8 to 30 mm,
+    margin = tan(5 deg) * (stiffness / g) / (mass of the counterweight),    some 8 to 25 mm,
 
 of the balancing place. Scenarios with less than `ROOM` of balancing deck are refuted.
 
@@ -18,12 +18,15 @@ Decisions where the paper is silent (it gives the story, the 5 deg, the pivot of
 
 * All masses are hidden; blocks and beam look the same whatever they weigh. What can be seen, may be used: geometry,
   and which side is down. The oracle starts from the masses that one would expect and learns only from tilts.
+* A place that anybody would try first must not balance: the mirror image of the target's, and the one that follows
+  if blocks that look alike weigh alike. With masses drawn at will one of them would in every second scene; therefore
+  a counterweight is clearly lighter or clearly heavier than the target.
 * The beam weighs in: its middle lies off the axle. It can even outweigh the target, so that the counterweight
   belongs on the target's own arm.
 * Level counts only hands off, with both blocks standing on the deck and nowhere else, the target where it was: else the
   hand could hold the beam, the counterweight could prop it up from the table, or both blocks could be moved to the
   axle, where they weigh nothing. None of these needs any balance of moments.
-* Held for `HOLD` seconds: the beam also sweeps through level on its way from stop to stop.
+* Level must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
 """
 
 import math
@@ -50,7 +53,7 @@ SURELY = math.radians(4.5)
 CLEARLY = math.radians(7.0)
 """Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by some 4 mm can change."""
 STAYS = 0.010
-"""How far the target may be from where it stood on the deck [m]: what a jolt of the beam may do, not what a hand does."""
+"""How far the target may be from where it stood on the deck [m]: what a jolt of the beam does, not what a hand does."""
 ROOM = 0.016
 """Least deck on which the counterweight balances [m]: 8 mm to either side, twice the error of a careful placement."""
 INNER = 0.055
@@ -58,7 +61,7 @@ INNER = 0.055
 BESIDE = 0.056
 """Least distance between the middles of two blocks [m]: 16 mm of air at 40 mm of width."""
 PALM = 0.110
-"""Half the width of the hand across the fingers, and 8 mm of air [m]: robosuite's panda_gripper.xml, hull of the hand."""
+"""Half the width of the hand across the fingers, and 8 mm of air [m]: hull of the hand in robosuite's gripper."""
 RIM = 0.004
 """Least deck beyond a block [m]."""
 EXPECTED_BEAM, EXPECTED_BLOCK = 0.28, 0.22
@@ -79,8 +82,9 @@ class SeesawBalance(Scenario):
     """A seesaw with the target on its deck, and a counterweight on the table in front of it."""
 
     HOLD = 3.0
-    """No swing passes for balance. A beam that will come to rest at 6 deg creeps through +-5 deg in (damping / stiffness)
-    ln(11 / 1) = 0.16 / 0.3 x 2.4 = 1.3 s, and the softest that is allowed, at 0.2 N m/rad, in 1.9 s."""
+    """How long the deck must stay level [s]: no swing passes for balance. A beam on its way from one side to 6 deg on
+    the other creeps through +-5 deg in (damping / stiffness) ln(11 / 1) = 0.16 / 0.26 x 2.4 = 1.5 s; 0.26 N m/rad is
+    the softest seesaw of the task file."""
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
