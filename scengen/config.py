@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -135,6 +136,8 @@ def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str,
                 node = compose(verb, overrides=[recorded, *asked], return_hydra_config=True)
         except (HydraException, OmegaConfBaseException) as error:
             raise _explain(verb, overrides, error) from None
+        except yaml.YAMLError as error:
+            raise BadConfig(f"a configuration file is no YAML: {' '.join(str(error).split())}") from None
     choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
     OmegaConf.set_struct(node, False)
     del node["hydra"]

@@ -376,7 +376,7 @@ class SeesawBalance(Scenario):
         return {
             "mirror the target": lambda world: self._once(world, self.mirror),
             "put it once": lambda world: self._once(world, self.expected(-1 if self.tilt(world) > 0 else 1)),
-            "press the deck level": self._press,
+            "hold the deck level": self._hold_level,
         }
 
     def _once(self, world: World, along: float) -> Plan:
@@ -384,10 +384,14 @@ class SeesawBalance(Scenario):
         yield from self.put(world, along)
         yield from self.watch(world)
 
-    def _press(self, world: World) -> Plan:
-        """Hold the deck level with the closed fingers: level it is, but not balanced."""
+    def _hold_level(self, world: World) -> Plan:
+        """Put the counterweight in the mirror image and hold the deck level by hand: level it is, but not balanced."""
+        yield from self._once(world, self.mirror)
         side = -1 if self.tilt(world) > 0 else 1
-        spot = self._on_deck(self.spans(side)[0][1], self.tilt(world))
-        yield from go_to(world, spot + 0.08 * UP, self._across(self.s), grip=CLOSED)
+        spot = self._on_deck(self.seesaw.ends[(side + 1) // 2] - side * 0.02, self.tilt(world))
+        frame = self._across(self.s)
+        yield from go_to(world, [*world.hand[:2], TRANSIT], frame, BRISK, within=0.03, grip=CLOSED)
+        yield from go_to(world, [*spot[:2], TRANSIT], frame, BRISK, within=0.015, grip=CLOSED)
         yield from push(world, -0.08 * UP, until=lambda: side * self.tilt(world) > 0, grip=CLOSED)
-        yield from hold(world, 2.0 * self.HOLD, CLOSED)
+        yield from hold(world, 1.2 * self.HOLD, CLOSED)
+        yield from go_to(world, world.hand + 0.08 * UP, within=0.02)
