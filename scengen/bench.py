@@ -1,11 +1,11 @@
 """The costs that scengen promises, measured as ratios within one run: `scengen bench`."""
 
 import logging
-import os
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -17,7 +17,8 @@ from rich.table import Table
 from . import config
 from .envs.gym import ScenarioEnv
 from .generate import Settings, generate
-from .pool import Pool
+from .pool import Pool, Row
+from .render import NoPictures
 from .robots import panda
 from .sim import native, scene_text
 from .sim.loop import Loop
@@ -35,14 +36,17 @@ BARS = {
 
 TICKS = 200
 """Control periods of the comparison with robosuite: two seconds."""
+CAMERA_TICKS = 20
+"""Control periods with a camera, which takes a hundred times as long without a graphics card."""
 
 
-def bench(repeats: int) -> tuple[Table, dict[str, float]]:
+def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
     """Measure everything `repeats` times and take medians of ratios.
 
     Raises:
         ImportError: robosuite's Python code does not run on this machine.
     """
+    logging.getLogger("robosuite_logs").setLevel(logging.WARNING)  # else it tells of every environment that it makes
     result = {
         "rollout_to_raw": rollout_to_raw(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
@@ -61,7 +65,11 @@ def bench(repeats: int) -> tuple[Table, dict[str, float]]:
         bar, side = BARS[name]
         holds = value <= bar if side == "at most" else value >= bar
         table.add_row(name, f"{value:.2f}", f"{side} {bar:g}: {'holds' if holds else 'MISSED'}", told[name])
-    return table, result
+    periods = costs(repeats)
+    beside = Table("control period of 10 ms", "cost (ms)", "times MuJoCo", title="environments", title_justify="left")
+    for name, value in periods.items():
+        beside.add_row(name, f"{value:.2f}", f"{value / next(iter(periods.values())):.1f}")
+    return [table, beside], {**result, "control_period_ms": periods}
 
 
 def rollout_to_raw(repeats: int) -> float:
@@ -79,25 +87,76 @@ def rollout_to_raw(repeats: int) -> float:
 
 def environment(repeats: int) -> dict[str, float]:
     """The Gymnasium environment without cameras: its step over the bare mj_step calls, and its reset [ms]."""
+    with _pool() as pool:
+        env, tape = ScenarioEnv("domino_single", pool.folder), next(pool.rows())["witness"]
+    env.reset()
+    raw = _bare(env.world, tape)
+    resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
+    ratios = [_stepping(env, tape) * len(tape) / _seconds(raw) for _ in range(repeats)]
+    return {"env_step_to_raw": statistics.median(ratios), "env_reset_ms": statistics.median(resets)}
+
+
+def costs(repeats: int) -> dict[str, float]:
+    """What a control period of 10 ms costs in each environment, same scenario, same actions, by name [ms].
+
+    Those with a camera of 256 x 256 pixels are missing where there is no OpenGL.
+    """
+    with _pool() as pool:
+        row = next(pool.rows())
+        tape = row["witness"]
+        bare = ScenarioEnv("domino_single", pool.folder)
+        seeing = ScenarioEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
+    bare.reset()
+    raw, brief = _bare(bare.world, tape), tape[:CAMERA_TICKS]
+    found = {
+        "MuJoCo: five bare mj_step": statistics.median(_seconds(raw) / len(tape) for _ in range(repeats)),
+        "scengen in Gymnasium: proprioception": statistics.median(_stepping(bare, tape) for _ in range(repeats)),
+        "robosuite: proprioception": _stepping(_robosuite(row, False), tape),
+    }
+    try:
+        found["scengen in Gymnasium: and one camera"] = _stepping(seeing, brief)
+        found["robosuite: and one camera"] = _stepping(_robosuite(row, True), brief)
+    except NoPictures as error:
+        found[f"(no cameras: {error})"] = float("nan")
+    return {name: 1000 * seconds for name, seconds in found.items()}
+
+
+@contextmanager
+def _pool() -> Iterator[Pool]:
+    """A pool of one scenario, for as long as it is needed."""
     with tempfile.TemporaryDirectory() as folder:
         composed = config.read("generate", ["task=domino_single", "n=1", f"pool={folder}/pool"])
         assert composed.task is not None
         settings = Settings(n=1, pool=f"{folder}/pool")
-        generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None)
-        env = ScenarioEnv("domino_single", f"{folder}/pool")
-        (row,) = Pool.open(f"{folder}/pool").rows()
+        yield generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None).pool
+
+
+def _robosuite(row: Row, camera: bool) -> Any:
+    """The same scenario in robosuite."""
+    from .envs.robosuite import environment  # here, because robosuite takes seconds and nothing else needs it
+
+    return environment("domino_single")(
+        robots="Panda",
+        scenario=row,
+        has_renderer=False,
+        has_offscreen_renderer=camera,
+        use_camera_obs=camera,
+        camera_names="agentview",
+        camera_heights=256,
+        camera_widths=256,
+        ignore_done=True,
+    )
+
+
+def _stepping(env: Any, actions: Tape) -> float:
+    """Mean time of a step [s]."""
     env.reset()
-    raw = _bare(env.world, row["witness"])
 
     def steps() -> None:
-        for action in row["witness"]:
+        for action in actions:
             env.step(action)
 
-    ratios, resets = [], []
-    for _ in range(repeats):
-        resets.append(1000 * _seconds(env.reset))
-        ratios.append(_seconds(steps) / _seconds(raw))
-    return {"env_step_to_raw": statistics.median(ratios), "env_reset_ms": statistics.median(resets)}
+    return _seconds(steps) / len(actions)
 
 
 def _bare(world: World, tape: Tape) -> Callable[[], None]:
@@ -138,18 +197,12 @@ def robosuite_to_ours(repeats: int) -> float:
 
 
 def _lift() -> Any:
-    """robosuite's own Lift environment without pictures, and without the log lines of its import."""
-    logging.disable(logging.WARNING)
-    backend = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = "disable"  # else robosuite wants OpenGL on import
-    try:
-        import robosuite  # here, because it takes seconds and nothing else needs it
-    finally:
-        os.environ.pop("MUJOCO_GL")
-        if backend is not None:
-            os.environ["MUJOCO_GL"] = backend
-        logging.disable(logging.NOTSET)
-    logging.getLogger("robosuite_logs").setLevel(logging.ERROR)
+    """robosuite's own Lift environment, without pictures."""
+    from .envs import robosuite_models  # noqa: F401  # keeps robosuite's import quiet
+
+    # isort: split
+    import robosuite  # here, because it takes seconds and nothing else needs it
+
     return robosuite.make(
         "Lift",
         robots="Panda",

@@ -1,4 +1,4 @@
-"""The ball leaves by the hole alone, once the stool is gone and the sill is low, and only fair problems are certified."""
+"""The ball leaves once the stool is gone and the sill is low, and what is no fair problem gets no certificate."""
 
 import math
 from dataclasses import dataclass
@@ -18,10 +18,12 @@ from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.tasks.ball_cage_escape import STILL, BallCageEscape
 from scengen.validate.certify import certify
-from scengen.validate.level import Level
+from scengen.validate.level import Level, Robust
 from scengen.validate.rollout import replay, run
 
 TASK = config.task("ball_cage_escape")
+ONE_JITTER = Level(robust=Robust(runs=1, bound=0.01))
+"""One jittered run, where certificates ask for more: what is tested here are the other checks."""
 
 
 def world(scenario, scene=None):
@@ -36,9 +38,9 @@ def play(scenario, plan):
 
 
 @pytest.mark.parametrize(("more", "outcome"), [(-6.0, "timeout"), (13.0, "success")])
-@pytest.mark.parametrize("sill", [0.004, 0.006])
+@pytest.mark.parametrize("sill", [0.003, 0.006])
 def test_the_ball_stays_behind_the_sill_below_the_angle_and_leaves_above_it(sill, more, outcome):
-    """42.8 and 53.1 deg; a held cage gives up to 5 deg."""
+    """36.9 and 53.1 deg; a held cage gives up to 5 deg."""
     scenario = BallCageEscape(cage=HoledCage(sill=sill))
     tilt = scenario.least_tilt + math.radians(more)
     assert play(scenario, lambda w: scenario._tip_only(w, tilt)).outcome == outcome
@@ -68,8 +70,8 @@ def test_half_of_the_plan_leaves_the_ball_in_the_lifted_cage(name):
     assert not w.touching("cage", "stool")
 
 
-@pytest.mark.parametrize("split", ["side_face", "turned", "tall_stool"])
-def test_a_memorised_motion_does_not_serve_where_the_hole_or_the_cage_is_elsewhere(split):
+@pytest.mark.parametrize("split", list(TASK.axes))
+def test_a_memorised_motion_serves_no_other_cage_and_no_other_stool(split):
     trained, moved = (TASK.draw(name, 0, 0).scenario for name in ("id", split))
     tape = play(trained, trained.oracle).tape
     assert not replay(moved, world(moved), tape, TASK.horizon, until_settled=True).solved
@@ -92,7 +94,7 @@ def put(w, body, pos, velocity=0.0):
         (0.2, TABLE_TOP, 0.0, True),
         (0.2, TABLE_TOP, 3 * STILL, False),
         (0.2, TABLE_TOP + 0.05, 0.0, False),
-        (-0.08 + 0.0195, TABLE_TOP + 0.06 + 0.05, 0.0, False),
+        (-0.08 + 0.0195, TABLE_TOP + 0.08 + 0.05, 0.0, False),
     ],
     ids=["lies on the table", "rolls on the table", "falls", "lies on the cage"],
 )
@@ -142,7 +144,8 @@ class Outside(BallCageEscape):
 
     def build(self):
         scene = super().build()
-        scene.body("ball").pos = self.axes.T @ ([0.2, 0.0, TABLE_TOP + self.ball.radius] - self.foot)
+        start = self.foot + np.array([self.ball_x, self.ball_y, self.cage.wall + self.ball.radius])
+        scene.body("ball").pos = [0.2, 0.0, TABLE_TOP + self.ball.radius] - start
         return scene
 
 
@@ -183,8 +186,8 @@ REFUTED = [
     BallCageEscape(cage=HoledCage(sill=0.0005)),
     BallCageEscape(stool_x=0.0),
     BallCageEscape(stool_x=0.045, stool=Stool(length=0.080), cage=HoledCage(face=SIDE)),
-    BallCageEscape(y=0.33),
-    BallCageEscape(x=0.26, yaw=90.0, stool=Stool(height=0.03)),
+    BallCageEscape(y=-0.33),
+    BallCageEscape(x=0.268, y=0.268, stool=Stool(height=0.02)),
 ]
 
 
@@ -207,7 +210,7 @@ def test_every_refutation_has_its_own_reason():
     ids=lambda value: type(value).__name__ if isinstance(value, BallCageEscape) else str(value),
 )
 def test_what_is_no_fair_problem_is_not_certified(scenario, check, verdict):
-    certificate = certify(scenario, TASK.horizon, Level(), TASK.embodiment).certificate
+    certificate = certify(scenario, TASK.horizon, ONE_JITTER, TASK.embodiment).certificate
     assert certificate.failed, "certified"
     assert (certificate.verdict, certificate.failed.name) == (verdict, check), certificate.reason
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -63,13 +64,18 @@ class Packed(Packing):
 
 
 @given(cuts)
-@settings(deadline=None, max_examples=30)
-def test_every_cut_closes_and_the_pieces_in_their_slots_leave_twice_the_clearance_between_them(scenario):
+@settings(deadline=None, max_examples=40)
+def test_every_cut_closes_exactly(scenario):
     assert guillotine.closes(scenario.slots, scenario.footprint)
     assert sum(slot.area for slot in scenario.slots) == scenario.footprint.area
+
+
+@given(cuts)
+@settings(deadline=None, max_examples=12)
+def test_the_pieces_in_their_slots_touch_nothing_but_the_floor_and_reach_the_goal(scenario):
     tight = with_values(Packed(), values(scenario))
     w = world(tight)
-    assert w.data.ncon and all(c.dist > -1e-5 for c in w.data.contact[: w.data.ncon])
+    assert all(c.dist > -1e-5 for c in w.data.contact[: w.data.ncon])
     assert tight.success(w)
     assert tight.joints == pytest.approx(_joints(tight), rel=1e-9)
 
@@ -91,7 +97,8 @@ def test_the_plan_is_one_of_few_arrangements_and_with_one_piece_exchanged_there_
 
 
 def test_the_number_of_solutions_of_the_training_scenarios_lies_between_2_and_32():
-    found = {TASK.draw("id", 0, i).scenario.solutions for i in range(40)}
+    drawn = [TASK.draw("id", 0, i).scenario for i in range(40)]
+    found = {scenario.solutions for scenario in drawn if isinstance(scenario, Packing)}
     assert min(found) == 2 and max(found) <= 32
 
 
@@ -139,16 +146,12 @@ def test_shortcuts_are_played_to_their_end_and_leave_gaps(split):
     scenario = TASK.draw(split, 0, 0).scenario
     assert isinstance(scenario, Packing)
     w = world(scenario)
-    for plan in scenario.shortcuts().values():
+    for name, plan in scenario.shortcuts().items():
         episode = run(scenario, w, plan, TASK.horizon, until_settled=True)
         assert episode.reason == "everything came to rest without reaching the goal"
-        assert scenario.gaps(w) - scenario.joints > 0.9 * min(piece.area for piece in scenario.pieces)
-
-
-def test_all_but_one_leaves_a_gap_of_the_size_of_the_last_piece():
-    w = world(NOMINAL)
-    run(NOMINAL, w, NOMINAL.shortcuts()["all but one"], TASK.horizon, until_settled=True)
-    assert NOMINAL.gaps(w) - NOMINAL.joints == pytest.approx(NOMINAL.pieces[-1].area)
+        gap = scenario.gaps(w) - scenario.joints
+        assert gap > 0.9 * min(piece.area for piece in scenario.pieces)
+        assert name != "all but one" or gap == pytest.approx(scenario.pieces[-1].area)
 
 
 def test_with_a_piece_of_the_same_area_that_does_not_fit_the_witness_leaves_pieces_on_top_of_others():
@@ -166,7 +169,7 @@ def test_with_a_piece_of_the_same_area_that_does_not_fit_the_witness_leaves_piec
 class Forged(Packing):
     """One piece is the mirror image of what was cut."""
 
-    @property
+    @cached_property
     def slots(self):
         whole = super().slots
         return (guillotine.mirrored(whole[:1], whole[0].bounds)[0], *whole[1:])
@@ -184,6 +187,9 @@ class Lenient(Packing):
 class Spared(Packing):
     """What is exchanged is exchanged for its like."""
 
+    def shortcuts(self):
+        return {}
+
     def without(self):
         return {"another piece": self.build()}
 
@@ -192,8 +198,11 @@ class Spared(Packing):
 class Clumsy(Packing):
     """The oracle turns nothing."""
 
+    def shortcuts(self):
+        return {}
+
     def oracle(self, world):
-        yield from self.shortcuts()["as they lie"](world)
+        yield from super().shortcuts()["as they lie"](world)
 
 
 TURNED = {f"spot_{i}": replace(getattr(NOMINAL, f"spot_{i}"), turn=20.0) for i in range(3)}
@@ -205,7 +214,7 @@ TURNED = {f"spot_{i}": replace(getattr(NOMINAL, f"spot_{i}"), turn=20.0) for i i
         (Forged(), "feasible", "refuted"),
         (Packing(unit=0.015, clearance=0.002), "feasible", "refuted"),
         (Packing(spot_0=Spot(x=-0.08, y=0.14)), "feasible", "refuted"),
-        (Packing(spot_1=Spot(x=0.1, y=-0.3, turn=65.0)), "feasible", "refuted"),
+        (Packing(spot_1=Spot(x=0.1, y=-0.25, turn=65.0)), "feasible", "refuted"),
         (Packing(spot_0=Spot(x=0.35, y=0.3)), "feasible", "refuted"),
         (Packing(**TURNED), "feasible", "refuted"),
         (Packed(), "unsolved", "refuted"),
@@ -216,6 +225,6 @@ TURNED = {f"spot_{i}": replace(getattr(NOMINAL, f"spot_{i}"), turn=20.0) for i i
     ids=lambda value: type(value).__name__ if isinstance(value, Packing) else str(value),
 )
 def test_what_is_no_fair_problem_is_not_certified(scenario, check, verdict):
-    certificate = certify(scenario, TASK.horizon, ONE_RUN, TASK.embodiment).certificate
+    certificate = certify(scenario, 20.0, ONE_RUN, TASK.embodiment).certificate
     failed = certificate.failed
     assert failed and (certificate.verdict, failed.name) == (verdict, check), certificate.reason

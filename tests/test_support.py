@@ -5,17 +5,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scengen import config
-from scengen.errors import BadConfig, OutOfBounds, UnknownName
+from scengen.errors import BadConfig, OutOfBounds
 from scengen.ood.axis import Axis, spell
 from scengen.ood.features import at_most, departure, sampled, unseen
 from scengen.ood.support import Interval, distance, meet, nearest
 from scengen.ood.symmetry import Symmetry, images
 from scengen.params import Parameter, parameters, values
-from scengen.samplers.dists import Fixed, Mixture, Uniform, parse
+from scengen.samplers.dists import Choice, Fixed, Mixture, Uniform, parse
 from scengen.samplers.task import ID, load
 from scengen.tasks.domino_single import DominoSingle
 
-NODE = config.read("one_task", ["task=domino_single"]).resolved["task"]
+NODE = {k: v for k, v in config.read("one_task", ["task=domino_single"]).resolved["task"].items() if k != "boundary"}
 KNOWN = {p.name: p for p in parameters(DominoSingle())}
 
 
@@ -225,10 +225,7 @@ def test_levels_of_whole_numbers_are_whole_or_refused():
 @pytest.mark.parametrize(
     ("boundary", "error"),
     [
-        ({"mien": {"gap_ratio": 1.6}}, UnknownName),
-        ({"mine": {"gap": 1.6}}, UnknownName),
         ({"mine": {"gap_ratio": 99.0}}, OutOfBounds),
-        ({"mine": {"gap_ratio": 1.0}}, BadConfig),
         ({"mine": 1.6}, BadConfig),
     ],
 )
@@ -238,10 +235,36 @@ def test_a_limit_that_makes_no_sense_is_refused(boundary, error):
         load("domino_single", {**NODE, "axes": axes, "boundary": boundary})
 
 
+def test_a_limit_inside_training_is_refused_when_the_level_is_asked_for_and_only_then():
+    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}
+    task = load("domino_single", {**NODE, "axes": axes, "boundary": {"mine": {"gap_ratio": 1.0}}})
+    assert task.draw("mine", 0, 0)
+    with pytest.raises(BadConfig, match=r"axis mine@1: .*drop the axis \(~task.axes.mine\)"):
+        task.draw("mine@1", 0, 0)
+
+
+def test_limits_of_an_axis_that_was_dropped_or_changed_do_not_stand_in_the_way():
+    boundary = {"gone": {"gap_ratio": 1.6}, "mine": {"count": 9}}
+    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}
+    assert load("domino_single", {**NODE, "axes": axes, "boundary": boundary}).axes["mine"].limits == {}
+
+
+@pytest.mark.parametrize("name", config.tasks())
+def test_every_recorded_limit_belongs_to_a_parameter_of_an_axis_with_one_way_to_go(name):
+    task, recorded = config.task(name), config.read("one_task", [f"task={name}"]).resolved["task"].get("boundary", {})
+    for axis, limits in recorded.items():
+        assert set(limits) <= set(task.axes[axis].limits), "a name in conf/boundary is wrong"
+        assert not any(isinstance(task.axes[axis].replace[n], Choice) for n in task.axes[axis].limits)
+
+
 def test_recorded_limits_are_found_beside_the_task_files_of_any_package(tmp_path):
-    (tmp_path / "boundary").mkdir()
-    (tmp_path / "boundary" / "domino_single.yaml").write_text("wide_gaps:\n  gap_ratio: 1.55\n")
-    asked = ["task=domino_single", "++task.axes.wide_gaps.levels=5", f"hydra.searchpath=[file://{tmp_path}]"]
+    for group, text in (
+        ("task", (config.conf_dir() / "task" / "domino_single.yaml").read_text()),
+        ("boundary", "wide_gaps:\n  gap_ratio: 1.55\n"),
+    ):
+        (tmp_path / group).mkdir()
+        (tmp_path / group / "theirs.yaml").write_text(text)
+    asked = ["task=theirs", "++task.axes.wide_gaps.levels=5", f"hydra.searchpath=[file://{tmp_path}]"]
     composed = config.read("generate", asked)
     assert composed.task and composed.task.moves("wide_gaps@5") == {"gap_ratio": Fixed(1.55)}
     assert composed.resolved["task"]["boundary"] == {"wide_gaps": {"gap_ratio": 1.55}}, "the manifest records it"

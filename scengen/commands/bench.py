@@ -20,8 +20,9 @@ def command(arguments: Arguments) -> int:
     settings = typed("", Settings, read("bench", arguments).settings)
     if settings.repeats < 1:
         raise BadConfig(f"repeats = {settings.repeats}; it must be at least 1")
-    table, result = bench(settings.repeats)
-    out.print(table)
+    tables, result = bench(settings.repeats)
+    for table in tables:
+        out.print(table)
     if settings.json:
         write_json(settings.json, result)
     return OK

@@ -39,9 +39,9 @@ def command(arguments: Arguments) -> int:
         found = bias(table, accepted)
         if not accepted.all():
             out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
-            if len(found.marginals) > 1:
-                first, second, *_ = found.marginals
-                out.print(map_table(acceptance_map((first.name, second.name), table, accepted)))
+            moved = [m.name for m in found.marginals if m.name in among[0].numbers]  # features follow from these
+            if len(moved) > 1:
+                out.print(map_table(acceptance_map((moved[0], moved[1]), table, accepted)))
         result[name] = {**asdict(found), "flagged": found.flagged, "effective": found.effective}
         out.print(_verdict(name, found), highlight=False)
     if settings.json:
@@ -58,4 +58,6 @@ def _verdict(stage: str, found: Bias) -> str:
     if found.accepted == found.proposed:
         return f"{stage}: all of them, so that nothing was bent"
     bent = f"BENT in {', '.join(found.flagged)}" if found.flagged else "no sign of selection"
-    return f"{stage}: {bent}; the {found.accepted} accepted draws are worth {found.effective:.1f} unbiased ones or more"
+    return (
+        f"{stage}: {bent}; along the worst marginal the {found.accepted} are worth {found.effective:.1f} unbiased ones"
+    )

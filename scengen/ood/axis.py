@@ -36,7 +36,7 @@ class Axis:
     levels: int = 0
     """How many levels of severity there are, `name@1` to `name@levels`; 0 for none."""
     limits: Mapping[str, float] = field(default_factory=dict)
-    """Measured ends of the way by parameter: the farthest value at which an oracle still succeeds."""
+    """Measured ends of the way by parameter, from conf/boundary: where the oracle dies."""
 
     def prove(
         self,
@@ -94,7 +94,7 @@ class Axis:
             raise BadConfig(
                 f"axis {self.name}: {parameter.name} goes to {spell(there)}, which touches or overlaps its "
                 f"training range {spell(here)}{modulo} [{parameter.unit}] ({how}); move it outside, "
-                f"narrow the range in `id`, or drop the axis (~task.axes.{self.name})"
+                f"narrow the range in `id`, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
             )
         finite = (Fixed, Choice, Integer)
         kind = "categorical" if isinstance(there, finite) or isinstance(here, finite) else "interval"
@@ -116,7 +116,7 @@ class Axis:
                 raise BadConfig(
                     f"axis {self.name}: {', '.join(self.replace)} move, but the scenes are training scenes again under "
                     f"the symmetries of the family ({', '.join(s.name for s in symmetries)}); move a parameter that "
-                    f"they do not take back, or drop the axis (~task.axes.{self.name})"
+                    f"they do not take back, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
                 )
 
     def _on_the_way(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:

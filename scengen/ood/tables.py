@@ -25,11 +25,11 @@ def bias_table(found: Bias, title: str) -> Table:
         rates = "  ".join(f"{c.rate:.0%}" for c in m.cells)
         lost = f", {m.lost:.0%} of the range lost" if m.lost else ""
         table.add_row(
-            f"{mark}{m.name}", f"{m.ks:.2f}", f"{m.energy:.2f}", f"{m.pvalue:.3f}", rates, f"{m.effective:.1f}{lost}"
+            f"{mark}{m.name}", f"{m.ks:.2f}", f"{m.energy:.2f}", _chance(m.pvalue), rates, f"{m.effective:.1f}{lost}"
         )
     mark = "[red]" if "(joint)" in found.flagged else ""
     table.add_section()
-    table.add_row(f"{mark}all together", "", f"{found.joint.distance:.2f}", f"{found.joint.pvalue:.3f}", "", "")
+    table.add_row(f"{mark}all together", "", f"{found.joint.distance:.2f}", _chance(found.joint.pvalue), "", "")
     return table
 
 
@@ -76,6 +76,10 @@ def shrunk_table(shrunk: Shrunk, units: dict[str, str]) -> Table:
         unit = units[c.parameter]
         table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.began:.4g}", f"{c.departure:.2f}")
     return table
+
+
+def _chance(pvalue: float) -> str:
+    return f"{pvalue:.3f}" if pvalue >= 0.001 else "< 0.001"
 
 
 def _part(edges: np.ndarray, i: int) -> str:

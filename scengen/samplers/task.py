@@ -109,7 +109,7 @@ class Task:
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such level.
+            BadConfig: it has no such level, or the level does not leave training.
         """
         name, at, level = part.partition("@")
         if name not in self.axes:
@@ -118,7 +118,9 @@ class Task:
             return self.axes[name]
         if not level.isdecimal():
             raise BadConfig(f"level {part}: after the @ stands a whole number, as in {name}@1")
-        return self.axes[name].at(int(level), self.training, self.known)
+        severe = self.axes[name].at(int(level), self.training, self.known)
+        self.prove(severe)
+        return severe
 
     def moves(self, split: str) -> dict[str, Dist]:
         """The distributions that a split replaces: none for `id`, those of all axes for `a+b`, levels as in `a@2+b`.
@@ -212,7 +214,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     training.update(_space(f"{name}.id", node["id"] or {}, known))
     for symmetry in family.SYMMETRIES:
         symmetry.check(known)
-    axes, limits = {}, dict(node.get("boundary") or {})
+    axes, limits = {}, node.get("boundary") or {}
     for axis, inner in (node.get("axes") or {}).items():
         where = f"{name}.axes.{axis}"
         if axis == ID or not str(axis).isidentifier():
@@ -228,10 +230,8 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
             inner.get("source", ""),
             _space(f"{where}.replace", inner["replace"], known),
             _levels(where, inner.get("levels", 0)),
-            _limits(name, axis, inner["replace"], limits.pop(axis, {}), known),
+            _limits(name, axis, inner["replace"], limits.get(axis, {}), known),
         )
-    if limits:
-        raise UnknownName(f"axis of {name} in its boundaries", next(iter(limits)), axes)
     task = Task(
         name,
         family,
@@ -244,10 +244,11 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         axes,
         node.get("certify") or {},
     )
-    for axis in task.axes.values():
-        for level in range(1, axis.levels + 1):
-            task.prove(axis.at(level, training, known))
     _ = task.proofs
+    for axis in task.axes.values():
+        if not axis.limits:  # those were measured with other distributions perhaps, and are looked at when asked for
+            for level in range(1, axis.levels + 1):
+                task.axis(f"{axis.name}@{level}")
     return task
 
 
@@ -299,14 +300,15 @@ def _levels(where: str, levels: Any) -> int:
 def _limits(
     task: str, axis: str, replaced: Mapping[str, Any], nodes: Any, known: Mapping[str, Parameter]
 ) -> dict[str, float]:
-    """Measured limits of the parameters of one axis, from conf/boundary/<task>.yaml."""
+    """Measured limits of the parameters of one axis, from conf/boundary/<task>.yaml.
+
+    Limits of what is no part of the axis are left alone: a command line may change or drop axes that were measured.
+    """
     where, names = f"{task}.boundary.{axis}", dict(_leaves(replaced))
     if not isinstance(nodes, Mapping):
-        raise BadConfig(f"{where} = {nodes!r}; expected parameters and the farthest values at which an oracle succeeds")
-    limits = dict(_leaves(nodes))
+        raise BadConfig(f"{where} = {nodes!r}; expected parameters and where the oracle dies")
+    limits = {name: value for name, value in _leaves(nodes) if name in names}
     for name, value in limits.items():
-        if name not in names:
-            raise UnknownName(f"parameter of {where}", name, names)
         known[name].check(f"{where}.{name}", value)
     return limits
 

@@ -310,6 +310,12 @@ class BallCageEscape(Scenario):
         yield from go_to(world, behind, within=0.01)
         yield from push(world, 0.15 * u, until=lambda: world.touched("cage", "table"))
 
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How far the cage must be tilted [rad], and the air that the hole leaves round the ball."""
+        return {"least tilt": self.least_tilt, "air over radius": self.cage.hole / self.ball.radius - 1}
+
 
 def _towards_end(tilt: float) -> Vec3:
     """Where down is in a cage whose holed end is lowered by `tilt` [rad]."""

@@ -65,6 +65,8 @@ LOWERING = 40.0
 """Speed at which it is lowered, by the clearance [1/s]: 40 mm/s at 1 mm. The hand wavers more the faster it moves."""
 CAUGHT = math.radians(0.7)
 """A piece that tilts this far while it is lowered stands on an edge [rad]; held by the cup alone it tilts 0.3 deg."""
+WRIST = math.radians(45.0)
+"""Direction of the hand for which the last joint is in the middle of its range [rad]: it may turn by 160 deg each way."""
 CALM = 0.008
 """Speed below which a piece over its slot no longer swings [m/s]."""
 FIRMLY = 0.15
@@ -317,7 +319,7 @@ class Packing(Scenario):
         name = f"piece_{i}"
         turn = float(turn_between(world.frame(name), _upright(yaw))[2])
         spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), _yaw_of(world.frame(name)))
-        down = facing_down(-turn / 2)
+        down = facing_down(WRIST - turn / 2)
         yield from go_to(world, spot + (self.thickness + 0.03) * UP, down, grip=OPEN, within=0.005)
         yield from suck(world, spot + self.thickness * UP, down)
         yield from go_to(world, world.hand + TRANSIT * UP, within=0.015)
@@ -407,7 +409,7 @@ def carry(
         GaveUp: that took longer than `give_up` [s].
     """
     end, goal, frame, setpoint = world.time + give_up, np.asarray(target, float), _upright(yaw), world.hand
-    turned = frame @ world.frame(body).T
+    turned, mean = frame @ world.frame(body).T, np.full(6, np.inf)
     aim, aim_frame = goal + turned @ (world.hand - world.pos(body)), turned @ world.hand_frame
     while not until():
         left, askew = goal - world.pos(body), turn_between(world.frame(body), frame)
@@ -417,7 +419,7 @@ def carry(
         if world.time > end:
             raise GaveUp(f"{body} stayed {1000 * error:.1f} mm and {math.degrees(angle):.1f} deg off for {give_up:g} s")
         if error < NEAR:
-            aim = aim + INTEGRAL * Loop.PERIOD * left
+            aim, aim_frame = aim + INTEGRAL * Loop.PERIOD * left, _rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_frame
         ahead = aim - setpoint
         distance = math.sqrt(ahead @ ahead)
         velocity = ahead * (min(speed, PACE * distance) / max(distance, 1e-9))
@@ -434,6 +436,14 @@ def _upright(yaw: float) -> Mat3:
     """Orientation of a body that stands upright, turned by `yaw` [rad]."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _rotation(turn: Vec3) -> Mat3:
+    """The matrix of a rotation vector [rad]."""
+    quat, mat, angle = np.empty(4), np.empty(9), math.sqrt(turn @ turn)
+    mujoco.mju_axisAngle2Quat(quat, turn / max(angle, 1e-12), angle)
+    mujoco.mju_quat2Mat(mat, quat)
+    return mat.reshape(3, 3)
 
 
 def _yaw_of(frame: Mat3) -> float:
