@@ -59,22 +59,24 @@ TRANSIT = 0.05
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
 RIM = 0.6
 """Depth of the bin by the thickness of the pieces."""
-AIM = 0.5
-"""Error with which a piece hangs over its slot before it is lowered, by the clearance: half of the room is left."""
-LOWERING = 40.0
-"""Speed at which it is lowered, by the clearance [1/s]: 40 mm/s at 1 mm. The hand wavers more the faster it moves."""
-CAUGHT = math.radians(0.7)
-"""A piece that tilts this far while it is lowered stands on an edge [rad]; held by the cup alone it tilts 0.3 deg."""
+AIM = 0.7
+"""x"""
+ABOVE = 0.003
+LOWERING = 0.03
+PATIENCE = 2.0
+SLACK = 0.0015
+"""Lag of the hand by which a piece shows that it is caught on an edge [m]: it presses there with some 1.5 N then, and
+2.5 N at 0.1 m from the cup peel it off."""
 WRIST = math.radians(45.0)
-"""Direction of the hand for which the last joint is in the middle of its range [rad]: it may turn by 160 deg each way."""
-CALM = 0.008
-"""Speed below which a piece over its slot no longer swings [m/s]."""
+"""Direction of the hand for which the last joint is in the middle of its range [rad]: 160 deg are left each way."""
+MEMORY = 0.15
+"""Time over which errors are averaged where a piece hangs over its slot [s]: noise on the actions makes it tremble."""
 FIRMLY = 0.15
 """How long the cup must hold on before a piece is lifted [s]."""
 PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
 """Carrying slows down at `PACE` [1/s] by the distance left; shares of the errors in place and turn that are asked for,
 near the 2.5 from which on the hand rings: the friction of the joints holds the last millimetre back."""
-NEAR, INTEGRAL, LEVER = 0.003, 1.5, 0.08
+NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
 
@@ -298,20 +300,19 @@ class Packing(Scenario):
 
         A piece that stands on an edge is raised and lowered again, one that came off the cup is taken up again.
         """
-        name, over = f"piece_{i}", pos + (self.thickness + 0.006) * UP
+        name, over = f"piece_{i}", pos + (self.thickness + ABOVE) * UP
 
         def lost() -> bool:
             return not world.sealed
-
-        def down() -> bool:
-            return lost() or self.lies(world, i) or world.tilt(name) > CAUGHT
 
         while not self.lies(world, i):
             if lost():
                 yield from self.lift(world, i, yaw)
                 yield from carry(world, name, _above(pos), yaw, within=0.02, until=lost)
             yield from carry(world, name, over, yaw, within=AIM * self.clearance, until=lost)
-            yield from carry(world, name, pos - 0.002 * UP, yaw, speed=LOWERING * self.clearance, until=down)
+            end = world.time + PATIENCE
+            down = lambda: lost() or self.lies(world, i) or world.time > end
+            yield from carry(world, name, pos - 0.002 * UP, yaw, LOWERING, slack=SLACK, until=down)
         yield from let_go(world)
 
     def lift(self, world: World, i: int, yaw: float) -> Plan:
@@ -396,33 +397,41 @@ def carry(
     yaw: float,
     speed: float = 0.25,
     within: float = 0.0,
+    slack: float = math.inf,
     until: Callable[[], bool] = lambda: False,
     give_up: float = 5.0,
 ) -> Plan:
     """Bring a body that hangs on the hand to `target` [m], upright and turned to `yaw` [rad], looking at the body.
 
     The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
-    against the weight and the friction of the joints. Ends when every point of the body is `within` [m] of its place
-    and the body is calm, or when `until` says so.
+    against the weight and the friction of the joints. Ends when every point of the body has been `within` [m] of its
+    place on the mean, when the hand lags by more than `slack` [m] as something is in the way, or when `until` says so.
 
     Raises:
         GaveUp: that took longer than `give_up` [s].
     """
     end, goal, frame, setpoint = world.time + give_up, np.asarray(target, float), _upright(yaw), world.hand
-    turned, mean = frame @ world.frame(body).T, np.full(6, np.inf)
+    turned, way = frame @ world.frame(body).T, goal - world.pos(body)
     aim, aim_frame = goal + turned @ (world.hand - world.pos(body)), turned @ world.hand_frame
+    way, mean = way / max(math.sqrt(way @ way), 1e-9), np.full(6, 1.0)
     while not until():
         left, askew = goal - world.pos(body), turn_between(world.frame(body), frame)
-        error, angle, pace = (math.sqrt(v @ v) for v in (left, askew, world.velocity(body)[3:]))
-        if error < within and angle * LEVER < within and pace < CALM:
+        mean = mean + Loop.PERIOD / MEMORY * (np.concatenate([left, LEVER * askew]) - mean)
+        if math.sqrt(mean @ mean) < within:
             return
         if world.time > end:
-            raise GaveUp(f"{body} stayed {1000 * error:.1f} mm and {math.degrees(angle):.1f} deg off for {give_up:g} s")
-        if error < NEAR:
-            aim, aim_frame = aim + INTEGRAL * Loop.PERIOD * left, _rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_frame
+            off = math.sqrt(left @ left), math.degrees(math.sqrt(askew @ askew))
+            raise GaveUp(f"{body} stayed {1000 * off[0]:.1f} mm and {off[1]:.1f} deg off for {give_up:g} s")
+        lag = setpoint - world.hand
+        yields = math.sqrt(lag @ lag) / slack
+        setpoint = setpoint - max(0.0, 1.0 - 1.0 / max(yields, 1e-9)) * lag
+        across = left if left @ left < NEAR**2 else left - (left @ way) * way
+        if max(across @ across, LEVER**2 * (askew @ askew)) < NEAR**2:
+            shift, aim_frame = INTEGRAL * Loop.PERIOD * across, _rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_frame
+            aim, setpoint = aim + shift, setpoint + shift
         ahead = aim - setpoint
         distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (min(speed, PACE * distance) / max(distance, 1e-9))
+        velocity = ahead * (max(0.0, 1.0 - yields) * min(speed, PACE * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
         yield firm(world, setpoint, velocity, turn_between(world.hand_frame, aim_frame))
 

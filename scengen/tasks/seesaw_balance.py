@@ -43,7 +43,7 @@ from ..errors import GaveUp
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
-from ..sim.world import ROBOT, Vec3, World
+from ..sim.world import ROBOT, Mat3, Vec3, World
 from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, release, wait
 
 LEVEL = math.radians(5.0)
@@ -341,15 +341,15 @@ class SeesawBalance(Scenario):
         yield from self.take(world, "weight")
         spot = self._on_deck(along, self.tilt(world))
         hangs = float(world.hand[2] - world.pos("weight")[2])
-        yield from go_to(world, [spot[0], spot[1], TRANSIT], self._across(self.s), BRISK, within=0.015)
-        yield from go_to(world, spot + (hangs + 0.006) * UP, self._across(self.s), BRISK, within=0.003)
+        yield from go_to(world, [spot[0], spot[1], TRANSIT], self._across(world, self.s), BRISK, within=0.015)
+        yield from go_to(world, spot + (hangs + 0.006) * UP, self._across(world, self.s), BRISK, within=0.003)
         yield from push(world, -0.04 * UP, until=lambda: world.touching("weight", BEAM))
         yield from release(world, 0.15)
         yield from go_to(world, world.hand + 0.08 * UP, speed=BRISK, within=0.02, grip=OPEN)
 
     def take(self, world: World, block: str) -> Plan:
         """Grasp a block where and as it stands, and lift it clear of everything."""
-        frame = self._across(world.frame(block)[:, 0])
+        frame = self._across(world, world.frame(block)[:, 0])
         high = 0.6 * self.weight.height * UP
         over = world.pos(block) + high
         over[2] = max(world.hand[2] - 0.02, TABLE_TOP + 0.14)
@@ -365,10 +365,14 @@ class SeesawBalance(Scenario):
         if world.tilt(BEAM) <= SURELY:
             yield from hold(world, self.HOLD)
 
-    def _across(self, along: Vec3) -> np.ndarray:
-        """The hand pointing down, closing across `along`: pads then lie against faces that no tilt turns."""
-        yaw = math.atan2(along[1], along[0])
-        return facing_down((yaw + math.pi / 2) % math.pi - math.pi / 2)
+    def _across(self, world: World, along: Vec3) -> Mat3:
+        """The hand pointing down, closing across `along`: pads then lie against faces that no tilt turns.
+
+        Of the two orientations that look alike, the one closer to the hand's own: it never turns half round.
+        """
+        x = world.hand_frame[:, 0]
+        here, there = math.atan2(-x[0], x[1]), math.atan2(along[1], along[0])
+        return facing_down(here + (there - here + math.pi / 2) % math.pi - math.pi / 2)
 
     # --- shortcuts ------------------------------------------------------------------------
 
@@ -389,9 +393,15 @@ class SeesawBalance(Scenario):
         yield from self._once(world, self.mirror)
         side = -1 if self.tilt(world) > 0 else 1
         spot = self._on_deck(self.seesaw.ends[(side + 1) // 2] - side * 0.02, self.tilt(world))
-        frame = self._across(self.s)
+        frame = self._across(world, self.s)
         yield from go_to(world, [*world.hand[:2], TRANSIT], frame, BRISK, within=0.03, grip=CLOSED)
         yield from go_to(world, [*spot[:2], TRANSIT], frame, BRISK, within=0.015, grip=CLOSED)
         yield from push(world, -0.08 * UP, until=lambda: side * self.tilt(world) > 0, grip=CLOSED)
         yield from hold(world, 1.2 * self.HOLD, CLOSED)
         yield from go_to(world, world.hand + 0.08 * UP, within=0.02)
+
+    # --- features -------------------------------------------------------------------------
+
+    def features(self) -> Mapping[str, float]:
+        """How wrong the mirror image is, and where the counterweight belongs [m]."""
+        return {"torque ratio": self.torque_ratio, "place of balance": self.balance}
