@@ -178,7 +178,7 @@ class Spared(BallCageEscape):
 REFUTED = [
     BallCageEscape(cage=HoledCage(hole=0.024)),
     BallCageEscape(cage=HoledCage(hole=0.0145)),
-    BallCageEscape(cage=HoledCage(face=SIDE, offset=0.0)),
+    BallCageEscape(cage=HoledCage(face=SIDE, offset=-0.02)),
     BallCageEscape(cage=HoledCage(face=TOP)),
     BallCageEscape(cage=HoledCage(sill=0.010)),
     BallCageEscape(ball_y=0.02),

@@ -62,7 +62,7 @@ class HoledCage:
     """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
     sill: float = param(0.003, "m", 0.0, 0.015)
     """Height of the bar across the floor; it is as thick as the walls. At 0 there is none."""
-    sill_x: float = param(-0.012, "m", -0.08, 0.08)
+    sill_x: float = param(-0.026, "m", -0.08, 0.08)
     """Where the sill stands, from the middle of the floor."""
     mass: float = param(0.100, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)

@@ -8,6 +8,8 @@ import mujoco
 from ..params import check_bounds, param
 from .scene import PRIORITY, STIFF, show
 
+Point = tuple[float, float]
+"""A place seen from above [m], in the axes of a piece."""
 Box = tuple[float, float, float, float]
 """Middle x and y, half width and half height [m], in the axes of a piece."""
 
@@ -29,6 +31,8 @@ class LPiece:
     upright: float = param(0.038, "m", 0.01, 0.20)
     lying: float = param(0.038, "m", 0.01, 0.20)
     thickness: float = param(0.020, "m", 0.006, 0.05)
+    rounding: float = param(0.003, "m", 0.0005, 0.005)
+    """Radius of the lower edges, as a moulded or sanded piece has them."""
     mass: float = param(0.060, "kg", 0.005, 1.0)
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: tuple[float, float, float, float] = (0.86, 0.55, 0.24, 1.0)
@@ -68,18 +72,41 @@ class LPiece:
             raise ValueError(f"no arm of the piece is {2000 * cup:.0f} mm wide; a cup of that size finds no face")
         return min(points, key=lambda p: math.dist(p, self.centroid))
 
+    @property
+    def edges(self) -> list[tuple[Point, Point]]:
+        """The outline of the foot, further in by the radius of the edges: six stretches, seen from above [m]."""
+        r, x, y = self.rounding, self.width / 2, self.height / 2
+        left, right, beside = r - x, x - r, self.upright - x - r
+        near, far, above = r - y, y - r, self.lying - y - r
+        ring = [(left, near), (right, near), (right, above), (beside, above), (beside, far), (left, far)]
+        return list(zip(ring, [*ring[1:], ring[0]], strict=True))
+
     def spec(self) -> mujoco.MjSpec:
+        """Boxes that begin at the height of the rounding, and capsules along the lower edges, on which it lies."""
         spec = mujoco.MjSpec()
         body = spec.worldbody.add_body(name="body")
+        half = (self.thickness - self.rounding) / 2
         for name, (x, y, half_width, half_height) in zip(("lying", "upright"), self.boxes, strict=True):
             body.add_geom(
                 name=name,
                 type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=[half_width, half_height, self.thickness / 2],
-                pos=[x, y, self.thickness / 2],
+                size=[half_width, half_height, half],
+                pos=[x, y, self.rounding + half],
                 mass=self.mass * 4 * half_width * half_height / self.area,
                 friction=[self.friction, 0.005, 0.0001],
                 condim=4,
+                solref=STIFF,
+                priority=PRIORITY,
+                rgba=self.rgba,
+            )
+        for i, (start, end) in enumerate(self.edges):
+            body.add_geom(
+                name=f"edge_{i}",
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                size=[self.rounding, 0, 0],
+                fromto=[*start, self.rounding, *end, self.rounding],
+                mass=0.0,
+                friction=[self.friction, 0.005, 0.0001],
                 solref=STIFF,
                 priority=PRIORITY,
                 rgba=self.rgba,

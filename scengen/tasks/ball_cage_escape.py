@@ -12,12 +12,14 @@ end, past the angle at which the ball rolls over the sill: cos(tilt) = 1 - sill 
 
 Decisions. The paper gives the story, no numbers. (1) The sill is ours. On a bare floor the ball lies wherever the last
 jerk has left it, lifting alone empties the cage as soon as it rolls across the hole, and "the reorientation must
-account for the ball's position" would be an accident; with the sill it is a law with a number. (2) The jaw holds the
-cage across its width, the one edge that it can span; walls are translucent so that cameras see ball and hole. (3) The
-stool is fixed: a tipping stool would be another task. (4) The ball must come to rest on the table. A ball on the floor
-is out of reach, hence a failure. It rolls like a felt ball (coefficient 0.04); a steel ball would leave every table.
-(5) The cage may not touch the table: knocked off its stool it tumbles, and a tumbling cage tilts without anybody having
-thought about it; whoever drops it or sets it down has given up the plan of the paper, "lift, tilt, reorient".
+account for the ball's position" would be an accident; with the sill it is a law with a number. It stands one
+centimetre before the ball: with more room the ball takes a run-up, and jumps a sill of 3 mm at half the angle. (2) The
+jaw holds the cage across its width, the one edge that it can span; walls are translucent so that cameras see ball and
+hole. (3) The stool is fixed: a tipping stool would be another task. (4) The ball must come to rest on the table. A ball
+on the floor is out of reach, hence a failure. It rolls like a felt ball (coefficient 0.04); a steel ball would leave
+every table. (5) The cage may not touch the table: knocked off its stool it tumbles, and a tumbling cage tilts without
+anybody having thought about it; whoever drops it or sets it down has given up the plan of the paper, "lift, tilt,
+reorient".
 """
 
 import dataclasses
@@ -78,7 +80,7 @@ class BallCageEscape(Scenario):
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     """Where the end with the hole points; at 0 straight away from the robot."""
-    ball_x: float = param(-0.032, "m", -0.1, 0.1)
+    ball_x: float = param(-0.042, "m", -0.1, 0.1)
     ball_y: float = param(0.0, "m", -0.04, 0.04)
     stool_x: float = param(0.0195, "m", -0.1, 0.1)
     """Middle of the stool; 19.5 mm leave 1.5 mm of plate beyond the hole."""

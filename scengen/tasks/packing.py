@@ -309,7 +309,7 @@ class Packing(Scenario):
             if lost():
                 yield from self.lift(world, i, yaw)
                 yield from carry(world, name, _above(pos), yaw, within=0.02, until=lost)
-            yield from carry(world, name, over, yaw, within=AIM * self.clearance, until=lost)
+            yield from carry(world, name, over, yaw, within=AIM, until=lost)
             end = world.time + PATIENCE
             down = lambda: lost() or self.lies(world, i) or world.time > end
             yield from carry(world, name, pos - 0.002 * UP, yaw, LOWERING, slack=SLACK, until=down)
@@ -422,16 +422,15 @@ def carry(
         if world.time > end:
             off = math.sqrt(left @ left), math.degrees(math.sqrt(askew @ askew))
             raise GaveUp(f"{body} stayed {1000 * off[0]:.1f} mm and {off[1]:.1f} deg off for {give_up:g} s")
-        lag = setpoint - world.hand
-        yields = math.sqrt(lag @ lag) / slack
-        setpoint = setpoint - max(0.0, 1.0 - 1.0 / max(yields, 1e-9)) * lag
+        lag = max(0.0, float((setpoint - world.hand) @ way))
+        setpoint = setpoint - max(0.0, lag - slack) * way
         across = left if left @ left < NEAR**2 else left - (left @ way) * way
         if max(across @ across, LEVER**2 * (askew @ askew)) < NEAR**2:
             shift, aim_frame = INTEGRAL * Loop.PERIOD * across, _rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_frame
             aim, setpoint = aim + shift, setpoint + shift
         ahead = aim - setpoint
         distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (max(0.0, 1.0 - yields) * min(speed, PACE * distance) / max(distance, 1e-9))
+        velocity = ahead * (max(0.0, 1.0 - lag / slack) * min(speed, PACE * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
         yield firm(world, setpoint, velocity, turn_between(world.hand_frame, aim_frame))
 

@@ -52,8 +52,10 @@ SURELY = math.radians(4.5)
 """Tilt with which the oracle is content [rad]: a beam that looks at rest at 0.01 rad/s may creep by another 0.4 deg."""
 CLEARLY = math.radians(7.0)
 """Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by some 4 mm can change."""
-STAYS = 0.010
-"""How far the target may be from where it stood on the deck [m]: what a jolt of the beam does, not what a hand does."""
+STAYS = 0.015
+"""How far the target may be from where it stood on the deck [m]. A heavy counterweight that is let go far out throws
+the deck against its stop, and the target hops by up to 10 mm. A hand that levels the deck by moving the target, with
+the counterweight in the mirror image, would have to move it by 17 mm and more (least of 200 training draws)."""
 ROOM = 0.016
 """Least deck on which the counterweight balances [m]: 8 mm to either side, twice the error of a careful placement."""
 INNER = 0.055
