@@ -20,13 +20,15 @@ Decisions, where the paper (App. B, T33) says no more than "L-shaped pieces", "b
   arrangement that does this counts, not the planned one alone; `solutions` says how many there are.
 * Cuts fall on a grid. Lengths of strips between cuts are the parameters, so that every combination closes exactly.
 * The bin is fixed to the table and lower than the pieces, so that the cup never meets a wall.
+* The lower edges of the pieces are round, by 3 mm. With sharp ones a piece has to be held within its clearance on all
+  six sides at once to enter its slot, which neither a person at a gamepad nor a hand under noise can do.
 * Table 3 of the paper (line 512) lists the task under "jaw"; its description says suction, and a jaw could not let go
   of a piece between two others. It is suction here.
 """
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -40,17 +42,16 @@ from ..assets.bin import Bin
 from ..assets.guillotine import Ell, Rect
 from ..assets.l_piece import Box, LPiece
 from ..assets.scene import TABLE_TOP, UP, place, table
-from ..errors import GaveUp
 from ..params import check_bounds, param
 from ..robots.panda import REACH, SHOULDER
 from ..robots.suction import REACHES
-from ..scenario import Action, Plan, Planner, Refutation, Scenario
-from ..sim.loop import Loop
-from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, release, steer, turn_between
+from ..scenario import Plan, Planner, Refutation, Scenario
+from ..sim.world import ROBOT, Vec3, World
+from ..validate.moves import OPEN, facing_down, go_to, turn_between
+from ..validate.suction import carry, let_go, suck, upright, yaw_of
 
 FLAT = math.radians(2.0)
-"""Largest tilt of a piece that lies flat [rad]. A piece with one long side on a neighbour tilts by 6 deg and more."""
+"""Largest tilt of a piece that lies flat [rad]. The thinnest piece with a side on a neighbour tilts by 4 deg."""
 DOWN = 0.0015
 """Largest height of a piece's foot above the bin's floor where it lies on it [m]."""
 APART = 0.008
@@ -59,25 +60,17 @@ TRANSIT = 0.05
 """Height above the table at which pieces are carried [m], twice what stands in the way."""
 RIM = 0.6
 """Depth of the bin by the thickness of the pieces."""
-AIM = 0.7
-"""x"""
 ABOVE = 0.003
-LOWERING = 0.03
+"""Height above its neighbours at which a piece hangs over its slot before it is lowered [m]."""
+AIM = 0.0015
+"""Mean error that is good enough there [m]: half the radius of a piece's lower edges, which guide it from then on."""
+LOWERING, SLACK = 0.04, 0.0015
+"""Speed at which a piece is lowered [m/s], and the most by which the hand may lag [m]: a piece that is caught on an
+edge presses there with some 1.5 N then and slides in; 2.5 N at 0.1 m from the cup would peel it off."""
 PATIENCE = 2.0
-SLACK = 0.0015
-"""Lag of the hand by which a piece shows that it is caught on an edge [m]: it presses there with some 1.5 N then, and
-2.5 N at 0.1 m from the cup peel it off."""
+"""How long it may be pressed before it is raised and lowered again [s]; the way down takes half of that."""
 WRIST = math.radians(45.0)
 """Direction of the hand for which the last joint is in the middle of its range [rad]: 160 deg are left each way."""
-MEMORY = 0.15
-"""Time over which errors are averaged where a piece hangs over its slot [s]: noise on the actions makes it tremble."""
-FIRMLY = 0.15
-"""How long the cup must hold on before a piece is lifted [s]."""
-PACE, FIRM, FIRM_TURN = 6.0, 1.6, 2.0
-"""Carrying slows down at `PACE` [1/s] by the distance left; shares of the errors in place and turn that are asked for,
-near the 2.5 from which on the hand rings: the friction of the joints holds the last millimetre back."""
-NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
-"""Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
 
 Corners = NDArray[np.float64]
@@ -310,16 +303,23 @@ class Packing(Scenario):
                 yield from self.lift(world, i, yaw)
                 yield from carry(world, name, _above(pos), yaw, within=0.02, until=lost)
             yield from carry(world, name, over, yaw, within=AIM, until=lost)
-            end = world.time + PATIENCE
-            down = lambda: lost() or self.lies(world, i) or world.time > end
-            yield from carry(world, name, pos - 0.002 * UP, yaw, LOWERING, slack=SLACK, until=down)
+            yield from self.lower(world, i, pos - 0.002 * UP, yaw)
         yield from let_go(world)
+
+    def lower(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
+        """Lower piece `i` softly until it lies, came off the cup, or will not go."""
+        end = world.time + PATIENCE
+
+        def done() -> bool:
+            return self.lies(world, i) or not world.sealed or world.time > end
+
+        yield from carry(world, f"piece_{i}", pos, yaw, LOWERING, slack=SLACK, until=done)
 
     def lift(self, world: World, i: int, yaw: float) -> Plan:
         """Take piece `i` up by suction, the wrist turned away by half of the turn that will bring it to `yaw` [rad]."""
         name = f"piece_{i}"
-        turn = float(turn_between(world.frame(name), _upright(yaw))[2])
-        spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), _yaw_of(world.frame(name)))
+        turn = float(turn_between(world.frame(name), upright(yaw))[2])
+        spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), yaw_of(world.frame(name)))
         down = facing_down(WRIST - turn / 2)
         yield from go_to(world, spot + (self.thickness + 0.03) * UP, down, grip=OPEN, within=0.005)
         yield from suck(world, spot + self.thickness * UP, down)
@@ -337,13 +337,13 @@ class Packing(Scenario):
     def _as_they_lie(self, world: World) -> Plan:
         """Every piece over its own slot, without turning it."""
         for i in range(self.count):
-            yield from self.drop(world, i, self.goal(i)[0], _yaw_of(world.frame(f"piece_{i}")))
+            yield from self.drop(world, i, self.goal(i)[0], yaw_of(world.frame(f"piece_{i}")))
 
     def _squared_up(self, world: World) -> Plan:
         """Every piece over its own slot, turned no farther than it takes to have its sides along the bin's."""
         for i in range(self.count):
             pos, goal = self.goal(i)
-            wrong = round((_yaw_of(world.frame(f"piece_{i}")) - goal) / (math.pi / 2)) * math.pi / 2
+            wrong = round((yaw_of(world.frame(f"piece_{i}")) - goal) / (math.pi / 2)) * math.pi / 2
             yield from self.drop(world, i, pos, goal + wrong)
 
     def drop(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
@@ -364,99 +364,9 @@ class Packing(Scenario):
             yield from self.pack(world, i, *self.goal(i))
 
 
-def suck(world: World, spot: Vec3, frame: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
-    """Press the cup onto a face at `spot` [m] until it has held on for `FIRMLY` [s]; by then it lies flat.
-
-    Raises:
-        GaveUp: that took longer than `give_up` [s].
-    """
-    end, sealed, setpoint = world.time + give_up, world.time, np.array([spot[0], spot[1], world.hand[2]])
-    while world.time - sealed < FIRMLY:
-        if world.time > end:
-            raise GaveUp(f"the cup did not get hold of anything for {give_up:g} s")
-        if not world.sealed:
-            sealed, setpoint = world.time, setpoint - speed * Loop.PERIOD * UP
-        yield firm(world, setpoint, -speed * UP * (not world.sealed), turn_between(world.hand_frame, frame))
-
-
-def let_go(world: World) -> Plan:
-    """Suction off, and straight up."""
-    yield from release(world, seconds=0.1)
-    yield from go_to(world, world.hand + 0.04 * UP, within=0.01)
-
-
-def firm(world: World, setpoint: Vec3, velocity: Vec3, turn: Vec3) -> Action:
-    """As `steer` with suction on, but stiffer: for the last millimetres of slow moves, where friction holds back."""
-    return steer(world, world.hand + FIRM * (setpoint - world.hand), velocity, FIRM_TURN * turn, CLOSED)
-
-
-def carry(
-    world: World,
-    body: str,
-    target: Vec3,
-    yaw: float,
-    speed: float = 0.25,
-    within: float = 0.0,
-    slack: float = math.inf,
-    until: Callable[[], bool] = lambda: False,
-    give_up: float = 5.0,
-) -> Plan:
-    """Bring a body that hangs on the hand to `target` [m], upright and turned to `yaw` [rad], looking at the body.
-
-    The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
-    against the weight and the friction of the joints. Ends when every point of the body has been `within` [m] of its
-    place on the mean, when the hand lags by more than `slack` [m] as something is in the way, or when `until` says so.
-
-    Raises:
-        GaveUp: that took longer than `give_up` [s].
-    """
-    end, goal, frame, setpoint = world.time + give_up, np.asarray(target, float), _upright(yaw), world.hand
-    turned, way = frame @ world.frame(body).T, goal - world.pos(body)
-    aim, aim_frame = goal + turned @ (world.hand - world.pos(body)), turned @ world.hand_frame
-    way, mean = way / max(math.sqrt(way @ way), 1e-9), np.full(6, 1.0)
-    while not until():
-        left, askew = goal - world.pos(body), turn_between(world.frame(body), frame)
-        mean = mean + Loop.PERIOD / MEMORY * (np.concatenate([left, LEVER * askew]) - mean)
-        if math.sqrt(mean @ mean) < within:
-            return
-        if world.time > end:
-            off = math.sqrt(left @ left), math.degrees(math.sqrt(askew @ askew))
-            raise GaveUp(f"{body} stayed {1000 * off[0]:.1f} mm and {off[1]:.1f} deg off for {give_up:g} s")
-        lag = max(0.0, float((setpoint - world.hand) @ way))
-        setpoint = setpoint - max(0.0, lag - slack) * way
-        across = left if left @ left < NEAR**2 else left - (left @ way) * way
-        if max(across @ across, LEVER**2 * (askew @ askew)) < NEAR**2:
-            shift, aim_frame = INTEGRAL * Loop.PERIOD * across, _rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_frame
-            aim, setpoint = aim + shift, setpoint + shift
-        ahead = aim - setpoint
-        distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (max(0.0, 1.0 - lag / slack) * min(speed, PACE * distance) / max(distance, 1e-9))
-        setpoint = setpoint + velocity * Loop.PERIOD
-        yield firm(world, setpoint, velocity, turn_between(world.hand_frame, aim_frame))
-
-
 def _above(pos: Vec3) -> Vec3:
     """The place at which a piece is carried over `pos` [m]."""
     return np.array([pos[0], pos[1], TABLE_TOP + TRANSIT])
-
-
-def _upright(yaw: float) -> Mat3:
-    """Orientation of a body that stands upright, turned by `yaw` [rad]."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _rotation(turn: Vec3) -> Mat3:
-    """The matrix of a rotation vector [rad]."""
-    quat, mat, angle = np.empty(4), np.empty(9), math.sqrt(turn @ turn)
-    mujoco.mju_axisAngle2Quat(quat, turn / max(angle, 1e-12), angle)
-    mujoco.mju_quat2Mat(mat, quat)
-    return mat.reshape(3, 3)
-
-
-def _yaw_of(frame: Mat3) -> float:
-    """Direction of a body's x axis, seen from above [rad]."""
-    return math.atan2(frame[1, 0], frame[0, 0])
 
 
 def _turned(point: tuple[float, float], yaw: float) -> Vec3:
