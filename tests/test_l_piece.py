@@ -44,7 +44,7 @@ def test_mass_and_balance_are_those_of_a_rectangle_less_its_corner(piece):
     assert piece.area == pytest.approx(area)
     assert piece.centroid == pytest.approx(balance)
     assert model.body("body").mass[0] == pytest.approx(piece.mass)
-    assert model.body("body").ipos == pytest.approx([*balance, piece.thickness / 2], abs=1e-6)
+    assert model.body("body").ipos == pytest.approx([*balance, (piece.thickness + piece.rounding) / 2], abs=1e-6)
 
 
 @given(pieces(), st.floats(0.005, 0.0135))
@@ -74,6 +74,31 @@ def test_a_piece_tips_off_an_edge_once_its_centre_of_mass_is_beyond(beyond):
     place(scene, piece, "piece", [0.08 / 12 + beyond, 0, TABLE_TOP + EDGE])
     data = lived(scene, 1.0)
     assert (data.body("piece").xpos[2] < TABLE_TOP + EDGE - 0.02) == (beyond > 0)
+
+
+@pytest.mark.parametrize(("overlap", "enters"), [(0.3, True), (1.1, False)])
+def test_the_round_edge_guides_a_piece_into_a_bin_that_it_overlaps_by_less_than_the_radius(overlap, enters):
+    scene, piece, room = table(), LPiece(width=0.08, height=0.08, friction=0.2), 0.002
+    tray = Bin(width=0.08 + 2 * room, height=0.08 + 2 * room)
+    place(scene, tray, "bin", [0, 0, TABLE_TOP], free=False)
+    off = room + overlap * piece.rounding
+    place(scene, piece, "piece", [off, 0, TABLE_TOP + tray.floor + tray.depth + 0.001])
+    data = lived(scene, 1.0)
+    assert (data.body("piece").xpos[2] < TABLE_TOP + tray.floor + 0.001) == enters
+
+
+@given(pieces())
+@settings(deadline=None, max_examples=10)
+def test_a_piece_lies_flat_on_its_five_outer_corners_and_its_foot_is_as_large_as_its_face(piece):
+    r, ends = piece.rounding, [end for edge in piece.edges for end in edge]
+    low, high = np.min(ends, axis=0) - r, np.max(ends, axis=0) + r
+    assert np.allclose([*low, *high], np.array([-piece.width, -piece.height, piece.width, piece.height]) / 2)
+    scene = table()
+    place(scene, piece, "piece", [0, 0, TABLE_TOP])
+    data = lived(scene, 0.3)
+    assert data.ncon == 5
+    assert data.body("piece").xpos[2] == pytest.approx(TABLE_TOP, abs=1e-4)
+    assert data.body("piece").xmat[8] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(("factor", "slides"), [(0.93, False), (1.07, True)])

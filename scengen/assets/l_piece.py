@@ -4,10 +4,16 @@ import math
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from ..params import check_bounds, param
 from .scene import PRIORITY, STIFF, show
 
+PROUD = 0.0002
+"""How far the five outer corners stand out below the edges [m]: a piece that lies on five points instead of twelve
+costs half the time to simulate."""
+INNER = 3
+"""The corner of the outline that points inwards."""
 Point = tuple[float, float]
 """A place seen from above [m], in the axes of a piece."""
 Box = tuple[float, float, float, float]
@@ -82,7 +88,7 @@ class LPiece:
         return list(zip(ring, [*ring[1:], ring[0]], strict=True))
 
     def spec(self) -> mujoco.MjSpec:
-        """Boxes that begin at the height of the rounding, and capsules along the lower edges, on which it lies."""
+        """Boxes from the height of the rounding upwards, capsules along the lower edges, spheres at the corners."""
         spec = mujoco.MjSpec()
         body = spec.worldbody.add_body(name="body")
         half = (self.thickness - self.rounding) / 2
@@ -100,18 +106,21 @@ class LPiece:
                 rgba=self.rgba,
             )
         for i, (start, end) in enumerate(self.edges):
-            body.add_geom(
-                name=f"edge_{i}",
-                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-                size=[self.rounding, 0, 0],
-                fromto=[*start, self.rounding, *end, self.rounding],
-                mass=0.0,
-                friction=[self.friction, 0.005, 0.0001],
-                solref=STIFF,
-                priority=PRIORITY,
-                rgba=self.rgba,
-            )
+            edge = body.add_geom(name=f"edge_{i}", type=mujoco.mjtGeom.mjGEOM_CAPSULE)
+            edge.fromto = np.array([*start, self.rounding + PROUD, *end, self.rounding + PROUD])
+            self._finish(edge)
+            if i != INNER:
+                corner = body.add_geom(name=f"corner_{i}", type=mujoco.mjtGeom.mjGEOM_SPHERE)
+                corner.pos = np.array([*start, self.rounding])
+                self._finish(corner)
         return spec
+
+    def _finish(self, geom: mujoco.MjsGeom) -> None:
+        """What all round parts have in common. The boxes carry the mass."""
+        geom.size = np.array([self.rounding, 0.0, 0.0])
+        geom.mass, geom.priority = 0.0, PRIORITY
+        geom.friction = np.array([self.friction, 0.005, 0.0001])
+        geom.solref, geom.rgba = np.array(STIFF), np.array(self.rgba, np.float32)
 
 
 def _nearest(point: tuple[float, float], box: Box, margin: float) -> tuple[float, float]:
