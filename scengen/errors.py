@@ -52,3 +52,11 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """The clause ` (did you mean 'x'?)`, or nothing when no known name is close."""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def at_least(settings: object, **lowest: float) -> None:
+    """Raise `BadConfig` for the first of the named settings that is less than its lowest value; None passes."""
+    for name, low in lowest.items():
+        value = getattr(settings, name)
+        if value is not None and value < low:
+            raise BadConfig(f"{name} = {value}; it must be at least {low:g}")

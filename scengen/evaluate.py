@@ -14,7 +14,7 @@ import numpy as np
 
 from .envs.gym import ScenarioEnv
 from .envs.observations import check_names
-from .errors import BadConfig, ScengenError
+from .errors import BadConfig, ScengenError, at_least
 from .log import Log
 from .parallel import each
 from .policies import REPLAY, Policy, find
@@ -55,9 +55,7 @@ class Settings:
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
         check_names(self.observations or [])
-        for name in ("seeds", "rollouts", "workers", "width", "height"):
-            if getattr(self, name) < 1:
-                raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least 1")
+        at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
 
 
 @dataclass(frozen=True)

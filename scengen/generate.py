@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import pool
-from .errors import BadConfig, Infeasible
+from .errors import BadConfig, Infeasible, at_least
 from .journal import Journal, Record
 from .parallel import each
 from .params import canonical
@@ -51,10 +51,7 @@ class Settings:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         task.moves(self.split)
         task.design(self.sampler)
-        for name, low in (("n", 1), ("seed", 0), ("workers", 1), ("limit", 1)):
-            value = getattr(self, name)
-            if value is not None and value < low:
-                raise BadConfig(f"{name} = {value}; it must be at least {low}")
+        at_least(self, n=1, seed=0, workers=1, limit=1)
         for verdict in self.keep:
             if verdict not in ("refuted", "unknown"):
                 raise BadConfig(f"keep = {verdict}; it must be refuted, unknown, or both")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ..bench import bench
 from ..config import read, typed
-from ..errors import BadConfig
+from ..errors import at_least
 from . import OK, Arguments, out, write_json
 
 
@@ -18,8 +18,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = typed("", Settings, read("bench", arguments).settings)
-    if settings.repeats < 1:
-        raise BadConfig(f"repeats = {settings.repeats}; it must be at least 1")
+    at_least(settings, repeats=1)
     tables, result = bench(settings.repeats)
     for table in tables:
         out.print(table)

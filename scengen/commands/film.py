@@ -6,7 +6,7 @@ from pathlib import Path
 from .. import config
 from ..config import read, search_path, typed
 from ..envs.observations import CAMERAS
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..film import WITNESS, Take, movie, shortcut, strip
 from ..pool import Pool
 from ..render import encode
@@ -36,9 +36,7 @@ class Settings:
         """Raise `BadConfig` for settings that make no sense."""
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; a film strip is a .png file, a video an .mp4 file")
-        for name in ("frames", "width", "height"):
-            if getattr(self, name) < 1:
-                raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least 1")
+        at_least(self, frames=1, width=1, height=1)
 
 
 def command(arguments: Arguments) -> int:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from rich.table import Table
 
 from ..config import read, search_path, typed
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..progress import Bar
 from . import FAILED, OK, Arguments, err, out, several, write_json
@@ -26,9 +26,7 @@ class Settings:
         """Raise `BadConfig` for a value that means nothing."""
         if not 0.0 <= self.bar <= 1.0:
             raise BadConfig(f"bar = {self.bar:g}; it is a share, between 0 and 1")
-        for name, value in (("first", self.first), ("workers", self.workers)):
-            if value is not None and value < 1:
-                raise BadConfig(f"{name} = {value}; it must be at least 1")
+        at_least(self, first=1, workers=1)
 
 
 def command(arguments: Arguments) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 
 from ..config import read, typed
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..ood.shrink import centre, shrink
 from ..ood.space import scale
 from ..ood.tables import shrunk_table
@@ -32,9 +32,7 @@ def command(arguments: Arguments) -> int:
     composed = read("shrink", arguments)
     settings, task, level = typed("", Settings, composed.settings), composed.task, composed.level
     assert task is not None
-    for name in ("seed", "index"):
-        if getattr(settings, name) < 0:
-            raise BadConfig(f"{name} = {getattr(settings, name)}; it must be at least 0")
+    at_least(settings, seed=0, index=0)
     scenario = _proposed(task, settings)
     failed = certify(scenario, task.horizon, level, task.embodiment).certificate.failed
     where = f"{task.name}/{settings.split}/{settings.index}"

@@ -5,7 +5,7 @@ from functools import partial
 
 from .. import config
 from ..config import read, search_path, typed
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..progress import Bar
 from ..validate.verify import verify
@@ -26,8 +26,7 @@ def command(arguments: Arguments) -> int:
     settings = typed("", Settings, read("verify", arguments).settings)
     if settings.expired not in ("fail", "report"):
         raise BadConfig(f"expired = {settings.expired}; it must be fail or report")
-    if settings.workers < 1:
-        raise BadConfig(f"workers = {settings.workers}; it must be at least 1")
+    at_least(settings, workers=1)
     pool = Pool.open(one(settings.pool))
     with Bar(err, f"verify {pool.folder}", len(pool)) as bar:
         find_task = partial(config.task, search=search_path(arguments))

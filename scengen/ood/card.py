@@ -11,7 +11,7 @@ import jinja2
 from matplotlib.figure import Figure
 
 from .. import film, generate, render
-from ..errors import BadConfig, UnknownName
+from ..errors import UnknownName, at_least
 from ..plots import svg
 from ..pool import Pool, Row
 from ..report import thumbnail
@@ -42,9 +42,7 @@ class Settings:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         if self.axis not in task.axes:
             raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
-        for name, low in (("n", 2), ("seed", 0), ("rounds", 2), ("workers", 1)):
-            if getattr(self, name) < low:
-                raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least {low}")
+        at_least(self, n=2, seed=0, rounds=2, workers=1)
 
 
 @dataclass(frozen=True)

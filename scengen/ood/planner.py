@@ -6,7 +6,7 @@ from statistics import NormalDist
 
 from scipy.optimize import brentq
 
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 
 _NORMAL = NormalDist()
 
@@ -35,9 +35,7 @@ class Plan:
     """Probability of finding a drop that is there."""
 
     def __post_init__(self) -> None:
-        for name, low in (("seeds", 2), ("rollouts", 1), ("comparisons", 1)):
-            if getattr(self, name) < low:
-                raise BadConfig(f"{name} = {getattr(self, name)}; it must be at least {low}")
+        at_least(self, seeds=2, rollouts=1, comparisons=1)
         for name in ("correlation", "twins"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BadConfig(f"{name} = {getattr(self, name):g}; it must lie in [0, 1]")

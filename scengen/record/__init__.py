@@ -15,7 +15,7 @@ from itertools import chain, islice
 from pathlib import Path
 
 from ..envs.observations import CAMERAS, Stream, proprioception, streams_of
-from ..errors import BadConfig, PoolError, UnknownName
+from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..film import periods_between
 from ..pool import Pool, Row
 from ..render import Camera, Picture
@@ -66,8 +66,7 @@ class Settings:
         """Raise `ScengenError` for settings that make no sense."""
         periods_between(self.fps)
         check_size(self.width, self.height)
-        if self.n is not None and self.n < 1:
-            raise BadConfig(f"n = {self.n}; it must be at least 1")
+        at_least(self, n=1)
         for name in self.eyes:
             if name not in CAMERAS:
                 raise UnknownName("camera", name, [NONE, *CAMERAS])

@@ -327,6 +327,10 @@ class Packing(Scenario):
 
     # --- shortcuts ------------------------------------------------------------------------
 
+    def features(self) -> Mapping[str, float]:
+        """How exactly a piece must be aimed, and what it weighs on the cup [kg/m^2]."""
+        return {"clearance over unit": self.clearance / self.unit, "weight over area": self.density * self.thickness}
+
     def shortcuts(self) -> Mapping[str, Planner]:
         return {
             "as they lie": self._as_they_lie,
