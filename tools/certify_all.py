@@ -4,26 +4,20 @@ import sys
 
 from scengen import cli, config
 
-n, *splits = sys.argv[1:]
-pools = [
-    (name, split)
-    for name in config.tasks()
-    for split in ("id", *config.task(name).axes)
-    if not splits or split in splits
-]
-failed = [
-    f"{name}/{split}"
-    for name, split in pools
-    if cli.run(
-        (
-            "generate",
-            f"task={name}",
-            f"split={split}",
-            f"n={n}",
-            "certify=full",
-            "workers=2",
-            f"pool=generated/certify/{name}-{split}",
-        )
-    )
-]
-sys.exit(f"fewer than {n} certified: {', '.join(failed)}" if failed else 0)
+
+def main(n: str, *splits: str) -> None:
+    """Go through all tasks and say at the end which pools fell short."""
+    failed = []
+    for task in config.tasks():
+        for split in ("id", *config.task(task).axes):
+            if splits and split not in splits:
+                continue
+            pool = f"generated/certify/{task}-{split}"
+            argv = ("generate", f"task={task}", f"split={split}", f"n={n}", "certify=full", "workers=2", f"pool={pool}")
+            if cli.run(argv):
+                failed.append(f"{task}/{split}")
+    sys.exit(f"fewer than {n} certified: {', '.join(failed)}" if failed else 0)
+
+
+if __name__ == "__main__":  # worker processes import this file again
+    main(*sys.argv[1:])
