@@ -74,6 +74,14 @@ class Scenario(abc.ABC):
         """Tempting plans that must fail: they show that the task's bottleneck is real."""
         return {}
 
+    def plays_out(self, shortcut: str) -> bool:
+        """Whether a shortcut has to fail by physics alone, seen to its end.
+
+        A certificate counts nothing else as a failure: neither a rule that ends the episode before all is at rest, nor
+        a move that gave up, nor the time limit.
+        """
+        return False
+
     def without(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene with its intended means taken away, by name: there the witness must fail."""
         return {}

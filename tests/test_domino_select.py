@@ -18,11 +18,10 @@ from scengen.sim.world import World
 from scengen.tasks.domino_select import DECOY, DRIFT, GAP, LANES, MISSING, SLAB_MOVES, Defect, DominoSelect
 from scengen.validate.certify import certify
 from scengen.validate.level import Level
-from scengen.validate.rollout import STILL, replay, run
+from scengen.validate.rollout import AT_REST, STILL, replay, run
 
 TASK = config.task("domino_select")
 SPLITS = ["id", *TASK.axes]
-AT_REST = "everything came to rest without reaching the goal"
 EVERY_KIND = DominoSelect(fourth=Defect(kind=MISSING, place=0.6), count=3)
 """One chain with each kind of defect."""
 
@@ -180,6 +179,16 @@ class Lawless(DominoSelect):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Hidden(Mended):
+    """As Mended, but a rule ends every try at a wrong chain before anybody sees that it works."""
+
+    def failure(self, world):
+        return super().failure(world) or next(
+            (f"chain {k} is wrong" for k in self.wrong if world.touched("robot", f"tile_{k}_0")), None
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class AllBroken(DominoSelect):
     """The second tile of the intact chain is missing too: of 31, 8 and 31 mm a tile of 50 mm reaches none."""
 
@@ -199,6 +208,12 @@ NEGATIVES = {
         "shortcuts",
         "refuted",
         "'topple chain 1' reaches the goal",
+    ),
+    "rule that hides what works": (
+        Hidden(count=3),
+        "shortcuts",
+        "refuted",
+        "was not seen to its end: chain 0 is wrong",
     ),
     "no rules": (Lawless(count=3), "shortcuts", "refuted", "'try a second chain' reaches the goal"),
     "no intact chain": (AllBroken(count=3), "solved", "unknown", "the oracle failed"),

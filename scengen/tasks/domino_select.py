@@ -296,6 +296,10 @@ class DominoSelect(Scenario):
             "carry the first tile to the slab": self._carry,
         }
 
+    def plays_out(self, shortcut: str) -> bool:
+        """A wrong chain must be seen to fall short: a rule that ends its cascade would hide that it works."""
+        return shortcut.startswith("topple chain")
+
     def _topple_chain(self, k: int) -> Planner:
         return lambda world: self.topple(world, f"tile_{k}_0")
 

@@ -14,7 +14,7 @@ from ..sim import scene_text
 from ..sim.loop import Loop
 from ..sim.world import IDLE, JAW, World
 from .level import Level
-from .rollout import Episode, Jitter, Tape, replay, run
+from .rollout import AT_REST, Episode, Jitter, Tape, replay, run
 
 Verdict = Literal["certified", "refuted", "unknown"]
 
@@ -201,8 +201,12 @@ class _Trial:
     def _shortcuts(self) -> "Finding":
         episodes = {name: self._run(plan, until_settled=True) for name, plan in self.scenario.shortcuts().items()}
         numbers = {name: _outcome(e) for name, e in episodes.items()}
-        easy = [name for name, e in episodes.items() if e.solved]
-        return {}, numbers, f"{easy[0]!r} reaches the goal" if easy else ""
+        for name, e in episodes.items():
+            if e.solved:
+                return {}, numbers, f"{name!r} reaches the goal"
+            if e.outcome == "unstable" or (self.scenario.plays_out(name) and e.reason != AT_REST):
+                return {}, numbers, f"{name!r} was not seen to its end: {e.reason}"
+        return {}, numbers, ""
 
     def _robust(self) -> "Finding":
         bars = self.level.robust

@@ -24,6 +24,8 @@ STILL = 1e-3
 """No coordinate of scene or robot may move faster than this [m/s, rad/s] where an episode is called settled."""
 STILL_FOR = 0.5
 """How long that must last [s]."""
+AT_REST = "everything came to rest without reaching the goal"
+"""The reason of an episode that was seen to its end."""
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,7 @@ def _live(
             period()
             verdict = judge.look(world)
             if verdict is None and stillness and source.ended and not judge.held and stillness.lasts():
-                verdict = "timeout", "everything came to rest without reaching the goal"
+                verdict = "timeout", AT_REST
         outcome, reason = verdict
         if outcome == "timeout":
             return ended(outcome, source.note or reason)
