@@ -90,6 +90,7 @@ class Scenario(abc.ABC):
         """What the physics depends on, by name: ratios and heights rather than parameters. Proves and decides nothing.
 
         Scenes that differ in every parameter may be equal in these, and then it takes no new insight to solve them.
+        A certificate records them in its first check.
         """
         return {}
 

@@ -34,6 +34,11 @@ def test_the_certificate_keeps_how_every_shortcut_ended(good):
     assert {name: end["outcome"] for name, end in ends.items()} == dict.fromkeys(ends, "failure") and len(ends) == 3
 
 
+def test_the_certificate_keeps_what_the_physics_depends_on(good):
+    features = config.task("domino_single").draw("id", 0, 1).scenario.features()
+    assert good.certificate.checks[0].name == "feasible" and good.certificate.checks[0].numbers == features
+
+
 def test_certifying_twice_gives_the_same_bits(good):
     again = certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, Level())
     assert again.digest == good.digest and np.array_equal(again.tape, good.tape)

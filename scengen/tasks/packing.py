@@ -328,8 +328,13 @@ class Packing(Scenario):
     # --- shortcuts ------------------------------------------------------------------------
 
     def features(self) -> Mapping[str, float]:
-        """How exactly a piece must be aimed, and what it weighs on the cup [kg/m^2]."""
-        return {"clearance over unit": self.clearance / self.unit, "weight over area": self.density * self.thickness}
+        """How exactly a piece is to be aimed, its weight on the cup [kg/m^2], the largest turn [rad], all packings."""
+        return {
+            "clearance over unit": self.clearance / self.unit,
+            "weight over area": self.density * self.thickness,
+            "largest turn": math.radians(max(abs(spot.turn) for spot in self.spots)),
+            "solutions": self.solutions,
+        }
 
     def shortcuts(self) -> Mapping[str, Planner]:
         return {

@@ -331,8 +331,9 @@ class ToolRetrieve(Scenario):
     # --- features -------------------------------------------------------------------------
 
     def features(self) -> Mapping[str, float]:
-        """How much of the handle is needed to reach the cube, and how far the tip reaches past it."""
+        """How far out of touch the cube is [m], as a share of the handle too, and how far the tip reaches past it."""
         return {
+            "out of touch": self.out_of_touch,
             "shortfall over handle": self.out_of_touch / self.hook.length,
             "tip over edge": self.hook.tip / self.cube.edge,
         }

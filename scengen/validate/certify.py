@@ -131,8 +131,10 @@ class _Trial:
     # Each check returns its settings, its numbers, and the reason of its failure (empty when it passed).
 
     def _feasible(self) -> "Finding":
-        refutation = self.scenario.infeasible()
-        return {}, dict(refutation.numbers) if refutation else {}, refutation.reason if refutation else ""
+        """What refutes the scenario before anything moves; of one that stands, what its physics depends on."""
+        if refutation := self.scenario.infeasible():
+            return {}, dict(refutation.numbers), refutation.reason
+        return {}, dict(self.scenario.features()), ""
 
     def _compiles(self) -> "Finding":
         try:
