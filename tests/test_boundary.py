@@ -70,6 +70,13 @@ def test_the_way_leads_from_the_edge_of_training_through_the_axis_to_the_bounds(
     assert way.single(way.end + boundary.STEP)["gap_ratio"] > TASK.known["gap_ratio"].high
 
 
+@pytest.mark.parametrize(("name", "end"), [("domino_single", 45.0), ("domino_select", -90.0)])
+def test_a_way_ends_where_it_would_come_nearer_to_training_again(name, end):
+    task = config.task(name)  # trained along {0, 90} and along {0, 180} deg
+    way = Way(task, task.axes["diagonal"])
+    assert way.values(way.end, 0, 0)["heading"] == pytest.approx(end)
+
+
 def test_an_axis_of_separate_values_has_no_way(tmp_path):
     task = config.task("tool_retrieve")
     with pytest.raises(BadConfig, match=r"moves hook\.mirrored, which takes separate values"):

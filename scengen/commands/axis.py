@@ -35,15 +35,18 @@ def _table(card: Card) -> Table:
     for proof in card.proofs:
         relative = f" = {proof.relative:.2g} training ranges" if proof.relative else ""
         table.add_row("outside", f"{proof.parameter}: gap {proof.gap:.3g}{relative} ({proof.kind})")
+    for found in card.features:
+        how = f"{found.inside} of {found.draws} draws inside training"
+        table.add_row("physics", f"{found.feature}: " + (f"leaves training ({found.kind})" if found.leaves else how))
     table.add_row("solvable", f"{card.funnel['certified']} of {card.funnel['proposed']} draws certified")
     for share in card.behaviour:
         if share.count:
             told = f"{share.value:.0%}, 95 % interval {share.low:.0%} to {share.high:.0%}"
             table.add_row("behaviour", f"{share.kind}: {share.count} ({told})")
-    for who, found in card.boundaries.items():
-        at = ", ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
-        way = f"{found.middle:.2f} from {found.low:.2f} to {found.high:.2f}, way ends at {found.end:.2f}"
-        table.add_row(f"boundary of {who}", f"{found.verdict}: {way}" + (f" ({at})" if at else ""))
+    for who, edge in card.boundaries.items():
+        at = ", ".join(f"{name} = {value:.4g}" for name, value in edge.values.items())
+        way = f"{edge.middle:.2f} from {edge.low:.2f} to {edge.high:.2f}, way ends at {edge.end:.2f}"
+        table.add_row(f"boundary of {who}", f"{edge.verdict}: {way}" + (f" ({at})" if at else ""))
     if card.no_way:
         table.add_row("boundary", card.no_way)
     table.add_row("energy distance", f"{card.energy.distance:.3g} training ranges, p = {card.energy.pvalue:.3g}")

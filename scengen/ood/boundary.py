@@ -1,7 +1,7 @@
 """How far along an axis memorised tapes live, and how far the oracle: a search in the axis' own direction.
 
 A place on the way is a fraction: 0 is the edge of training, 1 the axis' far end, and beyond 1 the way goes on to the
-bounds of the parameters. Twin i is scenario i of training with the axis' parameters put at that place.
+bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training with the axis' parameters put at that place.
 
 The chance of success is taken to fall along the way as a logistic curve, 1 / (1 + exp((x - middle) / spread)); what
 is known of middle and spread is kept as a posterior on a grid. Looking at the median of the middle is bisection that
@@ -26,6 +26,7 @@ from ..samplers.task import ID, Task
 from ..validate.identity import source_sha256
 from .axis import Axis
 from .behaviour import attempt, twin_tape
+from .support import distance
 
 TAPE, ORACLE = "tape", "oracle"
 BATCH = 4
@@ -113,7 +114,8 @@ class Way:
     @property
     def spelled(self) -> str:
         """What the way depends on, in words."""
-        return str({n: (self.task.training[n].support, d.support) for n, d in self.axis.replace.items()})
+        supports = {n: (self.task.training[n].support, d.support) for n, d in self.axis.replace.items()}
+        return f"{supports}, to {self.end:g}"
 
     def values(self, place: float, seed: int, index: int) -> dict[str, Value]:
         """The axis' parameters of one twin at one place; a keyed one where there are several."""
@@ -129,10 +131,16 @@ class Way:
         return self.axis.along(place, self.task.training, self.task.known)
 
     def _end(self) -> float:
-        """The largest fraction whose values lie in the bounds of their parameters."""
-        places = np.arange(1.0, FARTHEST + STEP, STEP)
-        outside = [i for i, place in enumerate(places) if not self._inside(float(place))]
-        return float(places[outside[0] - 1 if outside else -1])
+        """The largest fraction whose values lie in the bounds of their parameters and still lead away from training."""
+        end, gaps = 1.0, self._gaps(1.0)
+        for place in np.arange(1.0 + STEP, FARTHEST + STEP / 2, STEP):
+            if not self._inside(float(place)):
+                break
+            gaps, before = self._gaps(float(place)), gaps
+            if any(gaps[name] < before[name] for name in gaps):
+                break
+            end = float(place)
+        return end
 
     def _inside(self, place: float) -> bool:
         try:
@@ -142,6 +150,13 @@ class Way:
         except OutOfBounds:
             return False
         return True
+
+    def _gaps(self, place: float) -> dict[str, float]:
+        """How far each parameter is from training at a place."""
+        return {
+            name: distance(self.task.training[name].support, dist.support, self.task.known[name].period)
+            for name, dist in self._at(place).items()
+        }
 
 
 def _try(way: Way, seed: int, place: float, index: int) -> dict[str, Any]:

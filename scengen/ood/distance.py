@@ -91,7 +91,7 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0) -> Ener
         alternative="greater",
         rng=np.random.default_rng(seed),
     )
-    return Energy(float(np.sqrt(max(0.0, tested.statistic))), float(tested.pvalue))
+    return Energy(float(np.sqrt(round(max(0.0, tested.statistic), 12))), float(tested.pvalue))
 
 
 def near_duplicates(
