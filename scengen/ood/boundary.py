@@ -1,7 +1,8 @@
 """How far along an axis memorised tapes live, and how far the oracle: a search in the axis' own direction.
 
 A place on the way is a fraction: 0 is the edge of training, 1 the axis' far end, and beyond 1 the way goes on to the
-bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training with the axis' parameters put at that place.
+bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training with the
+axis' parameters put at that place.
 
 The chance of success is taken to fall along the way as a logistic curve, 1 / (1 + exp((x - middle) / spread)); what
 is known of middle and spread is kept as a posterior on a grid. Looking at the median of the middle is bisection that
