@@ -46,7 +46,11 @@ class Scenario(abc.ABC):
     MOVING: ClassVar[tuple[str, ...]] = ()
     """Bodies that are meant to move without anybody acting; they are exempt from the rest check."""
     SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
-    """Changes of the parameters that give the same scene, besides the periods that parameters declare themselves."""
+    """Changes of the parameters that give the same scene, besides the periods that parameters declare themselves.
+
+    The mirror image of a scene is another scene: the arm is not mirrored with it, and who has learnt to use the left
+    arm of a seesaw has not learnt to use the right one. A family may declare it all the same, where that is not asked.
+    """
 
     def __post_init__(self) -> None:
         check_bounds(self)

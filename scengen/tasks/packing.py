@@ -109,7 +109,7 @@ class Packing(Scenario):
     density: float = param(600.0, "kg/m^3", 200.0, 4000.0)
     x: float = param(-0.02, "m", -0.3, 0.3)
     y: float = param(0.0, "m", -0.3, 0.3)
-    heading: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
+    heading: float = param(0.0, "deg", -90.0, 90.0)
     spot_0: Spot = Spot(x=-0.08, y=0.235, turn=65.0)
     spot_1: Spot = Spot(x=-0.12, y=-0.215, turn=-65.0)
     spot_2: Spot = Spot(x=0.10, y=-0.215, turn=65.0)
