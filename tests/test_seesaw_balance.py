@@ -15,7 +15,7 @@ from scengen.assets.seesaw import Seesaw
 from scengen.params import parameters
 from scengen.sim import scene_text
 from scengen.sim.world import IDLE, World
-from scengen.tasks.seesaw_balance import BEAM, LEVEL, STAYS, SeesawBalance
+from scengen.tasks.seesaw_balance import BEAM, LEVEL, MOVED, STAYS, SeesawBalance
 from scengen.validate.certify import certify
 from scengen.validate.level import Level
 from scengen.validate.rollout import replay, run
@@ -75,6 +75,14 @@ def test_level_with_the_target_elsewhere_is_not_the_goal():
     moved = scenario.offset - STAYS - 0.005
     w = settled(scenario, replace(scenario, offset=moved).balance, moved)
     assert w.tilt(BEAM) < LEVEL and not scenario.success(w)
+
+
+@pytest.mark.parametrize(("mass", "level"), [(0.20, True), (0.19, False)])
+def test_where_it_is_refuted_that_a_nudge_levels_the_deck_it_does(mass, level):
+    """The counterweight in the mirror image, the target brought as near to the axle as `MOVED` says."""
+    scenario = SeesawBalance(weight=Block(mass=mass))
+    w = settled(scenario, scenario.mirror, scenario.offset - MOVED)
+    assert (w.tilt(BEAM) < LEVEL) == level == (scenario.infeasible() is not None)
 
 
 @pytest.mark.parametrize("weight", [LIGHT, HEAVY])
@@ -234,6 +242,7 @@ NEGATIVES = {
     ),
     "target beyond the end": (SeesawBalance(offset=0.3), "feasible", "the target has no room on its arm"),
     "equal masses": (SeesawBalance(weight=Block(mass=0.25)), "feasible", "the mirror image of the target's place"),
+    "nearly equal masses": (SeesawBalance(weight=Block(mass=0.20)), "feasible", "once the target is nudged"),
     "masses as expected": (
         SeesawBalance(target=Block(mass=0.22), weight=Block(mass=0.22), seesaw=Seesaw(mass=0.28, pivot_offset=-0.045)),
         "feasible",

@@ -54,8 +54,9 @@ CLEARLY = math.radians(7.0)
 """Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by some 4 mm can change."""
 STAYS = 0.015
 """How far the target may be from where it stood on the deck [m]. A heavy counterweight that is let go far out throws
-the deck against its stop, and the target hops by up to 10 mm. A hand that levels the deck by moving the target, with
-the counterweight in the mirror image, would have to move it by 17 mm and more (least of 200 training draws)."""
+the deck against its stop, and the target hops by up to 10 mm."""
+MOVED = 0.017
+"""By how much the target may be moved without levelling the deck, the counterweight in its mirror image [m]."""
 ROOM = 0.016
 """Least deck on which the counterweight balances [m]: 8 mm to either side, twice the error of a careful placement."""
 INNER = 0.055
@@ -138,9 +139,13 @@ class SeesawBalance(Scenario):
 
     # --- statics --------------------------------------------------------------------------
 
-    def tilt_at(self, place: float | None) -> float:
-        """Tilt with the counterweight at `place` [m], or without it [rad]. Positive where +s is down."""
-        loads = [(self.target.mass, self.offset, self.target.height / 2)]
+    def tilt_at(self, place: float | None, moved: float = 0.0) -> float:
+        """Tilt with the counterweight at `place` [m], or without it [rad]. Positive where +s is down.
+
+        Args:
+            moved: by how much the target has been moved along s [m].
+        """
+        loads = [(self.target.mass, self.offset + moved, self.target.height / 2)]
         if place is not None:
             loads.append((self.weight.mass, place, self.weight.height / 2))
         stop = math.radians(self.seesaw.stop)
@@ -247,6 +252,9 @@ class SeesawBalance(Scenario):
             return Refutation("the seesaw is not on its stop at the start", {"tilt": alone, "stop": stop})
         if (tilt := abs(self.tilt_at(self.mirror))) < CLEARLY:
             return Refutation("the mirror image of the target's place balances", {"tilt": tilt, "needed": CLEARLY})
+        low, high = self.tilt_at(self.mirror, -MOVED), self.tilt_at(self.mirror, MOVED)
+        if low <= LEVEL and high >= -LEVEL:
+            return Refutation("the mirror image balances once the target is nudged", {"from": low, "to": high})
         if (tilt := abs(self.tilt_at(self.expected(self.raised)))) < CLEARLY:
             return Refutation("the first guess balances", {"tilt": tilt, "needed": CLEARLY})
         return None
