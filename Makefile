@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test check types format certify reference bench clean
+.PHONY: setup demo test check types format certify axes reference bench clean
 
 setup: $(READY)
 
@@ -44,6 +44,11 @@ N ?= 20
 SPLITS ?=
 certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(SPLITS)
+
+# The card of every axis of every task, and docs/axes.md: hours. N twins each; TASKS=packing takes some tasks alone.
+TASKS ?=
+axes: setup
+	$(BIN)/python tools/all_axes.py $(N) $(TASKS)
 
 # The small pool in the repository; write it anew when a family or the format changes.
 reference: setup

@@ -332,6 +332,11 @@ class DominoSelect(Scenario):
     # --- features -------------------------------------------------------------------------
 
     def features(self) -> Mapping[str, float]:
-        """How far a tile leans when it strikes the next one, and the room between chains."""
-        gap = self.gap_ratio * self.tile.width
-        return {"gap over height": gap / self.tile.height, "lane over slab width": self.lane / self.slab.width}
+        """The lean of a tile that strikes the next one, the room between chains, how narrowly chains fail; 0: none."""
+        wrong = [d for d in self.defects if d]
+        return {
+            "gap over height": self.gap / self.tile.height,
+            "lane over slab width": self.lane / self.slab.width,
+            "widest space over height, least drift": min((d.stretch for d in wrong if d.kind == DRIFT), default=0.0),
+            "offset over width, least gap": min((d.offset for d in wrong if d.kind == GAP), default=0.0),
+        }

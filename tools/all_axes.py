@@ -1,0 +1,86 @@
+"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 [task ...]`
+
+Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from scengen import cli, config
+
+PAGE = Path("docs/axes.md")
+HEAD = """# Every axis, measured
+
+Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} twins, certificates of level quick.
+
+* **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
+  **physics**: which of the features that the family declares leave training (sampled, 300 draws).
+* **certified**: how many of the first draws. **true extrapolation**: twins in which the tape that solves the training
+  twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a tape asks
+  for no new motion; it may still be hard to *see*, and a tape never looks.
+* **tape dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
+  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way.
+* **energy**: energy distance between the features of the twins [training ranges], p value of its permutation test.
+
+| task | axis | outside | physics | certified | true extrapolation | else | tape dies | oracle dies | energy |
+|---|---|---|---|---|---|---|---|---|---|
+"""
+
+
+def main(n: str, *tasks: str) -> None:
+    """Make all cards, or those of some tasks, and write the page from whatever cards there are."""
+    failed = []
+    for task in tasks or config.tasks():
+        for axis in config.task(task).axes:
+            if cli.run(("axis", f"task={task}", f"axis={axis}", f"n={n}", "workers=2")):
+                failed.append(f"{task}/{axis}")
+    PAGE.write_text(HEAD.format(n=n) + "".join(_lines()))
+    sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
+
+
+def _lines() -> list[str]:
+    """A line for each card, in the order of the task files."""
+    lines = []
+    for task in config.tasks():
+        for axis in config.task(task).axes:
+            path = Path(f"generated/axes/{task}-{axis}/card.json")
+            if path.is_file():
+                lines.append(_line(json.loads(path.read_text())))
+    return lines
+
+
+def _line(card: dict[str, Any]) -> str:
+    gaps = [p["relative"] for p in card["proofs"] if p["relative"]]
+    leaving = [d["feature"] for d in card["features"] if d["inside"] == 0]
+    share = next(s for s in card["behaviour"] if s["kind"] == "true extrapolation")
+    cells = [
+        card["task"],
+        card["axis"],
+        f"{min(gaps):.2g}" if gaps else "another value",
+        ", ".join(leaving) or "stays",
+        f"{card['first_draws']}",
+        f"{share['count']} ({share['low']:.0%} to {share['high']:.0%})",
+        ", ".join(f"{s['count']} {s['kind']}" for s in card["behaviour"] if s["count"] and s is not share),
+        _boundary(card, "tape"),
+        _boundary(card, "oracle"),
+        f"{card['energy']['distance']:.2g} (p = {card['energy']['pvalue']:.2g})",
+    ]
+    return f"| {' | '.join(cells)} |\n"
+
+
+def _boundary(card: dict[str, Any], who: str) -> str:
+    if card["no_way"]:
+        return "separate values"
+    found = card["boundaries"][who]
+    if found["verdict"].startswith("alive"):
+        return f"> {found['end']:.2f}"
+    at = ", ".join(f"{name} {value:.3g}" for name, value in found["values"].items())
+    return f"{max(found['middle'], 0):.2f} [{max(found['low'], 0):.2f}, {found['high']:.2f}]" + (
+        f": {at}" if at else ""
+    )
+
+
+if __name__ == "__main__":  # worker processes import this file again
+    main(*sys.argv[1:])
