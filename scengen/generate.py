@@ -251,7 +251,9 @@ def _finish(
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
     kept = [r.index for r in counted if r.verdict in settings.keep and r.check != "feasible"]
-    reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check)
+    reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check not in ("", "feasible"))
+    for record in counted:
+        reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
     counts = funnel(counted)
     first = sum(r.verdict == "certified" and r.proposals == 1 for r in counted)
     manifest = {

@@ -113,6 +113,16 @@ def test_fewer_than_asked_for_is_status_1_and_keeps_what_there_is(capsys, tmp_pa
     assert all("the oracle failed" in r["certificate"]["reason"] for r in opened.rejected)
 
 
+def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
+    """Indices that were drawn again, and one that could not be drawn at all."""
+    far = ("task.id.x=[uniform,0.1,0.4]", "+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=3", "n=1")
+    assert said(capsys, *GENERATE, *QUICKLY, *far, f"pool={tmp_path / 'far'}")[0] == 1
+    manifest = Pool.open(tmp_path / "far").manifest
+    infeasible = {why: n for why, n in manifest["reasons"].items() if why.startswith("feasible: ")}
+    lost = manifest["funnel"]["proposed"] - manifest["funnel"]["feasible"]
+    assert infeasible.keys() == {"feasible: the chain leaves the table"} and sum(infeasible.values()) == lost > 0
+
+
 @pytest.mark.parametrize("verb", list(cli.VERBS))
 def test_every_command_explains_its_settings(capsys, verb):
     assert cli.run((verb, "--help")) == 0
