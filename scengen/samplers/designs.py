@@ -114,6 +114,7 @@ class Grid:
 Design = Independent | Sobol | Latin | Grid
 
 
+KINDS = ("iid", "sobol", "lhs", "grid")
 SPELLED = "iid, sobol, lhs:STRATA (such as lhs:50), grid:VALUES (such as grid:3)"
 
 
@@ -139,7 +140,8 @@ def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
     if kind == "grid" and count >= 1:
         sizes = {name: _values(dist, count) for name, dist in training.items() if not isinstance(dist, Fixed)}
         return Grid(key, sizes, count)
-    raise BadConfig(f"sampler = {spelled}{nearest(kind, ('iid', 'sobol', 'lhs', 'grid'))}; known: {SPELLED}")
+    hint = f" ({kind} needs a whole number from 1 on)" if kind in KINDS[2:] else nearest(kind, KINDS)
+    raise BadConfig(f"sampler = {spelled}{hint}; known: {SPELLED}")
 
 
 def _values(dist: Dist, count: int) -> int:
