@@ -265,7 +265,8 @@ def _finish(
         "first_draws": first,
     }
     written = pool.write(folder, manifest, journal.rows(certified), list(journal.rows(kept)))
-    return Summary(written, len(certified), len(counted), counts, reasons, first, math.fsum(r.cpu for r in counted))
+    cpu = math.fsum(r.cpu for r in counted)
+    return Summary(written, len(certified), len(counted), counts, dict(reasons), first, cpu)
 
 
 _NUMBER = re.compile(r"\d+(\.\d+)?")

@@ -39,11 +39,13 @@ def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
 
 
 def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
-    argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "rounds=2", f"to={tmp_path}")
+    far = "task.id.x=[uniform,0.0,0.2]"  # with a stout first tile the chain of index 1 leaves the table
+    argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "rounds=2", far, f"to={tmp_path}")
     assert cli.run((*argv, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0
     card = json.loads((tmp_path / "card.json").read_text())
     assert card["proofs"][0]["parameter"] == "starter.thickness" and card["proofs"][0]["gap"] == pytest.approx(0.014)
-    assert card["funnel"]["certified"] == 2 and card["behaviour"][0]["count"] == 2
+    assert card["funnel"]["certified"] == 2 and [s["count"] for s in card["behaviour"]] == [1, 0, 1, 0]
+    assert card["reasons"]["feasible: the chain leaves the table"] == card["funnel"]["proposed"] - 2
     assert card["boundaries"]["tape"]["trials"] == 8 and card["energy"]["distance"] > 1
     page = (tmp_path / "card.html").read_text()
     assert "true extrapolation" in page and 'src="http' not in page and "<script" not in page
