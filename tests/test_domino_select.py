@@ -201,6 +201,13 @@ class AllBroken(DominoSelect):
         return {}
 
 
+def test_a_wrong_chain_that_rocks_beyond_the_time_limit_is_seen_to_its_end():
+    scenario = TASK.draw("narrow_lanes", 0, 48).scenario
+    checks = certify(scenario, TASK.horizon, Level(), last="shortcuts").certificate.checks
+    (check,) = (c for c in checks if c.name == "shortcuts")
+    assert check.passed and check.numbers["topple chain 3"]["seconds"] > TASK.horizon
+
+
 NEGATIVES = {
     "gap that is mended": (Mended(count=3), "shortcuts", "refuted", "'topple chain 0' reaches the goal"),
     "drift that slides across": (
