@@ -17,7 +17,7 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
-* **certified**: how many of the first draws. **true extrapolation**: twins in which the tape that solves the training
+* **certified**: of how many indices. **true extrapolation**: twins in which the tape that solves the training
   twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a tape asks
   for no new motion; it may still be hard to *see*, and a tape never looks.
 * **tape dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
@@ -60,7 +60,7 @@ def _line(card: dict[str, Any]) -> str:
         card["axis"],
         f"{min(gaps):.2g}" if gaps else "another value",
         ", ".join(leaving) or "stays",
-        f"{card['first_draws']}",
+        f"{card['funnel']['certified']} of {card['indices']}",
         f"{share['count']} ({share['low']:.0%} to {share['high']:.0%})",
         ", ".join(f"{s['count']} {s['kind']}" for s in card["behaviour"] if s["count"] and s is not share),
         _boundary(card, "tape"),

@@ -38,7 +38,8 @@ def _table(card: Card) -> Table:
     for found in card.features:
         how = f"{found.inside} of {found.draws} draws inside training"
         table.add_row("physics", f"{found.feature}: " + (f"leaves training ({found.kind})" if found.leaves else how))
-    table.add_row("solvable", f"{card.funnel['certified']} of {card.funnel['proposed']} draws certified")
+    solvable = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
+    table.add_row("solvable", solvable)
     for share in card.behaviour:
         if share.count:
             told = f"{share.value:.0%}, 95 % interval {share.low:.0%} to {share.high:.0%}"

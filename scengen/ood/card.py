@@ -59,8 +59,10 @@ class Card:
     """Whether features are declared and none of them leaves training."""
     funnel: Mapping[str, int]
     reasons: Mapping[str, int]
+    indices: int
+    """How many indices had to be tried for n certified scenarios."""
     first_draws: int
-    """How many of the first n indices were certified."""
+    """How many of them were certified as first drawn."""
     behaviour: list[behaviour.Share]
     boundaries: dict[str, boundary.Boundary]
     no_way: str
@@ -114,6 +116,7 @@ def make(
         evidence.features_stay,
         made.funnel,
         made.reasons,
+        made.indices,
         made.first_draws,
         behaviour.shares(trials),
         boundaries,
