@@ -270,18 +270,18 @@ def _check_keys(where: str, node: Mapping[str, Any], required: tuple[str, ...], 
         raise BadConfig(f"{where} lacks {', '.join(missing)}")
 
 
-def _leaves(nodes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(nodes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Flatten `{tile: {mass: [uniform, ..]}}` to `tile.mass, [uniform, ..]`."""
     for key, node in nodes.items():
         if isinstance(node, Mapping):
-            yield from _leaves(node, f"{prefix}{key}.")
+            yield from leaves(node, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", node
 
 
 def _space(where: str, nodes: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Dist]:
     space: dict[str, Dist] = {}
-    for name, node in _leaves(nodes):
+    for name, node in leaves(nodes):
         if name not in known:
             raise UnknownName(f"parameter in {where}", name, known)
         dist = parse(f"{where}.{name}", node)
@@ -304,10 +304,10 @@ def _limits(
 
     Limits of what is no part of the axis are left alone: a command line may change or drop axes that were measured.
     """
-    where, names = f"{task}.boundary.{axis}", dict(_leaves(replaced))
+    where, names = f"{task}.boundary.{axis}", dict(leaves(replaced))
     if not isinstance(nodes, Mapping):
         raise BadConfig(f"{where} = {nodes!r}; expected parameters and where the oracle dies")
-    limits = {name: value for name, value in _leaves(nodes) if name in names}
+    limits = {name: value for name, value in leaves(nodes) if name in names}
     for name, value in limits.items():
         known[name].check(f"{where}.{name}", value)
     return limits
