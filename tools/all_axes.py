@@ -21,7 +21,8 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
   twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a tape asks
   for no new motion; it may still be hard to *see*, and a tape never looks.
 * **tape dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
-  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way.
+  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way. `at the edge`: a tape
+  that fails as soon as its scene's own value is exchanged for the nearest end of training.
 * **energy**: energy distance between the features of the twins [training ranges], p value of its permutation test.
 
 | task | axis | outside | physics | certified | true extrapolation | else | tape dies | oracle dies | energy |
