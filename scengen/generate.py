@@ -7,7 +7,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -91,8 +91,8 @@ def generate(task: Task, node: Mapping[str, Any], level: Level, settings: Settin
     """
     settings.check(task)
     folder = Path(settings.pool or Path("generated", f"{task.name}-{settings.split}"))
-    config = {k: v for k, v in node.items() if k not in ("workers", "pool", "limit", "n")}
-    config = {**config, "task": {"name": task.name, **node["task"]}}
+    drawn = {k: v for k, v in asdict(settings).items() if k in ("split", "sampler", "seed", "keep")}
+    config = {"task": {"name": task.name, **node["task"]}, "certify": node["certify"], **drawn}
     identity = {"config": config, **_made_with(task)}
     journal = Journal(folder, identity)
     try:

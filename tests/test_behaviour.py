@@ -49,6 +49,9 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     assert card["boundaries"]["tape"]["trials"] == 8 and card["energy"]["distance"] > 1
     page = (tmp_path / "card.html").read_text()
     assert "true extrapolation" in page and 'src="http' not in page and "<script" not in page
+    longer = [a.replace("rounds=2", "rounds=3") for a in argv]
+    assert cli.run((*longer, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0, "a card can be continued"
+    assert json.loads((tmp_path / "card.json").read_text())["boundaries"]["tape"]["trials"] > 8
 
 
 @pytest.mark.parametrize(
