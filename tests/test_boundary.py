@@ -15,13 +15,13 @@ TASK = config.task("domino_single")
 
 @pytest.fixture
 def world_where(monkeypatch):
-    """Tapes live up to one place of the way and oracles up to another, each with some blur."""
+    """Tapes live up to one place of the way and oracles up to another, each with some blur; later some come back."""
 
-    def make(tape, oracle, blur=0.05):
+    def make(tape, oracle, blur=0.05, revival=math.inf):
         def tried(way, seed, place, index):
             def lives(who, middle):
                 chance = 1 / (1 + math.exp(min(500.0, (place - middle) / blur)))
-                return unit(who, seed, index) < chance
+                return place > revival or unit(who, seed, index) < chance
 
             return {"index": index, "place": place, "tape": lives("tape", tape), "oracle": lives("oracle", oracle)}
 
@@ -50,6 +50,12 @@ def test_what_never_dies_is_alive_at_the_end_and_what_never_lives_is_dead_at_the
     found = search(TASK, "wide_gaps", tmp_path, rounds=12)
     assert found["oracle"].verdict == "alive at the end of the way" and not found["oracle"].values
     assert found["tape"].verdict == "dead at the edge of training"
+
+
+def test_success_that_comes_back_farther_out_does_not_hide_the_death_before(world_where, tmp_path):
+    world_where(tape=0.4, oracle=1.7, revival=3.0)
+    found = search(TASK, "wide_gaps", tmp_path, rounds=20)
+    assert found["tape"].verdict == "dies on the way" and found["tape"].low <= 0.4 <= found["tape"].high
 
 
 def test_a_search_cut_short_goes_on_and_finds_the_same(world_where, tmp_path):

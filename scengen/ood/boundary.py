@@ -6,7 +6,8 @@ axis' parameters put at that place.
 
 The chance of success is taken to fall along the way as a logistic curve, 1 / (1 + exp((x - middle) / spread)); what
 is known of middle and spread is kept as a posterior on a grid. Looking at the median of the middle is bisection that
-bears noise; after some rounds of it the search looks where success is between 30 and 70 percent.
+bears noise; after some rounds of it the search looks where success is between 30 and 70 percent. Success may come back
+farther out (a ball that slips on a rough ramp rolls on a rougher one): what lies beyond the first death is left out.
 """
 
 import math
@@ -32,6 +33,8 @@ from .support import distance
 TAPE, ORACLE = "tape", "oracle"
 BATCH = 4
 """Twins that are tried at one place before the search moves on; a round."""
+FIRST = (math.inf, 0.0, 1.0)
+"""Where the first rounds look: the end of the way, the edge of training, the far end of the axis."""
 BISECTIONS = 4
 """Rounds at the most likely middle, for each of tape and oracle, before the band is sampled."""
 BAND = 0.7
@@ -174,11 +177,11 @@ def _try(way: Way, seed: int, place: float, index: int) -> dict[str, Any]:
 
 def _next(number: int, trials: list[dict[str, Any]], end: float) -> float:
     """Where to look in round `number`, given all earlier trials."""
-    if number < 2:
-        return (end, 0.0)[number]
+    if number < len(FIRST):
+        return min(end, FIRST[number])
     who = (TAPE, ORACLE)[number % 2]
     middle, spread = _Posterior(trials, who, end).centre
-    if number >= 2 + 2 * BISECTIONS:
+    if number >= len(FIRST) + 2 * BISECTIONS:
         logit = math.log(BAND / (1 - BAND))
         middle += spread * logit * (2 * unit("band", number) - 1)
     return round(min(max(middle, 0.0), end), 6)
@@ -190,11 +193,21 @@ def _boundary(who: str, trials: list[dict[str, Any]], way: Way) -> Boundary:
     return Boundary(who, middle, low, high, way.end, values, sum(t[who] is not None for t in trials))
 
 
+def _before_revival(trials: list[dict[str, Any]], who: str) -> list[dict[str, Any]]:
+    """The trials without those beyond a place where all fail, if success comes back there."""
+    at: dict[float, list[bool]] = {}
+    for trial in trials:
+        at.setdefault(trial["place"], []).append(trial[who])
+    death = min((place for place, solved in at.items() if len(solved) > 2 and not any(solved)), default=math.inf)
+    revived = any(place > death and sum(solved) > 0.7 * len(solved) for place, solved in at.items())
+    return [t for t in trials if t["place"] <= death] if revived else trials
+
+
 class _Posterior:
     """What trials say about middle and spread of the logistic curve; priors are flat, that of the spread in log."""
 
     def __init__(self, trials: list[dict[str, Any]], who: str, end: float):
-        tried = [t for t in trials if t[who] is not None]
+        tried = _before_revival([t for t in trials if t[who] is not None], who)
         places = np.array([t["place"] for t in tried])
         solved = np.array([t[who] for t in tried], bool)
         self.middles = np.linspace(-0.5 * end, 1.5 * end, 401)
