@@ -77,10 +77,10 @@ def _boundary(card: dict[str, Any], who: str) -> str:
     found = card["boundaries"][who]
     if found["verdict"].startswith("alive"):
         return f"> {found['end']:.2f}"
-    at = ", ".join(f"{name} {value:.3g}" for name, value in found["values"].items())
-    return f"{max(found['middle'], 0):.2f} [{max(found['low'], 0):.2f}, {found['high']:.2f}]" + (
-        f": {at}" if at else ""
-    )
+    if found["verdict"].startswith("dead"):
+        return "at the edge"
+    at = "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
+    return f"{found['middle']:.2f} [{max(found['low'], 0):.2f}, {found['high']:.2f}]{at}"
 
 
 if __name__ == "__main__":  # worker processes import this file again
