@@ -1,6 +1,7 @@
 """The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 [task ...]`
 
-Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again.
+Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again. Axes without a
+card keep the line that they have.
 """
 
 import json
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scengen import cli, config
+from scengen.ood.behaviour import EXTRAPOLATION
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
@@ -31,7 +33,7 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
 
 
 def main(n: str, *tasks: str) -> None:
-    """Make all cards, or those of some tasks, and write the page from whatever cards there are."""
+    """Make all cards, or those of some tasks, and write their lines."""
     failed = []
     for task in tasks or config.tasks():
         for axis in config.task(task).axes:
@@ -42,20 +44,23 @@ def main(n: str, *tasks: str) -> None:
 
 
 def _lines() -> list[str]:
-    """A line for each card, in the order of the task files."""
+    """A line for each card, in the order of the task files; where there is no card, the line that the page has."""
+    written = PAGE.read_text().splitlines(keepends=True) if PAGE.is_file() else []
     lines = []
     for task in config.tasks():
         for axis in config.task(task).axes:
             path = Path(f"generated/axes/{task}-{axis}/card.json")
             if path.is_file():
                 lines.append(_line(json.loads(path.read_text())))
+            else:
+                lines += [line for line in written if line.startswith(f"| {task} | {axis} |")]
     return lines
 
 
 def _line(card: dict[str, Any]) -> str:
     gaps = [p["relative"] for p in card["proofs"] if p["relative"]]
     leaving = [d["feature"] for d in card["features"] if d["inside"] == 0]
-    share = next(s for s in card["behaviour"] if s["kind"] == "true extrapolation")
+    share = next(s for s in card["behaviour"] if s["kind"] == EXTRAPOLATION)
     cells = [
         card["task"],
         card["axis"],

@@ -114,7 +114,8 @@ class Grid:
 Design = Independent | Sobol | Latin | Grid
 
 
-KINDS = ("iid", "sobol", "lhs", "grid")
+NUMBERED = ("lhs", "grid")
+KINDS = ("iid", "sobol", *NUMBERED)
 SPELLED = "iid, sobol, lhs:STRATA (such as lhs:50), grid:VALUES (such as grid:3)"
 
 
@@ -140,7 +141,7 @@ def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
     if kind == "grid" and count >= 1:
         sizes = {name: _values(dist, count) for name, dist in training.items() if not isinstance(dist, Fixed)}
         return Grid(key, sizes, count)
-    hint = f" ({kind} needs a whole number from 1 on)" if kind in KINDS[2:] else nearest(kind, KINDS)
+    hint = f" ({kind} needs a whole number from 1 on)" if kind in NUMBERED else nearest(kind, KINDS)
     raise BadConfig(f"sampler = {spelled}{hint}; known: {SPELLED}")
 
 
