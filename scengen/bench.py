@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from . import config
+from .control import native
+from .control.loop import Loop
 from .envs.gym import ScenarioEnv
-from .generate import Settings, generate
+from .pictures.render import NoPictures
 from .pool import Pool, Row
-from .render import NoPictures
 from .robots import panda
-from .sim import native, scene_text
-from .sim.loop import Loop
+from .runs.generate import Settings, generate
+from .sim import scene_text
 from .sim.world import World
-from .validate.rollout import Episode, Tape, run
+from .validate.rollout import Actions, Episode, run
 
 BARS = {
     "rollout_to_raw": (1.25, "at most"),
@@ -81,18 +82,18 @@ def rollout_to_raw(repeats: int) -> float:
     def rollout() -> Episode:
         return run(scenario, world, scenario.oracle, task.horizon)  # type: ignore[attr-defined]
 
-    raw = _bare(world, rollout().tape)
+    raw = _bare(world, rollout().actions)
     return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
 
 
 def environment(repeats: int) -> dict[str, float]:
     """The Gymnasium environment without cameras: its step over the bare mj_step calls, and its reset [ms]."""
     with _pool() as pool:
-        env, tape = ScenarioEnv("domino_single", pool.folder), next(pool.rows())["witness"]
+        env, actions = ScenarioEnv("domino_single", pool.folder), next(pool.rows())["witness"]
     env.reset()
-    raw = _bare(env.world, tape)
+    raw = _bare(env.world, actions)
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
-    ratios = [_stepping(env, tape) * len(tape) / _seconds(raw) for _ in range(repeats)]
+    ratios = [_stepping(env, actions) * len(actions) / _seconds(raw) for _ in range(repeats)]
     return {"env_step_to_raw": statistics.median(ratios), "env_reset_ms": statistics.median(resets)}
 
 
@@ -103,15 +104,15 @@ def costs(repeats: int) -> dict[str, float]:
     """
     with _pool() as pool:
         row = next(pool.rows())
-        tape = row["witness"]
+        actions = row["witness"]
         bare = ScenarioEnv("domino_single", pool.folder)
         seeing = ScenarioEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     bare.reset()
-    raw, brief = _bare(bare.world, tape), tape[:CAMERA_TICKS]
+    raw, brief = _bare(bare.world, actions), actions[:CAMERA_TICKS]
     found = {
-        "MuJoCo: five bare mj_step": statistics.median(_seconds(raw) / len(tape) for _ in range(repeats)),
-        "scengen in Gymnasium: proprioception": statistics.median(_stepping(bare, tape) for _ in range(repeats)),
-        "robosuite: proprioception": _stepping(_robosuite(row, False), tape),
+        "MuJoCo: five bare mj_step": statistics.median(_seconds(raw) / len(actions) for _ in range(repeats)),
+        "scengen in Gymnasium: proprioception": statistics.median(_stepping(bare, actions) for _ in range(repeats)),
+        "robosuite: proprioception": _stepping(_robosuite(row, False), actions),
     }
     try:
         found["scengen in Gymnasium: and one camera"] = _stepping(seeing, brief)
@@ -148,7 +149,7 @@ def _robosuite(row: Row, camera: bool) -> Any:
     )
 
 
-def _stepping(env: Any, actions: Tape) -> float:
+def _stepping(env: Any, actions: Actions) -> float:
     """Mean time of a step [s]."""
     env.reset()
 
@@ -159,11 +160,11 @@ def _stepping(env: Any, actions: Tape) -> float:
     return _seconds(steps) / len(actions)
 
 
-def _bare(world: World, tape: Tape) -> Callable[[], None]:
-    """The bare mj_step calls through the states that a tape leads to, from the start."""
-    controls = np.zeros((len(tape) * world.loop.substeps, world.model.nu))
+def _bare(world: World, actions: Actions) -> Callable[[], None]:
+    """The bare mj_step calls through the states that a actions leads to, from the start."""
+    controls = np.zeros((len(actions) * world.loop.substeps, world.model.nu))
     world.reset()
-    world.loop.replay(tape, controls)
+    world.loop.replay(actions, controls)
 
     def raw() -> None:
         world.reset()
@@ -186,7 +187,7 @@ def robosuite_to_ours(repeats: int) -> float:
 
     def ours() -> None:
         for action in actions:
-            loop.tick(action)
+            loop.step(action)
 
     ratios = []
     for _ in range(repeats + 1):  # the first one warms up

@@ -7,8 +7,8 @@ from importlib import import_module
 
 from .commands import BAD_INPUT, INTERRUPTED, OK, err, out
 from .config import conf_dir
+from .control import native
 from .errors import BadConfig, ScengenError, nearest
-from .sim import native
 
 VERBS = (
     "generate",
@@ -23,7 +23,7 @@ VERBS = (
     "axis",
     "report",
     "robosuite",
-    "plan",
+    "power",
     "bias",
     "compare",
     "subset",
@@ -53,7 +53,7 @@ def run(argv: Sequence[str]) -> int:
         if verb not in VERBS:
             raise BadConfig(f"no command named {verb!r}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
         if {"-h", "--help"} & set(arguments):
-            out.print((conf_dir() / f"{verb}.yaml").read_text(), highlight=False, markup=False, end="")
+            out.print(_settings(verb), highlight=False, markup=False, end="")
             return OK
         if flags := [a for a in arguments if a.startswith("-")]:
             raise BadConfig(f"{flags[0]!r} is no option; settings are key=value, see scengen {verb} --help")
@@ -67,6 +67,12 @@ def run(argv: Sequence[str]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return OK
+
+
+def _settings(verb: str) -> str:
+    """The settings of a command as its file tells them, without what only Hydra reads."""
+    lines = (conf_dir() / "command" / f"{verb}.yaml").read_text().splitlines(keepends=True)
+    return "".join(line for line in lines if not line.startswith("# @package") and "optional /limits" not in line)
 
 
 def _help() -> str:

@@ -17,7 +17,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName
 from .samplers.task import Task, load
-from .validate.level import Level
+from .validate.settings import CertifySettings
 
 T = TypeVar("T")
 
@@ -29,7 +29,7 @@ class Composed:
     settings: dict[str, Any]
     """Everything but task and certify."""
     task: Task | None
-    level: Level
+    level: CertifySettings
     resolved: dict[str, Any]
     """The whole configuration as plain data, task file included."""
 
@@ -38,14 +38,14 @@ class Composed:
 def conf_dir() -> Path:
     """The folder of configuration files: inside an installed package, beside it in a checkout."""
     here = Path(__file__).parent
-    found = next((d for d in (here / "conf", here.parent / "conf") if (d / "generate.yaml").is_file()), None)
+    found = next((d for d in (here / "conf", here.parent / "conf") if (d / "command").is_dir()), None)
     if found is None:
         raise BadConfig("the conf/ folder is missing from this installation; install scengen again")
     return found
 
 
 def read(verb: str, overrides: Sequence[str]) -> Composed:
-    """Compose conf/<verb>.yaml with the overrides of a command line, and check all of it.
+    """Compose conf/command/<verb>.yaml with the overrides of a command line, and check all of it.
 
     Raises:
         ScengenError: one line that says what is wrong.
@@ -57,10 +57,10 @@ def read(verb: str, overrides: Sequence[str]) -> Composed:
         if value == "???":
             raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
     task = load(choices["task"], plain["task"]) if "task" in plain else None
-    level = Level()
+    level = CertifySettings()
     if "certify" in plain:
         plain["certify"] = _settle(plain["certify"], task, choices["certify"])
-        level = typed("certify", Level, plain["certify"])
+        level = typed("certify", CertifySettings, plain["certify"])
     return Composed(settings, task, level, plain)
 
 
@@ -73,7 +73,7 @@ def tasks(search: Sequence[str] = ()) -> list[str]:
     """Names of all task files, those of other packages included (`search_path`)."""
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         loader = GlobalHydra.instance().config_loader()
-        return sorted(loader.get_group_options("task", config_name="tasks", overrides=list(search)))
+        return sorted(loader.get_group_options("task", config_name="command/tasks", overrides=list(search)))
 
 
 def task(name: str, search: Sequence[str] = ()) -> Task:
@@ -131,9 +131,7 @@ def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str,
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         try:
             asked = [_listed(o) for o in overrides]
-            node = compose(verb, overrides=asked, return_hydra_config=True)
-            if recorded := _boundary(verb, asked, node):
-                node = compose(verb, overrides=[recorded, *asked], return_hydra_config=True)
+            node = compose(f"command/{verb}", overrides=asked, return_hydra_config=True)
         except (HydraException, OmegaConfBaseException) as error:
             raise _explain(verb, overrides, error) from None
         except yaml.YAMLError as error:
@@ -142,15 +140,6 @@ def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str,
     OmegaConf.set_struct(node, False)
     del node["hydra"]
     return node, choices
-
-
-def _boundary(verb: str, overrides: list[str], node: DictConfig) -> str | None:
-    """The override that brings in conf/boundary/<task>.yaml, the measured limits of a task's axes, if there are any."""
-    task = node.hydra.runtime.choices.get("task")
-    loader = GlobalHydra.instance().config_loader()
-    if task is None or task not in loader.get_group_options("boundary", config_name=verb, overrides=overrides):
-        return None
-    return f"+boundary@task.boundary={task}"
 
 
 def _listed(override: str) -> str:
@@ -203,7 +192,7 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     """Name the level at which the path of an override leaves the configuration."""
     groups = [o for o in overrides if re.match(r"(task|certify)=", o)]
     try:
-        node: Any = compose(verb, overrides=groups)
+        node: Any = compose(f"command/{verb}", overrides=groups)
     except HydraException:
         return None
     seen: list[str] = []

@@ -19,7 +19,7 @@ from .ood import features
 from .params import canonical, with_values
 from .samplers.task import ID, Task
 from .validate.certify import certify
-from .validate.level import Level
+from .validate.settings import CertifySettings
 
 
 class Nonconformity(ScengenError):
@@ -100,7 +100,7 @@ def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) 
     """The first scenarios pass every check, and their witnesses replay in a fresh world."""
     for i in range(scenarios):
         scenario = task.draw(split, seed, i).scenario
-        certificate = certify(scenario, task.horizon, Level(), task.embodiment).certificate
+        certificate = certify(scenario, task.horizon, CertifySettings(), task.embodiment).certificate
         where = f"{task.name}/{split}/{i} (seed {seed}, {canonical(scenario)})"
         _ask(certificate.verdict == "certified", f"{where} is {certificate.verdict}: {certificate.reason}")
 

@@ -44,6 +44,13 @@ class Unstable(ScengenError):
     """MuJoCo raised a warning, so that nothing simulated after it means anything."""
 
 
+class NoOracle(ScengenError):
+    """A family without a scripted solution was asked for one."""
+
+    def __init__(self, family: str):
+        super().__init__(f"{family} has no oracle; write its method oracle(world), see CONTRIBUTING.md")
+
+
 class GaveUp(ScengenError):
     """A move did not reach its end condition in time."""
 

@@ -10,8 +10,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
+from .control import native
 from .errors import ScengenError
-from .sim import native
 
 A = TypeVar("A")
 B = TypeVar("B")

@@ -51,11 +51,11 @@ SCHEMA = pa.schema(
         ("category", pa.string()),
         ("split", pa.string()),
         ("axes", pa.list_(pa.string())),
-        ("moved", pa.string()),
+        ("shifted", pa.string()),
         ("seed", pa.int64()),
         ("index", pa.int64()),
         ("attempt", pa.int64()),
-        ("twin", pa.string()),
+        ("id_twin", pa.string()),
         ("instruction", pa.string()),
         ("horizon", pa.float64()),
         ("params", pa.string()),
@@ -221,9 +221,9 @@ def _write_shard(folder: Path, name: str, rows: Sequence[Row]) -> dict[str, Any]
 
 def _table(rows: Sequence[Row]) -> pa.Table:
     plain = pa.Table.from_pylist([{**row, "witness": None} for row in rows], schema=SCHEMA)
-    tapes = [np.asarray(row["witness"], np.float32).reshape(-1, 7) for row in rows]
-    offsets = np.cumsum([0, *map(len, tapes)], dtype=np.int32)
-    flat = np.concatenate(tapes).ravel() if tapes else np.zeros(0, np.float32)
+    recordings = [np.asarray(row["witness"], np.float32).reshape(-1, 7) for row in rows]
+    offsets = np.cumsum([0, *map(len, recordings)], dtype=np.int32)
+    flat = np.concatenate(recordings).ravel() if recordings else np.zeros(0, np.float32)
     column = pa.ListArray.from_arrays(offsets, pa.FixedSizeListArray.from_arrays(pa.array(flat), 7))
     where = SCHEMA.get_field_index("witness")
     return plain.set_column(where, SCHEMA.field(where), column.cast(SCHEMA.field(where).type))
@@ -234,9 +234,9 @@ def _rows(table: pa.Table) -> Iterator[Row]:
     if "witness" not in table.column_names:
         yield from table.to_pylist()
         return
-    tapes = table.column("witness")
-    for row, tape in zip(table.drop_columns("witness").to_pylist(), tapes, strict=True):
-        numbers = tape.values.flatten().to_numpy(zero_copy_only=False)
+    recordings = table.column("witness")
+    for row, actions in zip(table.drop_columns("witness").to_pylist(), recordings, strict=True):
+        numbers = actions.values.flatten().to_numpy(zero_copy_only=False)
         yield {**row, "witness": np.asarray(numbers, np.float32).reshape(-1, 7)}
 
 

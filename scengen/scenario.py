@@ -2,17 +2,20 @@
 
 import abc
 import hashlib
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .ood.symmetry import Symmetry
+from .assets.prop import TABLE_HALF
+from .errors import NoOracle
 from .params import canonical, check_bounds
+from .robots.panda import REACH, SHOULDER
 from .sim.world import World
+from .symmetry import Symmetry
 
 Action = NDArray[np.float64]
 """Shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1 closed)."""
@@ -24,8 +27,20 @@ Planner = Callable[[World], Plan]
 
 
 @dataclass(frozen=True)
+class Shortcut:
+    """A tempting plan that must fail: it shows that the task's bottleneck is real."""
+
+    plan: Planner
+    to_rest: bool = False
+    """Whether it is simulated until everything is at rest, and has to fail by physics alone.
+
+    A certificate then counts nothing else as a failure: neither a rule that ends the episode earlier, nor a move that
+    gave up, nor the time limit."""
+
+
+@dataclass(frozen=True)
 class Refutation:
-    """A checkable reason why a combination of parameters is no fair problem."""
+    """A checkable reason why a combination of parameters is an invalid scenario."""
 
     reason: str
     """The same words for every scenario that fails in this way, so that rejections can be counted."""
@@ -33,12 +48,34 @@ class Refutation:
     """What was compared, in SI units."""
 
 
+def require(holds: bool, otherwise: str, **numbers: float) -> Refutation | None:
+    """One constraint of a family, as a positive statement.
+
+    Args:
+        holds: what must be true.
+        otherwise: the reason for the refutation where it is not, the same words for every scenario.
+        numbers: what was compared, in SI units.
+    """
+    return None if holds else Refutation(otherwise, {name: float(value) for name, value in numbers.items()})
+
+
+def on_table(what: str, points: ArrayLike, margin: float = 0.0) -> Refutation | None:
+    """Require that every point, shape (..., 2 or 3), is over the table and `margin` from its edge [m]."""
+    far = float(np.abs(np.asarray(points, float)[..., :2]).max())
+    return require(far <= TABLE_HALF - margin, f"{what} leaves the table", farthest=far, edge=TABLE_HALF - margin)
+
+
+def within_reach(what: str, *points: ArrayLike) -> Refutation | None:
+    """Require that the grip site can come to each point [m], by a bound that no posture exceeds (`panda.REACH`)."""
+    away = max(float(np.linalg.norm(np.asarray(point, float) - SHOULDER)) for point in points)
+    return require(away <= REACH, f"{what} is out of reach", distance=away, reach=REACH)
+
+
 class Scenario(abc.ABC):
     """Base of every scenario family. Subclasses are frozen dataclasses; subclass once, never twice.
 
-    A family also defines `oracle(world) -> Plan`, a scripted solution that may read the full state but acts
-    only through the robot. It is no part of this interface on purpose: nothing but certification calls it,
-    and everything else must work without it.
+    A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `shortcuts`,
+    `ablations`, `constraints`, geometry.
     """
 
     HOLD: ClassVar[float] = 0.0
@@ -55,10 +92,6 @@ class Scenario(abc.ABC):
     def __post_init__(self) -> None:
         check_bounds(self)
 
-    def infeasible(self) -> Refutation | None:
-        """Why this combination of parameters cannot be a fair problem, or None."""
-        return None
-
     @abc.abstractmethod
     def build(self) -> mujoco.MjSpec:
         """The scene, without the robot. Bodies that goals and oracles name must be named here."""
@@ -71,29 +104,39 @@ class Scenario(abc.ABC):
         """Why the episode is lost for good, or None. A failure ends the episode."""
         return None
 
-    def script(self, world: World) -> None:  # noqa: B027
+    def events(self, world: World) -> None:  # noqa: B027
         """Events of the scene itself, called before every control period. Draws nothing: all values are parameters."""
 
-    def shortcuts(self) -> Mapping[str, Planner]:
-        """Tempting plans that must fail: they show that the task's bottleneck is real."""
-        return {}
+    def oracle(self, world: World) -> Plan:
+        """A scripted solution, which may read the full state but acts only through the robot.
 
-    def plays_out(self, shortcut: str) -> bool:
-        """Whether a shortcut has to fail by physics alone, seen to its end.
+        Certification calls it and nothing else does: verification, environments and pools work without it.
 
-        A certificate counts nothing else as a failure: neither a rule that ends the episode before all is at rest, nor
-        a move that gave up, nor the time limit.
+        Raises:
+            NoOracle: the family has none.
         """
-        return False
+        raise NoOracle(type(self).__name__)
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
-        """The scene with its intended means taken away, by name: there the witness must fail."""
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        """Tempting plans that must fail, by name in snake_case."""
         return {}
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        """The scene with its intended means taken away, by name in snake_case: there the witness must fail."""
+        return {}
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        """What must hold of the parameters, one `require(...)` after the other; later ones may rely on earlier ones."""
+        yield from ()
+
+    def infeasible(self) -> Refutation | None:
+        """The first constraint that does not hold, or None."""
+        return next((refutation for refutation in self.constraints() if refutation), None)
 
     def features(self) -> Mapping[str, float]:
-        """What the physics depends on, by name: ratios and heights rather than parameters. Proves and decides nothing.
+        """What the physics depends on, by name in snake_case: ratios and heights rather than parameters.
 
-        Scenes that differ in every parameter may be equal in these, and then it takes no new insight to solve them.
+        Proves and decides nothing. Scenes that differ in every parameter may be equal in these, and then it takes no new insight to solve them.
         A certificate records them in its first check.
         """
         return {}

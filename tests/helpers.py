@@ -4,11 +4,12 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from scengen import render
 from scengen.params import parameters, with_values
+from scengen.pictures import render
 from scengen.pool import Pool
 
 REFERENCE = Path(__file__).parents[1] / "generated" / "reference"
+
 
 
 def anywhere(cls):

@@ -19,15 +19,15 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
-* **certified**: of how many indices. **true extrapolation**: twins in which the tape that solves the training
-  twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a tape asks
-  for no new motion; it may still be hard to *see*, and a tape never looks.
-* **tape dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
-  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way. `at the edge`: a tape
+* **certified**: of how many indices. **true extrapolation**: twins in which the actions that solves the training
+  twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a actions asks
+  for no new motion; it may still be hard to *see*, and a actions never looks.
+* **actions dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
+  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way. `at the edge`: a actions
   that fails as soon as its scene's own value is exchanged for the nearest end of training.
 * **energy**: energy distance between the features of the twins [training ranges], p value of its permutation test.
 
-| task | axis | outside | physics | certified | true extrapolation | else | tape dies | oracle dies | energy |
+| task | axis | outside | physics | certified | true extrapolation | else | actions dies | oracle dies | energy |
 |---|---|---|---|---|---|---|---|---|---|
 """
 
@@ -69,7 +69,7 @@ def _line(card: dict[str, Any]) -> str:
         f"{card['funnel']['certified']} of {card['indices']}",
         f"{share['count']} ({share['low']:.0%} to {share['high']:.0%})",
         ", ".join(f"{s['count']} {s['kind']}" for s in card["behaviour"] if s["count"] and s is not share),
-        _boundary(card, "tape"),
+        _boundary(card, "replay"),
         _boundary(card, "oracle"),
         f"{card['energy']['distance']:.2g} (p = {card['energy']['pvalue']:.2g})",
     ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 STEEL = 7850.0
 """Density of carbon steel [kg/m^3]."""

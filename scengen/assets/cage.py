@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

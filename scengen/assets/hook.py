@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
 """Two ends of a straight stretch in the plane [m], shape (2,) each, and how far the box goes on beyond both [m]."""

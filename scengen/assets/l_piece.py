@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 PROUD = 0.0002
 """How far the five outer corners stand out below the edges [m]: a piece that lies on five points instead of twelve

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, show
+from .prop import PRIORITY, show
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s^2], MuJoCo's own."""

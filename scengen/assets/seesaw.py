@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import mujoco
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 CHEEK = 0.004
 """Thickness of the plates that join deck and axle [m]; they count as weightless beside the deck."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 
 from ..params import check_bounds, param
-from .scene import PRIORITY, STIFF, show
+from .prop import PRIORITY, STIFF, show
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from rich.table import Table
 
 from ..config import read, typed
 from ..ood.card import Card, Settings, make
-from ..progress import Bar
+from ..runs.progress import Bar
 from . import OK, Arguments, err, out
 
 

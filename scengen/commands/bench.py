@@ -10,7 +10,7 @@ from . import OK, Arguments, out, write_json
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen bench`; meanings stand in conf/bench.yaml."""
+    """Settings of `scengen bench`; meanings stand in conf/command/bench.yaml."""
 
     json: str | None = None
     repeats: int = 5

@@ -5,19 +5,19 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from ..analysis.bias import Bias, acceptance_map, bias
+from ..analysis.redraw import Proposed, proposed
+from ..analysis.space import measured
+from ..analysis.tables import bias_table, map_table
 from ..config import read, typed
-from ..ood.bias import Bias, acceptance_map, bias
-from ..ood.redraw import Proposed, proposed
-from ..ood.space import measured
-from ..ood.tables import bias_table, map_table
 from ..pool import Pool
-from ..progress import Bar
+from ..runs.progress import Bar
 from . import OK, Arguments, err, one, out, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen bias`; meanings stand in conf/bias.yaml."""
+    """Settings of `scengen bias`; meanings stand in conf/command/bias.yaml."""
 
     pool: str | list[str] = ""
     json: str | None = None
@@ -39,7 +39,7 @@ def command(arguments: Arguments) -> int:
         found = bias(table, accepted)
         if not accepted.all():
             out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
-            moved = [m.name for m in found.marginals if m.name in among[0].numbers]  # features follow from these
+            moved = [m.name for m in found.marginals if m.name in among[0].quantiles]  # features follow from these
             if len(moved) > 1:
                 out.print(map_table(acceptance_map((moved[0], moved[1]), table, accepted)))
         result[name] = {**asdict(found), "flagged": found.flagged, "effective": found.effective}

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.coverage import evenness
+from ..analysis.distance import CLOSE, energy, near_duplicates, per_parameter
+from ..analysis.redraw import proposed, scenarios_of, task_of
+from ..analysis.space import of_features
+from ..analysis.tables import pairs_table
 from ..config import read, typed
 from ..errors import BadConfig
-from ..ood.coverage import evenness
-from ..ood.distance import CLOSE, energy, near_duplicates, per_parameter
-from ..ood.redraw import proposed, scenarios_of, task_of
-from ..ood.space import of_features
-from ..ood.tables import pairs_table
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
@@ -21,7 +21,7 @@ from . import FAILED, OK, Arguments, out, several, write_json
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen compare`; meanings stand in conf/compare.yaml."""
+    """Settings of `scengen compare`; meanings stand in conf/command/compare.yaml."""
 
     pool: str | list[str] = ""
     within: float = CLOSE
@@ -54,7 +54,7 @@ def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: 
     out.print(f"  outside training by [training widths]: {told or 'nothing'}", highlight=False, markup=False)
     even = None
     if "subset" not in pool.manifest and scenarios:
-        certified = [list(p.numbers.values()) for p in proposed(pool) if p.certified]
+        certified = [list(p.quantiles.values()) for p in proposed(pool) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
             out.print(

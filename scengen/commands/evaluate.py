@@ -3,8 +3,8 @@
 from rich.table import Table
 
 from ..config import read, typed
-from ..evaluate import Settings, cells, evaluate, markdown, plain, table
-from ..progress import Bar
+from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
+from ..runs.progress import Bar
 from . import OK, Arguments, err, out, write, write_json
 
 

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..config import read, typed
-from ..export import export
+from ..export.mjcf import export
 from ..pool import Pool
-from ..progress import Bar
+from ..runs.progress import Bar
 from . import OK, Arguments, err, one, out
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen export`; meanings stand in conf/export.yaml."""
+    """Settings of `scengen export`; meanings stand in conf/command/export.yaml."""
 
     pool: str | list[str] = ""
     id: str | None = None

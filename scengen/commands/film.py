@@ -7,15 +7,15 @@ from .. import config
 from ..config import read, search_path, typed
 from ..envs.observations import CAMERAS
 from ..errors import BadConfig, at_least
-from ..film import WITNESS, Take, movie, shortcut, strip
+from ..pictures.film import WITNESS, Take, movie, shortcut, strip
+from ..pictures.render import encode
 from ..pool import Pool
-from ..render import encode
 from . import OK, Arguments, one, out, write
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen film`; meanings stand in conf/film.yaml."""
+    """Settings of `scengen film`; meanings stand in conf/command/film.yaml."""
 
     pool: str | list[str] = ""
     id: str = ""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from ..config import read, typed
-from ..generate import Settings, generate
-from ..progress import Bar
-from ..report import funnel_table, summary_lines
+from ..pictures.report import funnel_table, summary_lines
+from ..runs.generate import Settings, generate
+from ..runs.progress import Bar
 from . import FAILED, OK, Arguments, err, out
 
 

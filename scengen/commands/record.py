@@ -4,8 +4,8 @@ from functools import partial
 
 from .. import config
 from ..config import read, search_path, typed
-from ..progress import Bar
-from ..record import Settings, record
+from ..export.recording import Settings, record
+from ..runs.progress import Bar
 from . import FAILED, INTERRUPTED, OK, Arguments, err, out
 
 

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..analysis.overview import gather, page, plain
 from ..config import read, typed
 from ..errors import BadConfig
-from ..ood.overview import gather, page, plain
 from ..pool import Pool
 from . import OK, Arguments, err, out, several, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen report`; meanings stand in conf/report.yaml."""
+    """Settings of `scengen report`; meanings stand in conf/command/report.yaml."""
 
     pool: str | list[str] = ""
     to: str = "generated/report.html"

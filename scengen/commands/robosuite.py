@@ -8,13 +8,13 @@ from rich.table import Table
 from ..config import read, search_path, typed
 from ..errors import BadConfig, at_least
 from ..pool import Pool
-from ..progress import Bar
+from ..runs.progress import Bar
 from . import FAILED, OK, Arguments, err, out, several, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen robosuite`; meanings stand in conf/robosuite.yaml."""
+    """Settings of `scengen robosuite`; meanings stand in conf/command/robosuite.yaml."""
 
     pool: str | list[str] = ""
     first: int | None = None

@@ -3,16 +3,17 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import config, film, render, report
+from .. import config
 from ..config import read, search_path, typed
 from ..errors import BadConfig
+from ..pictures import film, render, report
 from ..pool import Pool
 from . import OK, Arguments, err, out, several, write
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen show`; meanings stand in conf/show.yaml."""
+    """Settings of `scengen show`; meanings stand in conf/command/show.yaml."""
 
     pool: str | list[str] = ""
     id: str | None = None

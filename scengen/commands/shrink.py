@@ -3,23 +3,23 @@
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 
+from ..analysis.shrink import centre, shrink
+from ..analysis.space import scale
+from ..analysis.tables import shrunk_table
 from ..config import read, typed
 from ..errors import BadConfig, at_least
-from ..ood.shrink import centre, shrink
-from ..ood.space import scale
-from ..ood.tables import shrunk_table
 from ..params import Value, values, with_values
-from ..progress import Bar
+from ..runs.progress import Bar
 from ..samplers.task import ID, Task
 from ..scenario import Scenario
 from ..validate.certify import Check, certify
-from ..validate.level import Level
+from ..validate.settings import CertifySettings
 from . import OK, Arguments, err, out, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen shrink`; meanings stand in conf/shrink.yaml."""
+    """Settings of `scengen shrink`; meanings stand in conf/command/shrink.yaml."""
 
     split: str = ID
     sampler: str = "iid"
@@ -61,7 +61,7 @@ def _proposed(task: Task, settings: Settings) -> Scenario:
 
 
 def _fails(
-    task: Task, level: Level, failed: Check, progress: Callable[[int, int], None]
+    task: Task, level: CertifySettings, failed: Check, progress: Callable[[int, int], None]
 ) -> Callable[[Mapping[str, Value]], bool]:
     """Whether a scenario fails the same check, and no cheaper one before it."""
     start, judged = task.family(), 0

@@ -3,18 +3,18 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..analysis.coverage import farthest_points
+from ..analysis.redraw import scenarios_of, task_of
+from ..analysis.space import of_parameters
 from ..config import read, typed
 from ..errors import BadConfig, PoolError
-from ..ood.coverage import farthest_points
-from ..ood.redraw import scenarios_of, task_of
-from ..ood.space import of_parameters
 from ..pool import MANIFEST, Pool, write
 from . import OK, Arguments, one, out
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen subset`; meanings stand in conf/subset.yaml."""
+    """Settings of `scengen subset`; meanings stand in conf/command/subset.yaml."""
 
     pool: str | list[str] = ""
     n: int = 20

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 from .. import config
 from ..config import read, search_path, tasks, typed
-from ..report import task_tables, tasks_table
+from ..pictures.report import task_tables, tasks_table
 from . import OK, Arguments, out
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen tasks`; meanings stand in conf/tasks.yaml."""
+    """Settings of `scengen tasks`; meanings stand in conf/command/tasks.yaml."""
 
     name: str | None = None
 

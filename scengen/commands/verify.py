@@ -7,14 +7,14 @@ from .. import config
 from ..config import read, search_path, typed
 from ..errors import BadConfig, at_least
 from ..pool import Pool
-from ..progress import Bar
+from ..runs.progress import Bar
 from ..validate.verify import verify
 from . import FAILED, OK, Arguments, err, one, out, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen verify`; meanings stand in conf/verify.yaml."""
+    """Settings of `scengen verify`; meanings stand in conf/command/verify.yaml."""
 
     pool: str | list[str] = ""
     json: str | None = None

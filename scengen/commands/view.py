@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from .. import config
 from ..config import read, search_path, typed
+from ..pictures.view import check_display, view
 from ..pool import Pool
-from ..view import check_display, view
 from . import OK, Arguments, one
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen view`; meanings stand in conf/view.yaml."""
+    """Settings of `scengen view`; meanings stand in conf/command/view.yaml."""
 
     pool: str | list[str] = ""
     id: str = ""

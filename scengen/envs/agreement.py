@@ -9,12 +9,12 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ..control.loop import Loop
+from ..episode import Actions, Outcome
 from ..parallel import each
 from ..pool import Pool, Row
-from ..sim.loop import Loop
 from ..sim.world import Vec3, World
-from ..validate.moves import idle
-from ..validate.rollout import Outcome, Tape, replay
+from ..validate.rollout import replay
 from ..validate.verify import settling_time
 from .robosuite import ScenarioEnv, environment
 
@@ -90,33 +90,31 @@ class _Traced(World):
 
     path: list[Vec3] = field(default_factory=list)
 
-    def follow(self, filtered: NDArray[np.float32]) -> None:
-        super().follow(filtered)
-        self.path.append(self.hand)
+    def apply(self, filtered: NDArray[np.float32]) -> None:
+        super().apply(filtered)
+        self.path.append(self.arm.hand)
 
 
-def _played(env: ScenarioEnv, tape: Tape, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
-    """Outcome of a tape in robosuite, its reason, when it was decided [s], and the path of the hand.
+def _played(env: ScenarioEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
+    """Outcome of recorded actions in robosuite, its reason, when it was decided [s], and the path of the hand.
 
-    As in `rollout.replay`: the robot is idle when the tape has ended, and the goal must hold for `settle` seconds.
+    As in `rollout.replay`: the robot is idle when the actions have ended, and the goal must hold for `settle` seconds.
     """
-    rows, path = iter(tape), list[Vec3]()
+    rows, path = iter(actions), list[Vec3]()
 
     def step() -> None:
         row = next(rows, None)
-        env.step(idle(env.world) if row is None else row)
-        path.append(env.world.hand)
+        env.step(env.world.idle if row is None else row)
+        path.append(env.world.arm.hand)
 
     env.reset()
-    while env.outcome is None:
+    while env.episode.outcome is None:
         step()
     reached = env.world.time
-    if env.outcome == "success":
+    if env.episode.outcome == "success":
         for _ in range(round(settle / Loop.PERIOD)):
             step()
-    if env.outcome == "success" and not env.scenario.success(env.world):
-        return "timeout", f"the goal was reached but did not hold for {settle:g} s", reached, path
-    return env.outcome, env.reason, reached, path
+    return *env.episode.settled(), reached, path
 
 
 def _rows(pools: Sequence[Pool], first: int | None) -> Iterator[Row]:

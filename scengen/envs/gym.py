@@ -16,16 +16,16 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from .. import config
-from ..errors import BadConfig, PoolError, UnknownName, Unstable
+from ..control.loop import ACTION, Loop
+from ..episode import Episode
+from ..errors import BadConfig, PoolError, UnknownName
 from ..params import Value, with_values
+from ..pictures.render import Camera
 from ..pool import Pool, Row
-from ..render import Camera
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.loop import ACTION, Loop
 from ..sim.world import World
 from ..validate.identity import check_versions
-from ..validate.rollout import Judge
 from .observations import CAMERAS, STREAMS, Reading, check_names, proprioception
 
 Observation = dict[str, Reading]
@@ -142,7 +142,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(), self._info("", False)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Live one control period of 10 ms.
+        """Advance one control period (10 ms).
 
         Raises:
             ValueError: the action has another shape than (7,) or is not finite; nothing was simulated then.
@@ -150,17 +150,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         given = np.asarray(action, np.float32)
         if given.shape != (ACTION,) or not np.isfinite(given).all():
             raise ValueError(f"an action is {ACTION} finite numbers in [-1, 1], not {np.array2string(given)}")
-        world = self.world
-        self._scenario.script(world)
-        try:
-            world.follow(np.clip(given, -1.0, 1.0))
-            verdict = self._judge.look(world)
-        except Unstable as error:
-            verdict = "unstable", str(error)
-        outcome, reason = verdict or (None, "")
+        outcome = self._episode.step(np.clip(given, -1.0, 1.0))
         success = outcome == "success"
         terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
-        return self._observe(), float(success), terminated, truncated, self._info(reason, success)
+        return self._observe(), float(success), terminated, truncated, self._info(self._episode.reason, success)
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
@@ -179,7 +172,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._scenario = with_values(self.task.family(), row["values"])
         self._row = row
         self._world.reset()
-        self._judge = Judge(self._scenario, row["horizon"])
+        self._episode = Episode(self._scenario, self._world, row["horizon"])
 
     @property
     def _sees(self) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownName
-from ..robots.panda import JOINTS
+from ..robots.panda import JOINTS, Names
 from ..sim.world import JAW, World
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
@@ -19,8 +19,8 @@ Reading = NDArray[np.float32] | NDArray[np.uint8]
 TAXELS = 8
 """Rows and columns of a tactile grid (paper, table of modalities)."""
 PADS = {
-    "robot0_tactile_left": "gripper0_right_finger1_pad_collision",
-    "robot0_tactile_right": "gripper0_right_finger2_pad_collision",
+    "robot0_tactile_left": f"{Names().hand}finger1_pad_collision",
+    "robot0_tactile_right": f"{Names().hand}finger2_pad_collision",
 }
 """The finger pad under each tactile grid. The grid spans the pad's inner face, columns along x, rows along z."""
 
@@ -37,7 +37,7 @@ class Stream:
 
 def _hand_quat(world: World) -> NDArray[np.float64]:
     quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, world.hand_frame.ravel())
+    mujoco.mju_mat2Quat(quat, world.arm.hand_rot.ravel())
     return np.array([quat[1], quat[2], quat[3], quat[0]])
 
 
@@ -48,7 +48,7 @@ def wrench(world: World) -> NDArray[np.float64]:
     cost time in every step.
     """
     mujoco.mj_rnePostConstraint(world.model, world.data)
-    site = world.model.site("gripper0_right_ft_frame").id
+    site = world.model.site(Names().wrist_site).id
     body = int(world.model.site_bodyid[site])
     local = np.empty(6)
     root = int(world.model.body_rootid[body])
@@ -61,7 +61,7 @@ def wrench(world: World) -> NDArray[np.float64]:
 
 
 def _world_force(world: World) -> NDArray[np.float64]:
-    frame = world.data.site("gripper0_right_ft_frame").xmat.reshape(3, 3)
+    frame = world.data.site(Names().wrist_site).xmat.reshape(3, 3)
     return frame @ wrench(world)[:3]
 
 
@@ -85,11 +85,11 @@ def _tactile(pad: str) -> Callable[[World], NDArray[np.float64]]:
 
 
 STREAMS: dict[str, Stream] = {
-    "robot0_eef_pos": Stream((3,), 3.0, lambda world: world.hand),
+    "robot0_eef_pos": Stream((3,), 3.0, lambda world: world.arm.hand),
     "robot0_eef_quat": Stream((4,), 1.0, _hand_quat),
-    "robot0_joint_pos": Stream((JOINTS,), 7.0, lambda world: world.joint_pos),
-    "robot0_joint_vel": Stream((JOINTS,), 100.0, lambda world: world.joint_vel),
-    "robot0_gripper_qpos": Stream((2,), 0.1, lambda world: world.finger_pos),
+    "robot0_joint_pos": Stream((JOINTS,), 7.0, lambda world: world.arm.joint_pos),
+    "robot0_joint_vel": Stream((JOINTS,), 100.0, lambda world: world.arm.joint_vel),
+    "robot0_gripper_qpos": Stream((2,), 0.1, lambda world: world.arm.finger_pos),
     "force_torque": Stream((6,), 1e4, wrench),
     "force_torque_world": Stream((3,), 1e4, _world_force),
     **{name: Stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},

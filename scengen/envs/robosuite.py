@@ -18,15 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import config
-from ..assets.scene import TABLE_HALF
+from ..assets.prop import TABLE_HALF
+from ..control.loop import Loop
+from ..episode import Episode
 from ..errors import BadConfig, PoolError
 from ..params import with_values
 from ..pool import Pool, Row
+from ..robots.panda import Names
 from ..scenario import Scenario
-from ..sim.loop import Loop
 from ..sim.world import JAW, SUCTION, World
 from ..validate.identity import check_versions
-from ..validate.rollout import Judge, Outcome
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
 # isort: split
@@ -65,10 +66,8 @@ class ScenarioEnv(ManipulationEnv):
     """The scenario as its pool tells it."""
     scenario: Scenario
     """The scenario itself. Privileged: a policy that reads it knows what it should find out."""
-    outcome: Outcome | None
-    """What has come of the episode; None as long as it is open. A success is lost by a later failure."""
-    reason: str
-    """Why it is no success; empty as long as that is open, and for a success."""
+    episode: Episode
+    """Outcome and reason so far, by the certificate's clock."""
     world: World
     """robosuite's model and data, seen through names. To be looked at; robosuite is who steps it."""
 
@@ -122,12 +121,12 @@ class ScenarioEnv(ManipulationEnv):
     def reset(self) -> Observations:
         """robosuite's reset, and the scene's events of the first control period."""
         observations = super().reset()
-        self.scenario.script(self.world)
+        self.episode.begin()
         return observations
 
     def _check_success(self) -> bool:
         """Whether the goal has been reached, and nothing forbidden has happened since."""
-        return self.outcome == "success"
+        return self.episode.outcome == "success"
 
     def _check_robot_configuration(self, robots: Sequence[str]) -> None:
         if list(robots) != [ROBOT]:
@@ -175,13 +174,12 @@ class ScenarioEnv(ManipulationEnv):
         for controller in self.robots[0].part_controllers.values():
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
-        self._judge = Judge(self.scenario, self.row["horizon"])
-        self.outcome, self.reason, self._substep = None, "", 0
+        self.episode, self._substep = Episode(self.scenario, self.world, self.row["horizon"]), 0
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Between mj_step1 and mj_step2, in every physics step."""
         super()._pre_action(action, policy_step)
-        self.world.grip = float(action[-1])
+        self.world.arm.grip = float(action[-1])
         self.world.loop.watch(first=self._substep == 0)
 
     def _update_observables(self, force: bool = False) -> None:
@@ -195,24 +193,22 @@ class ScenarioEnv(ManipulationEnv):
     def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
         reward, done, info = super()._post_action(action)
         success = self._check_success()
-        return reward, done, {**info, "scenario": self.row["id"], "success": success, "reason": self.reason}
+        return reward, done, {**info, "scenario": self.row["id"], "success": success, "reason": self.episode.reason}
 
     # --- the certificate's clock ----------------------------------------------------------
 
     def _period_ends(self) -> None:
         """Judge the control period that has passed, and let the scene's events of the next happen."""
         mujoco.mj_kinematics(self.world.model, self.world.data)  # else poses are those of 2 ms before
-        if self.outcome is None:
-            unstable = ("unstable", ", ".join(self.world.warnings)) if self.world.warnings else None
-            self.outcome, self.reason = unstable or self._judge.look(self.world) or (None, "")
-        elif self.outcome == "success" and (lost := self.scenario.failure(self.world)):
-            self.outcome, self.reason = "failure", f"after the goal was reached: {lost}"
-        self.scenario.script(self.world)
+        if self.episode.outcome is None and self.world.warnings:
+            self.episode.outcome, self.episode.reason = "unstable", ", ".join(self.world.warnings)
+        self.episode.judge()
+        self.episode.begin()
 
     def _moving(self) -> list[str]:
         """Bodies of the scene that have joints."""
         model = self.world.model
-        robot = self.world.body("robot0_base")
+        robot = self.world.body(Names().base)
         jointed = np.flatnonzero((model.body_jntnum > 0) & (model.body_rootid != robot))
         return [model.body(int(body)).name for body in jointed]
 

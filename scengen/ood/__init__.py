@@ -1,1 +1,1 @@
-"""Out of distribution: what an axis is, and the proof that it leaves the training support."""
+"""Evidence on an OOD axis: features, replayed actions, boundaries, cards."""

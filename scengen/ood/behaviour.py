@@ -1,4 +1,4 @@
-"""What a shift does to behaviour: tapes that solve training scenarios are played in their OOD twins."""
+"""What a shift does to behaviour: replays that solve training scenarios are played in their OOD twins."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Infeasible
-from ..log import Log
 from ..parallel import each
+from ..runs.log import Log
 from ..samplers.task import ID, Task
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
 from ..statistics import wilson
 from ..validate.identity import source_sha256
-from ..validate.rollout import Episode, Tape, replay, run
+from ..validate.rollout import Actions, Episode, replay, run
 
 EXTRAPOLATION = "true extrapolation"
 COSMETIC = "cosmetic"
@@ -27,7 +27,7 @@ KINDS: dict[tuple[bool, bool], str] = {
     (False, False): UNKNOWN,
     (True, False): BUG,
 }
-"""What it means whether (the tape of the ID twin, the oracle) solves an OOD scenario."""
+"""What it means whether (the actions of the ID twin, the oracle) solves an OOD scenario."""
 
 
 @dataclass(frozen=True)
@@ -35,17 +35,17 @@ class Trial:
     """One OOD scenario, tried twice."""
 
     index: int
-    tape: bool
+    replay: bool
     """Whether the actions that solve its ID twin solve it."""
     oracle: bool
     """Whether its oracle solves it; False too if the scenario is infeasible."""
     reason: str
-    """Why the tape failed; or why there is no scenario."""
+    """Why the actions failed; or why there is no scenario."""
 
     @property
     def kind(self) -> str:
         """One of the values of `KINDS`."""
-        return KINDS[self.tape, self.oracle]
+        return KINDS[self.replay, self.oracle]
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ def try_twins(
     workers: int = 1,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Trial]:
-    """Play ID tapes in the first n scenarios of a split, continuing what stands in `folder`.
+    """Play ID witnesses in the first n scenarios of a split, continuing what stands in `folder`.
 
-    Twins that their own oracle cannot solve have no tape and are left out.
+    Twins that their own oracle cannot solve have no actions and are left out.
 
     Args:
         progress: told how many twins are done.
     """
-    moves = {name: str(dist) for name, dist in task.moves(split).items()}
+    moves = {name: str(dist) for name, dist in task.shifts(split).items()}
     identity = {"task": task.name, "split": split, "moves": moves, "seed": seed, "source": source_sha256(task.family)}
     with Log(folder / "behaviour.jsonl", identity) as log:
         todo = sorted(set(range(n)) - {r["index"] for r in log.records})
@@ -83,7 +83,7 @@ def try_twins(
             log.add(trial)
             progress(len(log.records))
         records = sorted((r for r in log.records if r["index"] < n), key=lambda r: r["index"])
-    return [Trial(**r) for r in records if r["tape"] is not None]
+    return [Trial(**r) for r in records if r["replay"] is not None]
 
 
 def shares(trials: Iterable[Trial]) -> list[Share]:
@@ -94,23 +94,23 @@ def shares(trials: Iterable[Trial]) -> list[Share]:
     return [Share(kind, k, k / n, *wilson(k / n, n)) for kind, k in counts.items()] if n else []
 
 
-def attempt(task: Task, tape: Tape, scenario: Scenario) -> tuple[bool, bool, str]:
-    """Whether a tape and whether the oracle solve a scenario, and why the tape does not."""
+def attempt(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool, str]:
+    """Whether a actions and whether the oracle solve a scenario, and why the actions does not."""
     world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
-    played = replay(scenario, world, tape, task.horizon, until_settled=True)
+    played = replay(scenario, world, actions, task.horizon, until_settled=True)
     return played.solved, _solution(scenario, world, task.horizon).solved, played.reason
 
 
-def twin_tape(task: Task, seed: int, index: int) -> Tape | None:
+def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
     """Actions with which the oracle solves a training scenario, or None."""
-    return _tape(task.draw(ID, seed, index).scenario, task.horizon, task.embodiment)
+    return _actions(task.draw(ID, seed, index).scenario, task.horizon, task.embodiment)
 
 
 @cache
-def _tape(scenario: Scenario, horizon: float, embodiment: str) -> Tape | None:
+def _actions(scenario: Scenario, horizon: float, embodiment: str) -> Actions | None:
     world = World.load(scene_text.emit(scenario.build())[0], embodiment)
     episode = _solution(scenario, world, horizon)
-    return episode.tape if episode.solved else None
+    return episode.actions if episode.solved else None
 
 
 def _solution(scenario: Scenario, world: World, horizon: float) -> Episode:
@@ -118,12 +118,12 @@ def _solution(scenario: Scenario, world: World, horizon: float) -> Episode:
 
 
 def _try_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """One trial as plain data; `tape` is None where there is no tape to try."""
+    """One trial as plain data; `actions` is None where there is no actions to try."""
     found: tuple[bool | None, bool, str]
-    tape = twin_tape(task, seed, index)
+    actions = twin_actions(task, seed, index)
     try:
         scenario = task.draw(split, seed, index).scenario
-        found = attempt(task, tape, scenario) if tape is not None else (None, False, "")
+        found = attempt(task, actions, scenario) if actions is not None else (None, False, "")
     except Infeasible as error:
         found = False, False, str(error)
-    return {"index": index, **dict(zip(("tape", "oracle", "reason"), found, strict=True))}
+    return {"index": index, **dict(zip(("replay", "oracle", "reason"), found, strict=True))}

@@ -1,4 +1,4 @@
-"""How far along an axis memorised tapes live, and how far the oracle: a search in the axis' own direction.
+"""How far along an axis memorised replays live, and how far the oracle: a search in the axis' own direction.
 
 A place on the way is a fraction: 0 is the edge of training, 1 the axis' far end, and beyond 1 the way goes on to the
 bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training with the
@@ -20,23 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadConfig, OutOfBounds
-from ..log import Log
 from ..params import Value, with_values
+from ..runs.log import Log
+from ..samplers.axis import Axis
 from ..samplers.dists import Choice, Fixed
 from ..samplers.keyed import unit
+from ..samplers.support import distance
 from ..samplers.task import ID, Task
 from ..validate.identity import source_sha256
-from .axis import Axis
-from .behaviour import attempt, twin_tape
-from .support import distance
+from .behaviour import attempt, twin_actions
 
-TAPE, ORACLE = "tape", "oracle"
+REPLAY, ORACLE = "replay", "oracle"
 BATCH = 4
 """Twins that are tried at one place before the search moves on; a round."""
 FIRST = (math.inf, 0.0, 1.0)
 """Where the first rounds look: the end of the way, the edge of training, the far end of the axis."""
 BISECTIONS = 4
-"""Rounds at the most likely middle, for each of tape and oracle, before the band is sampled."""
+"""Rounds at the most likely middle, for each of actions and oracle, before the band is sampled."""
 BAND = 0.7
 """The band of interest: chances of success from 1 - BAND to BAND."""
 FARTHEST, STEP = 10.0, 0.02
@@ -48,7 +48,7 @@ class Boundary:
     """Where success falls to one half."""
 
     who: str
-    """`tape`: actions that solved the ID twin; `oracle`: the task's own solution."""
+    """`actions`: actions that solved the ID twin; `oracle`: the task's own solution."""
     middle: float
     """The place on the way, as a fraction: posterior median."""
     low: float
@@ -95,7 +95,7 @@ def search(
                 log.add(_try(way, seed, place, index))
                 progress(index + 1, rounds * BATCH)
         trials = log.records[: rounds * BATCH]
-    return {who: _boundary(who, trials, way) for who in (TAPE, ORACLE)}
+    return {who: _boundary(who, trials, way) for who in (REPLAY, ORACLE)}
 
 
 def no_way(task: Task, axis: Axis) -> str:
@@ -167,19 +167,19 @@ def _try(way: Way, seed: int, place: float, index: int) -> dict[str, Any]:
     """One twin at one place; None for a twin whose own oracle fails, and so says nothing about the axis."""
     task = way.task
     scenario = task.draw(ID, seed, index).scenario
-    tape = twin_tape(task, seed, index)
+    actions = twin_actions(task, seed, index)
     found: tuple[bool | None, bool | None] = (None, None)
-    if tape is not None:
+    if actions is not None:
         moved = with_values(scenario, way.values(place, seed, index))
-        found = (False, False) if moved.infeasible() else attempt(task, tape, moved)[:2]
-    return {"index": index, "place": place, TAPE: found[0], ORACLE: found[1]}
+        found = (False, False) if moved.infeasible() else attempt(task, actions, moved)[:2]
+    return {"index": index, "place": place, REPLAY: found[0], ORACLE: found[1]}
 
 
 def _next(number: int, trials: list[dict[str, Any]], end: float) -> float:
     """Where to look in round `number`, given all earlier trials."""
     if number < len(FIRST):
         return min(end, FIRST[number])
-    who = (TAPE, ORACLE)[number % 2]
+    who = (REPLAY, ORACLE)[number % 2]
     middle, spread = _Posterior(trials, who, end).centre
     if number >= len(FIRST) + 2 * BISECTIONS:
         logit = math.log(BAND / (1 - BAND))

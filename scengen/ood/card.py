@@ -10,18 +10,20 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
-from .. import film, generate, render
+from ..analysis import distance
+from ..analysis.space import of_features
 from ..errors import UnknownName, at_least
-from ..plots import svg
+from ..pictures import film, render
+from ..pictures.plots import svg
+from ..pictures.report import thumbnail
 from ..pool import Pool, Row
-from ..report import thumbnail
+from ..runs import generate
+from ..samplers.axis import Proof, spell
+from ..samplers.support import Support
 from ..samplers.task import ID, Task
 from ..sim import scene_text
-from ..validate.level import Level
-from . import behaviour, boundary, distance, features
-from .axis import Proof, spell
-from .space import of_features
-from .support import Support
+from ..validate.settings import CertifySettings
+from . import behaviour, boundary, features
 
 SHOWN = 4
 """Twins whose pictures are shown side by side."""
@@ -29,7 +31,7 @@ SHOWN = 4
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `scengen axis`; meanings stand in conf/axis.yaml."""
+    """Settings of `scengen axis`; meanings stand in conf/command/axis.yaml."""
 
     axis: str = ""
     n: int = 50
@@ -80,7 +82,7 @@ class Card:
 def make(
     task: Task,
     node: Mapping[str, Any],
-    level: Level,
+    level: CertifySettings,
     settings: Settings,
     folder: Path,
     progress: Callable[[str, int, int], None],
@@ -98,7 +100,7 @@ def make(
     wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
     made = generate.generate(task, node, level, wanted, lambda done, *_: progress("certify twins", done, n))
     trials = behaviour.try_twins(
-        task, name, folder, n, seed, settings.workers, lambda done: progress("play ID tapes", done, n)
+        task, name, folder, n, seed, settings.workers, lambda done: progress("play ID witnesses", done, n)
     )
     boundaries, no_way = _boundaries(task, name, folder, seed, settings.rounds, progress)
     twins = [(task.draw(ID, seed, row["index"]).scenario, task.scenario(row["params"])) for row in made.pool.rows()]
@@ -151,7 +153,7 @@ def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
         strips = [*_strips(task, rows[0])] if rows else []
     except render.NoPictures as error:
         remark = str(error)
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "templates"), autoescape=True)
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "pictures/templates"), autoescape=True)
     page = environment.get_template("axis_card.html").render(
         card=card,
         task=task,
@@ -210,7 +212,7 @@ def _support(plot: Any, support: Support, y: float, colour: str) -> None:
 
 
 def _way(card: Card) -> Figure:
-    """Where tape and oracle die on the way of the axis."""
+    """Where actions and oracle die on the way of the axis."""
     figure = Figure(figsize=(7.5, 1.5))
     plot = figure.subplots()
     end = max(b.end for b in card.boundaries.values())

@@ -78,7 +78,7 @@ def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Eviden
     twins = _twins(task, split, draws, seed)
     if not twins:
         raise BadConfig(f"{task.name}/{split}: none of {draws} indices is feasible; widen the distributions")
-    moved = task.moves(split)
+    moved = task.shifts(split)
     before, after = [values(t) for t, _ in twins], [values(s) for _, s in twins]
     differ = [{n for n in a if a[n] != b[n]} for a, b in zip(before, after, strict=True)]
     here = [dict(s.features()) for _, s in twins]

@@ -116,8 +116,8 @@ class _Arm:
         panda.attach(spec)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self.site = self.model.site("gripper0_right_grip_site").id
-        joints = [self.model.joint(f"robot0_joint{i + 1}") for i in range(panda.JOINTS)]
+        self.site = self.model.site(panda.Names().grip_site).id
+        joints = [self.model.joint(name) for name in panda.Names().joints]
         self.at = np.array([joint.qposadr[0] for joint in joints])
         self.dofs = np.array([joint.dofadr[0] for joint in joints])
         ranges = np.array([joint.range for joint in joints])

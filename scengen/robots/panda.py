@@ -8,6 +8,7 @@ them all.
 import functools
 import importlib.util
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -53,6 +54,73 @@ farther.
 """
 
 
+@dataclass(frozen=True)
+class Names:
+    """How robosuite names the parts of one robot and its hand."""
+
+    number: int = 0
+
+    @property
+    def arm(self) -> str:
+        """What the name of every part of the arm begins with."""
+        return f"robot{self.number}_"
+
+    @property
+    def hand(self) -> str:
+        """What the name of every part of the hand begins with."""
+        return f"gripper{self.number}_right_"
+
+    @property
+    def joints(self) -> list[str]:
+        """The arm's joints, from the base on."""
+        return [f"{self.arm}joint{i + 1}" for i in range(JOINTS)]
+
+    @property
+    def motors(self) -> list[str]:
+        """The arm's motors, in the order of the joints."""
+        return [f"{self.arm}torq_j{i + 1}" for i in range(JOINTS)]
+
+    @property
+    def finger_joints(self) -> list[str]:
+        """The jaw's two joints."""
+        return [f"{self.hand}finger_joint{i}" for i in (1, 2)]
+
+    @property
+    def finger_motors(self) -> list[str]:
+        """The jaw's two motors."""
+        return [f"{self.hand}gripper_finger_joint{i}" for i in (1, 2)]
+
+    @property
+    def base(self) -> str:
+        """The body that stands on the mount."""
+        return f"{self.arm}base"
+
+    @property
+    def controller_site(self) -> str:
+        """The site whose axes are the controller's."""
+        return f"{self.arm}right_center"
+
+    @property
+    def grip_site(self) -> str:
+        """The site that the controller moves: between the finger tips, or in the middle of a cup's lip."""
+        return f"{self.hand}grip_site"
+
+    @property
+    def wrist_site(self) -> str:
+        """The site of the force and torque sensors."""
+        return f"{self.hand}ft_frame"
+
+    @property
+    def cup(self) -> str:
+        """The actuator of a suction cup."""
+        return f"{self.hand}suction"
+
+    @property
+    def first_pad(self) -> str:
+        """The first of a suction cup's four pads."""
+        return f"{self.hand}pad0_collision"
+
+
 def attach(scene: mujoco.MjSpec, visual: bool = False, hand: mujoco.MjSpec | None = None) -> None:
     """Add the robot to `scene`, named and placed as in robosuite's table environments.
 
@@ -65,16 +133,16 @@ def attach(scene: mujoco.MjSpec, visual: bool = False, hand: mujoco.MjSpec | Non
     arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), (hand or _jaw(visual)).copy()
     # Arm first: what is attached to it before it is in the scene gets its prefix too (robot0_gripper0_ ...).
     place = scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist())
-    place.attach_body(arm.body("base"), "robot0_", "")
-    base, wrist = scene.body("robot0_base"), scene.body("robot0_right_hand")
+    names = Names()
+    place.attach_body(arm.body("base"), names.arm, "")
+    base, wrist = scene.body(names.base), scene.body(f"{names.arm}right_hand")
     base.add_frame().attach_body(mount.body("base"), "fixed_mount0_", "")
-    wrist.add_frame().attach_body(hand.body("right_gripper"), "gripper0_right_", "")
+    wrist.add_frame().attach_body(hand.body("right_gripper"), names.hand, "")
 
 
-def fingers(model: mujoco.MjModel) -> list[int]:
+def fingers(model: mujoco.MjModel, names: Names) -> list[int]:
     """Places of the finger joints in qpos; none for a hand without a jaw."""
-    names = [f"gripper0_right_finger_joint{i}" for i in (1, 2)]
-    found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names]
+    found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names.finger_joints]
     return [int(model.jnt_qposadr[joint]) for joint in found if joint >= 0]
 
 

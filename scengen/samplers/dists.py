@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import BadConfig, nearest
-from ..ood.support import Interval, Support
 from ..params import Value
+from .support import Interval, Support
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,18 @@ from typing import Any
 from hydra.utils import get_class
 
 from ..errors import BadConfig, Infeasible, UnknownName, nearest
-from ..ood.axis import Axis, Proof
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
 from ..sim.world import EMBODIMENTS, JAW
 from . import designs
+from .axis import Axis, Proof
 from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
 
 ID = "id"
 """Name of the split that policies train on."""
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
-OPTIONAL = ("axes", "certify", "embodiment", "boundary")
+OPTIONAL = ("axes", "certify", "embodiment", "limits")
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Proposal:
 
     attempt: int
     scenario: Scenario
-    numbers: Mapping[str, float]
+    quantiles: Mapping[str, float]
     """What the design gave for each parameter that varies, in (0, 1)."""
     refutation: Refutation | None
     trained: Scenario | None
@@ -48,11 +48,11 @@ class Draw:
     attempt: int
     """Which try was the first feasible one."""
     scenario: Scenario
-    numbers: Mapping[str, float]
+    quantiles: Mapping[str, float]
     """See `Proposal`."""
-    twin: str
+    id_twin: str
     """Id of the training scenario with the same index: it differs in the parameters of the split's axes only."""
-    moved: Mapping[str, Value]
+    shifted: Mapping[str, Value]
     """Values of the parameters that the split's axes name."""
     rejected: Mapping[str, int]
     """How many earlier tries were infeasible, by reason."""
@@ -122,21 +122,21 @@ class Task:
         self.prove(severe)
         return severe
 
-    def moves(self, split: str) -> dict[str, Dist]:
+    def shifts(self, split: str) -> dict[str, Dist]:
         """The distributions that a split replaces: none for `id`, those of all axes for `a+b`, levels as in `a@2+b`.
 
         Raises:
             UnknownName: there is no such axis.
             BadConfig: it has no such level, or two axes move the same parameter.
         """
-        moved: dict[str, Dist] = {}
+        shifted: dict[str, Dist] = {}
         for axis in [] if split == ID else map(self.axis, split.split("+")):
-            if both := moved.keys() & axis.replace.keys():
+            if both := shifted.keys() & axis.replace.keys():
                 raise BadConfig(
                     f"split {split}: two of its axes move {', '.join(sorted(both))}; compose axes that differ"
                 )
-            moved.update(axis.replace)
-        return moved
+            shifted.update(axis.replace)
+        return shifted
 
     def design(self, spelled: str) -> Design:
         """Where the numbers come from: `iid`, `sobol`, `lhs:50` or `grid:3`.
@@ -163,10 +163,10 @@ class Task:
         if last.refutation:
             rejected[last.refutation.reason] += 1
             raise Infeasible(f"{self.name}/{split}/{index}", rejected.total(), rejected)
-        scenario, moves = last.scenario, self.moves(split)
-        moved = {p.name: p.nominal for p in parameters(scenario) if p.name in moves}
+        scenario, shifts = last.scenario, self.shifts(split)
+        shifted = {p.name: p.nominal for p in parameters(scenario) if p.name in shifts}
         twin = (last.trained or scenario).id
-        return Draw(self.name, split, seed, index, last.attempt, scenario, last.numbers, twin, moved, rejected)
+        return Draw(self.name, split, seed, index, last.attempt, scenario, last.quantiles, twin, shifted, rejected)
 
     def proposals(self, split: str, seed: int, index: int, design: Design | None = None) -> Iterator[Proposal]:
         """Every try at an index; the last one is feasible, if any is.
@@ -178,9 +178,9 @@ class Task:
         if split == ID:
             yield from self._tries(self.training, None, {}, seed, index, design)
         else:
-            moves, trained = self.moves(split), self.draw(ID, seed, index, design)
-            kept = {name: u for name, u in trained.numbers.items() if name not in moves}
-            yield from self._tries(moves, trained.scenario, kept, seed, index, design)
+            shifts, trained = self.shifts(split), self.draw(ID, seed, index, design)
+            kept = {name: u for name, u in trained.quantiles.items() if name not in shifts}
+            yield from self._tries(shifts, trained.scenario, kept, seed, index, design)
 
     def _tries(
         self,
@@ -193,10 +193,10 @@ class Task:
     ) -> Iterator[Proposal]:
         start, varied = trained or self.family(), [n for n, d in space.items() if not isinstance(d, Fixed)]
         for attempt in range(design.tries if varied else 1):  # without anything varied all tries are the same
-            numbers = {name: design.number(name, seed, index, attempt) for name in varied}
-            scenario = with_values(start, {n: d.quantile(numbers.get(n, 0.5)) for n, d in space.items()})
+            quantiles = {name: design.number(name, seed, index, attempt) for name in varied}
+            scenario = with_values(start, {n: d.quantile(quantiles.get(n, 0.5)) for n, d in space.items()})
             refutation = scenario.infeasible()
-            yield Proposal(attempt, scenario, {**kept, **numbers}, refutation, trained)
+            yield Proposal(attempt, scenario, {**kept, **quantiles}, refutation, trained)
             if refutation is None:
                 return
 
@@ -214,7 +214,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     training.update(_space(f"{name}.id", node["id"] or {}, known))
     for symmetry in family.SYMMETRIES:
         symmetry.check(known)
-    axes, limits = {}, node.get("boundary") or {}
+    axes, limits = {}, node.get("limits") or {}
     for axis, inner in (node.get("axes") or {}).items():
         where = f"{name}.axes.{axis}"
         if axis == ID or not str(axis).isidentifier():
@@ -300,11 +300,11 @@ def _levels(where: str, levels: Any) -> int:
 def _limits(
     task: str, axis: str, replaced: Mapping[str, Any], nodes: Any, known: Mapping[str, Parameter]
 ) -> dict[str, float]:
-    """Measured limits of the parameters of one axis, from conf/boundary/<task>.yaml.
+    """Measured limits of the parameters of one axis, from conf/limits/<task>.yaml.
 
     Limits of what is no part of the axis are left alone: a command line may change or drop axes that were measured.
     """
-    where, names = f"{task}.boundary.{axis}", dict(leaves(replaced))
+    where, names = f"{task}.limits.{axis}", dict(leaves(replaced))
     if not isinstance(nodes, Mapping):
         raise BadConfig(f"{where} = {nodes!r}; expected parameters and where the oracle dies")
     limits = {name: value for name, value in leaves(nodes) if name in names}

@@ -10,16 +10,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..control.loop import Loop
+from ..control.teleop import Filter
 from ..errors import UnknownName, Unstable
-from ..robots import osc, panda, suction
-from ..robots.teleop import Filter
+from ..geometry import Mat3, Vec3
+from ..robots import panda, suction
+from ..robots.panda import Names
 from . import scene_text
-from .loop import Loop
-
-Vec3 = NDArray[np.float64]
-"""Shape (3,)."""
-Mat3 = NDArray[np.float64]
-"""Shape (3, 3), columns are the axes of the body."""
 
 ROBOT = "robot"
 """Stands for any body of the robot in questions about contact."""
@@ -46,6 +43,65 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
     return scene
 
 
+class Arm:
+    """One arm of a world with its hand: what a move looks at, and steers."""
+
+    def __init__(self, world: "World", number: int):
+        model, names = world.model, Names(number)
+        self.world, self.number, self.data = world, number, world.data
+        self.grip = -1.0
+        """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
+        joints = [model.joint(name) for name in names.joints]
+        self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
+        self._fingers = panda.fingers(model, names)
+        self._site = model.site(names.grip_site).id
+
+    @property
+    def hand(self) -> Vec3:
+        """Position of the grip site, between the finger tips or in the middle of the suction cup's lip [m]."""
+        return self.data.site_xpos[self._site].copy()
+
+    @property
+    def hand_rot(self) -> Mat3:
+        """Orientation of the grip site; its z axis points out of the hand."""
+        return self.data.site_xmat[self._site].reshape(3, 3).copy()
+
+    @property
+    def joint_pos(self) -> NDArray[np.float64]:
+        """Angles of the seven joints [rad]."""
+        return self.data.qpos[self._qpos]
+
+    @property
+    def joint_vel(self) -> NDArray[np.float64]:
+        """Speeds of the seven joints [rad/s]."""
+        return self.data.qvel[self._dofs]
+
+    @property
+    def finger_pos(self) -> NDArray[np.float64]:
+        """Positions of the two finger joints [m]; empty without a jaw."""
+        return self.data.qpos[self._fingers]
+
+    @property
+    def sealed(self) -> bool:
+        """Whether the suction cup pulled at the last physics step: switched on, with its lip closed."""
+        return bool(self.data.ctrl[self._cup] > 0.0)
+
+    @property
+    def idle(self) -> NDArray[np.float64]:
+        """The action without motion that keeps the gripper command, shape (7,)."""
+        return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.grip])
+
+    @functools.cached_property
+    def wrist_range(self) -> tuple[float, float]:
+        """Limits of the last joint [rad]."""
+        low, high = self.world.model.joint(Names(self.number).joints[-1]).range
+        return float(low), float(high)
+
+    @functools.cached_property
+    def _cup(self) -> int:
+        return self.world.model.actuator(Names(self.number).cup).id
+
+
 @dataclass
 class World:
     """Names -> numbers. Holds no task logic. Made by `World.load`, driven by `step`."""
@@ -54,8 +110,11 @@ class World:
     data: mujoco.MjData
     loop: Loop
     filter: Filter = field(default_factory=Filter)
-    grip: float = -1.0
-    """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
+    arms: tuple[Arm, ...] = field(init=False)
+    """All arms of the robot; an action holds seven numbers for each, in this order."""
+
+    def __post_init__(self) -> None:
+        self.arms = (Arm(self, 0),)
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> Self:
@@ -84,10 +143,11 @@ class World:
         """Back to the start; a used world then behaves bit by bit like a fresh one."""
         self.loop.reset()
         self.filter.reset()
-        self.grip = -1.0
+        for arm in self.arms:
+            arm.grip = -1.0
 
     def step(self, action: ArrayLike) -> NDArray[np.float32]:
-        """Pass an action through the teleoperation filter and live one control period of 10 ms.
+        """Pass an action through the teleoperation filter and advance one control period (10 ms).
 
         Returns:
             What the controller received, shape (7,).
@@ -96,17 +156,18 @@ class World:
             Unstable: MuJoCo raised a warning.
         """
         filtered = self.filter(action)
-        self.follow(filtered)
+        self.apply(filtered)
         return filtered
 
-    def follow(self, filtered: NDArray[np.float32]) -> None:
-        """Live one control period under an action that has passed the filter already, shape (7,).
+    def apply(self, filtered: NDArray[np.float32]) -> None:
+        """Advance one control period under an action that has passed the filter already, shape (7,).
 
         Raises:
             Unstable: MuJoCo raised a warning.
         """
-        self.grip = float(filtered[6])
-        if self.loop.tick(filtered):
+        for arm in self.arms:
+            arm.grip = float(filtered[7 * arm.number + 6])
+        if self.loop.step(filtered):
             raise Unstable(f"MuJoCo raised a warning at t = {self.time:.3f} s: {', '.join(self.warnings)}")
 
     # --- questions ------------------------------------------------------------------------
@@ -117,29 +178,15 @@ class World:
         return self.data.time
 
     @property
-    def hand(self) -> Vec3:
-        """Position of the grip site, between the finger tips or in the middle of the suction cup's lip [m]."""
-        return self.data.site_xpos[self._grip_site].copy()
+    def arm(self) -> Arm:
+        """The only arm of a world that has one."""
+        (arm,) = self.arms
+        return arm
 
     @property
-    def hand_frame(self) -> Mat3:
-        """Orientation of the grip site; its z axis points out of the hand."""
-        return self.data.site_xmat[self._grip_site].reshape(3, 3).copy()
-
-    @property
-    def joint_pos(self) -> NDArray[np.float64]:
-        """Angles of the arm's seven joints [rad]."""
-        return self.data.qpos[self._joints[0]]
-
-    @property
-    def joint_vel(self) -> NDArray[np.float64]:
-        """Speeds of the arm's seven joints [rad/s]."""
-        return self.data.qvel[self._joints[1]]
-
-    @property
-    def finger_pos(self) -> NDArray[np.float64]:
-        """Positions of the two finger joints [m]; empty without a jaw."""
-        return self.data.qpos[self._joints[2]]
+    def idle(self) -> NDArray[np.float64]:
+        """The action without motion that keeps all gripper commands, shape (7 * arms,)."""
+        return np.concatenate([arm.idle for arm in self.arms])
 
     def pos(self, body: str) -> Vec3:
         """Origin of a body [m]."""
@@ -149,7 +196,7 @@ class World:
         """Centre of mass of a body [m]."""
         return self.data.xipos[self.body(body)].copy()
 
-    def frame(self, body: str) -> Mat3:
+    def rot(self, body: str) -> Mat3:
         """Orientation of a body."""
         return self.data.xmat[self.body(body)].reshape(3, 3).copy()
 
@@ -171,10 +218,10 @@ class World:
         """Whether two bodies were in contact at any physics step since the start."""
         return bool(self.loop.touched[self._label(a), self._label(b)])
 
-    @property
-    def sealed(self) -> bool:
-        """Whether the suction cup pulled at the last physics step: switched on, with its lip closed."""
-        return bool(self.data.ctrl[self.model.actuator(osc.CUP).id] > 0.0)
+    def touching_bodies(self, body: str) -> set[str]:
+        """Names of the bodies that a body was in contact with in the last control period; `ROBOT` stands for its own."""
+        others = np.flatnonzero(self.loop.touching[self._label(body)])
+        return {ROBOT if i == self.model.nbody else self.model.body(int(i)).name for i in others if i not in self._own}
 
     @property
     def free_bodies(self) -> tuple[str, ...]:
@@ -189,14 +236,15 @@ class World:
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the future depends on, in one vector."""
-        return np.concatenate([self.loop.state(), self.filter.state, [self.grip]])
+        return np.concatenate([self.loop.state(), self.filter.state, [arm.grip for arm in self.arms]])
 
     def restore(self, state: NDArray[np.float64]) -> None:
         """Continue from `state()` of a world of the same scene, bit by bit."""
-        n = len(self.filter.state)
-        self.loop.restore(state[: -n - 1])
-        self.filter.state = state[-n - 1 : -1]
-        self.grip = float(state[-1])
+        loop, motion, grips = np.split(state, [-len(self.filter.state) - len(self.arms), -len(self.arms)])
+        self.loop.restore(loop)
+        self.filter.state = motion
+        for arm, grip in zip(self.arms, grips, strict=True):
+            arm.grip = float(grip)
 
     @property
     def digest(self) -> str:
@@ -219,14 +267,9 @@ class World:
         return {self.model.body(i).name: i for i in range(self.model.nbody)}
 
     @functools.cached_property
-    def _joints(self) -> tuple[list[int], list[int], list[int]]:
-        """Places of the arm's joints in qpos and in qvel, and of the fingers in qpos."""
-        arm = [self.model.joint(f"robot0_joint{i + 1}") for i in range(panda.JOINTS)]
-        return [j.qposadr[0] for j in arm], [j.dofadr[0] for j in arm], panda.fingers(self.model)
-
-    @functools.cached_property
-    def _grip_site(self) -> int:
-        return self.model.site("gripper0_right_grip_site").id
+    def _own(self) -> frozenset[int]:
+        """Bodies of the robot."""
+        return frozenset(np.flatnonzero(self.model.body_rootid == self.model.body(Names().base).id).tolist())
 
     @functools.cached_property
     def _free(self) -> tuple[str, ...]:

@@ -32,13 +32,13 @@ import numpy as np
 
 from ..assets.ball import Ball
 from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage
-from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..assets.stool import Stool
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, rotate, wait
+from ..skills.motion import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, rotate, wait
 
 STILL = 0.02
 """Speed below which the ball counts as lying [m/s]: at the nominal rolling friction it stops within 1 mm."""
@@ -174,7 +174,7 @@ class BallCageEscape(Scenario):
     def build(self) -> mujoco.MjSpec:
         return self._scene(self.cage)
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no hole": self._scene(dataclasses.replace(self.cage, closed=True))}
 
     def _scene(self, cage: HoledCage) -> mujoco.MjSpec:
@@ -198,7 +198,7 @@ class BallCageEscape(Scenario):
 
     def ball_in_cage(self, world: World) -> Vec3:
         """The ball's centre in the cage's axes [m]."""
-        return world.frame("cage").T @ (world.com("ball") - world.pos("cage"))
+        return world.rot("cage").T @ (world.com("ball") - world.pos("cage"))
 
     def success(self, world: World) -> bool:
         velocity = world.velocity("ball")[3:]
@@ -257,9 +257,9 @@ class BallCageEscape(Scenario):
         spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
         yield from go_to(world, [spot[0], spot[1], max(world.hand[2], spot[2])], speed=0.2, within=0.01)
         yield from go_to(world, spot, speed=0.2, within=0.01)
-        turn = self._turn_to_middle(world, world.frame("cage") @ down, -side)
+        turn = self._turn_to_middle(world, world.rot("cage") @ down, -side)
         for _ in range(2):  # each half is the shorter way
-            yield from rotate(world, _about_z(turn / 2) @ world.hand_frame, rate=2.0)
+            yield from rotate(world, _about_z(turn / 2) @ world.hand_rot, rate=2.0)
 
     @staticmethod
     def _turn_to_middle(world: World, leaning: Vec3, side: float) -> float:
@@ -273,8 +273,8 @@ class BallCageEscape(Scenario):
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
-        turn = _shortest(world.frame("cage") @ down, -UP)
-        yield from rotate(world, turn @ world.hand_frame, rate, until=lambda: self.out(world))
+        turn = _shortest(world.rot("cage") @ down, -UP)
+        yield from rotate(world, turn @ world.hand_rot, rate, until=lambda: self.out(world))
 
     def watch(self, world: World) -> Plan:
         """Wait until the ball has come to rest in the cage, or is out."""
@@ -326,7 +326,7 @@ def _towards_end(tilt: float) -> Vec3:
 
 def hand_yaw(world: World) -> float:
     """The `yaw` of `facing_down` for a hand that points about down, counted from -125 deg up [rad]."""
-    x = world.hand_frame[:, 0]
+    x = world.hand_rot[:, 0]
     return (math.atan2(-x[0], x[1]) + math.radians(125.0)) % (2 * math.pi) - math.radians(125.0)
 
 

@@ -40,13 +40,13 @@ import mujoco
 import numpy as np
 from scipy.optimize import root_scalar
 
-from ..assets.domino import Domino
-from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.box import Domino
+from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import check_bounds, param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, push, wait
+from ..skills.motion import CLOSED, OPEN, facing_down, go_to, grasp, push, wait
 
 LANES = 5
 """Chains on the table (paper, App. B, T18)."""
@@ -235,7 +235,7 @@ class DominoSelect(Scenario):
             place(scene, piece.domino, name, self.foot(name), math.radians(self.heading))
         return scene
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the intact chain its first tile falls on nothing; one tile less might be bridged by the others."""
         scene = self.build()
         for i in range(1, self.count):

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ..assets.domino import Domino
-from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.box import Domino
+from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Vec3, World
-from ..validate.moves import CLOSED, facing_down, go_to, push, wait
+from ..skills.motion import CLOSED, facing_down, go_to, push, wait
 
 SLAB_MOVES = 0.05
 """How far the slab's centre of mass must go, measured along the table [m] (paper, App. B, T17)."""
@@ -97,7 +97,7 @@ class DominoSingle(Scenario):
         place(scene, self.slab, "slab", self.spot(self.count), yaw + math.radians(self.slab_yaw))
         return scene
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the chain the first tile falls on nothing; one tile less may still be bridged by the others."""
         scene = self.build()
         for i in range(1, self.count):

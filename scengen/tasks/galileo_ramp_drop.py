@@ -37,13 +37,13 @@ import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
+from ..assets.prop import PRIORITY, STIFF, TABLE_HALF, TABLE_TOP, UP, place, table
 from ..assets.ramp import RIM, WALL, Ramp
-from ..assets.scene import PRIORITY, STIFF, TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import OPEN, facing_down, go_to, grasp, push, release, wait
+from ..skills.motion import OPEN, facing_down, go_to, grasp, push, release, wait
 
 JAW = 0.132
 """Width of the open jaw with its fingers [m], measured on the model as the next two."""
@@ -193,7 +193,7 @@ class GalileoRampDrop(Scenario):
                 rgba=[0.35, 0.38, 0.45, 1.0],
             )
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it."""
         near, far = self.build(), self.build()
         _clear(near, "ramp/near")

@@ -41,14 +41,14 @@ from ..assets import guillotine
 from ..assets.bin import Bin
 from ..assets.guillotine import Ell, Rect
 from ..assets.l_piece import Box, LPiece
-from ..assets.scene import TABLE_TOP, UP, place, table
+from ..assets.prop import TABLE_TOP, UP, place, table
 from ..params import check_bounds, param
 from ..robots.panda import REACH, SHOULDER
 from ..robots.suction import REACHES
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Vec3, World
-from ..validate.moves import OPEN, facing_down, go_to, turn_between
-from ..validate.suction import carry, let_go, suck, upright, yaw_of
+from ..skills.motion import OPEN, facing_down, go_to, turn_between
+from ..skills.suction import carry, let_go, suck, upright, yaw_of
 
 FLAT = math.radians(2.0)
 """Largest tilt of a piece that lies flat [rad]. The thinnest piece with a side on a neighbour tilts by 4 deg."""
@@ -234,7 +234,7 @@ class Packing(Scenario):
             place(scene, piece, f"piece_{i}", pos, yaw)
         return scene
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """One piece replaced by another L of the same area, such that the set no longer fills the bin."""
         i, other = self.misfit
         pieces = list(self.pieces)
@@ -272,7 +272,7 @@ class Packing(Scenario):
     def lies(self, world: World, i: int) -> bool:
         """Whether piece `i` lies flat on the bin's floor."""
         name = f"piece_{i}"
-        away = world.frame("bin").T @ (world.pos(name) - world.pos("bin"))
+        away = world.rot("bin").T @ (world.pos(name) - world.pos("bin"))
         inside = abs(away[0]) < self.bin.width / 2 and abs(away[1]) < self.bin.height / 2
         return inside and abs(away[2] - self.bin.floor) < DOWN and world.tilt(name) < FLAT
 
@@ -318,8 +318,8 @@ class Packing(Scenario):
     def lift(self, world: World, i: int, yaw: float) -> Plan:
         """Take piece `i` up by suction, the wrist turned away by half of the turn that will bring it to `yaw` [rad]."""
         name = f"piece_{i}"
-        turn = float(turn_between(world.frame(name), upright(yaw))[2])
-        spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), yaw_of(world.frame(name)))
+        turn = float(turn_between(world.rot(name), upright(yaw))[2])
+        spot = world.pos(name) + _turned(self.pieces[i].hold(REACHES), yaw_of(world.rot(name)))
         down = facing_down(WRIST - turn / 2)
         yield from go_to(world, spot + (self.thickness + 0.03) * UP, down, grip=OPEN, within=0.005)
         yield from suck(world, spot + self.thickness * UP, down)
@@ -346,13 +346,13 @@ class Packing(Scenario):
     def _as_they_lie(self, world: World) -> Plan:
         """Every piece over its own slot, without turning it."""
         for i in range(self.count):
-            yield from self.drop(world, i, self.goal(i)[0], yaw_of(world.frame(f"piece_{i}")))
+            yield from self.drop(world, i, self.goal(i)[0], yaw_of(world.rot(f"piece_{i}")))
 
     def _squared_up(self, world: World) -> Plan:
         """Every piece over its own slot, turned no farther than it takes to have its sides along the bin's."""
         for i in range(self.count):
             pos, goal = self.goal(i)
-            wrong = round((yaw_of(world.frame(f"piece_{i}")) - goal) / (math.pi / 2)) * math.pi / 2
+            wrong = round((yaw_of(world.rot(f"piece_{i}")) - goal) / (math.pi / 2)) * math.pi / 2
             yield from self.drop(world, i, pos, goal + wrong)
 
     def drop(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:

@@ -26,7 +26,7 @@ Decisions where the paper is silent (it gives the story, the 5 deg, the pivot of
 * Level counts only hands off, with both blocks standing on the deck and nowhere else, the target where it was: else the
   hand could hold the beam, the counterweight could prop it up from the table, or both blocks could be moved to the
   axle, where they weigh nothing. None of these needs any balance of moments.
-* Level must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
+* CertifySettings must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
 """
 
 import math
@@ -36,15 +36,15 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from ..assets.block import Block
-from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.box import Block
+from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..assets.seesaw import Seesaw
 from ..errors import GaveUp
 from ..params import param
 from ..robots.panda import REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, release, wait
+from ..skills.motion import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, release, wait
 
 LEVEL = math.radians(5.0)
 """Tilt that counts as level [rad] (paper, App. B, T19)."""
@@ -281,7 +281,7 @@ class SeesawBalance(Scenario):
         run, rise = level + hangs
         return self.foot + self.seesaw.axle * UP + run * self.s + rise * UP
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         scene = self.build()
         scene.delete(scene.body("weight"))
         return {"no counterweight": scene}
@@ -310,11 +310,11 @@ class SeesawBalance(Scenario):
 
     def along(self, world: World, block: str) -> float:
         """Where a block is, measured along the deck from the axle [m]."""
-        return float(world.frame(BEAM)[:, 0] @ (world.pos(block) - world.pos(BEAM)))
+        return float(world.rot(BEAM)[:, 0] @ (world.pos(block) - world.pos(BEAM)))
 
     def tilt(self, world: World) -> float:
         """Tilt of the deck, positive where +s is down [rad]."""
-        return -math.asin(float(world.frame(BEAM)[2, 0]))
+        return -math.asin(float(world.rot(BEAM)[2, 0]))
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -359,7 +359,7 @@ class SeesawBalance(Scenario):
 
     def take(self, world: World, block: str) -> Plan:
         """Grasp a block where and as it stands, and lift it clear of everything."""
-        frame = self._across(world, world.frame(block)[:, 0])
+        frame = self._across(world, world.rot(block)[:, 0])
         high = 0.6 * self.weight.height * UP
         over = world.pos(block) + high
         over[2] = max(world.hand[2] - 0.02, TABLE_TOP + 0.14)
@@ -380,7 +380,7 @@ class SeesawBalance(Scenario):
 
         Of the two orientations that look alike, the one closer to the hand's own: it never turns half round.
         """
-        x = world.hand_frame[:, 0]
+        x = world.hand_rot[:, 0]
         here, there = math.atan2(-x[0], x[1]), math.atan2(along[1], along[0])
         return facing_down(here + (there - here + math.pi / 2) % math.pi - math.pi / 2)
 

@@ -31,15 +31,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..assets.cube import Cube
+from ..assets.box import Cube
 from ..assets.hook import LHook
-from ..assets.scene import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
 from ..params import param
 from ..robots import ik
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario
 from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..validate.moves import OPEN, facing_down, go_to, grasp, push, release
+from ..skills.motion import OPEN, facing_down, go_to, grasp, push, release
 
 LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
@@ -163,7 +163,7 @@ class ToolRetrieve(Scenario):
         place(scene, self.hook, "hook", [self.hook_x, self.hook_y, TABLE_TOP], math.radians(self.hook_yaw))
         return scene
 
-    def without(self) -> Mapping[str, mujoco.MjSpec]:
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the hook nothing reaches the cube; without its tip nothing pulls it."""
         bare, straight = self.build(), self.build()
         bare.delete(bare.body("hook"))
@@ -199,8 +199,8 @@ class ToolRetrieve(Scenario):
 
     def take_hook(self, world: World) -> Plan:
         """Grasp the handle across."""
-        held = world.pos("hook") + world.frame("hook") @ [self.hook.inside - self.stretch, 0, GRASP_HEIGHT]
-        along = world.frame("hook")[:, 0]
+        held = world.pos("hook") + world.rot("hook") @ [self.hook.inside - self.stretch, 0, GRASP_HEIGHT]
+        along = world.rot("hook")[:, 0]
         yield from self._descend_on(world, held, math.atan2(along[1], along[0]))
         yield from grasp(world, 0.4)
 
@@ -224,7 +224,7 @@ class ToolRetrieve(Scenario):
 
     def put_down(self, world: World) -> Plan:
         """Take the tip, then the handle off the cube, let go, go up."""
-        along, left = world.frame("hook")[:, 0], world.frame("hook")[:, 1]
+        along, left = world.rot("hook")[:, 0], world.rot("hook")[:, 1]
         yield from go_to(world, world.hand + 0.03 * along, within=0.01)
         yield from go_to(world, world.hand - 0.05 * self.hook.side * left, within=0.01)
         yield from release(world)
@@ -232,7 +232,7 @@ class ToolRetrieve(Scenario):
 
     def lift_cube(self, world: World) -> Plan:
         """Grasp the cube across the faces that need the least turn of the hand from its bearing."""
-        cube, side = world.com("cube") - BASE, world.frame("cube")[:, 0]
+        cube, side = world.com("cube") - BASE, world.rot("cube")[:, 0]
         bearing = math.atan2(cube[1], cube[0])
         turn = math.remainder(math.atan2(side[1], side[0]) - bearing, math.pi / 2)
         yield from self._descend_on(world, world.com("cube"), bearing + turn)
@@ -257,7 +257,7 @@ class ToolRetrieve(Scenario):
                 where the tip points [m].
             mirror: -1 for the other side.
         """
-        held = world.frame("hook").T @ np.column_stack([world.hand - world.pos("hook"), world.hand_frame])
+        held = world.rot("hook").T @ np.column_stack([world.hand - world.pos("hook"), world.hand_rot])
         place = np.array([inside - self.hook.inside, -mirror * self.hook.side * beside, 0.0])
         goal = BASE + _turned(bearing) @ place
         goal[2] = TABLE_TOP + RAISED + self.hook.length / 2 * math.sin(NOSE_UP)
@@ -271,7 +271,7 @@ class ToolRetrieve(Scenario):
 
     def _half_across(self, world: World, bearing: float) -> float:
         """Half the cube's width seen along `bearing`, and as much across it [m]."""
-        along = world.frame("cube")[:2, :2].T @ [math.cos(bearing), math.sin(bearing)]
+        along = world.rot("cube")[:2, :2].T @ [math.cos(bearing), math.sin(bearing)]
         return self.half * float(np.abs(along).sum())
 
     def _descend_on(self, world: World, target: Vec3, yaw: float) -> Plan:

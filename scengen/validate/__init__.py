@@ -1,1 +1,1 @@
-"""Moves, rollouts, certificates, and their verification without any oracle."""
+"""Certificates: checks, rollouts, verification without any oracle."""

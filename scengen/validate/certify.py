@@ -1,106 +1,52 @@
-"""Certificates: what was checked about a scenario, with numbers, so that others can disagree."""
+"""Certification: every check of one scenario, cheap ones first."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.stats import beta
 
-from ..errors import ScengenError, Unstable
+from ..certificate import CHECKS, Certificate, Check
+from ..control.loop import Loop
+from ..episode import Actions, Episode
+from ..errors import ScengenError
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
-from ..sim.loop import Loop
 from ..sim.world import IDLE, JAW, World
-from .level import Level
-from .rollout import AT_REST, Episode, Jitter, Tape, replay, run
-
-Verdict = Literal["certified", "refuted", "unknown"]
-
-CHECKS: dict[str, Verdict] = {
-    "feasible": "refuted",
-    "compiles": "refuted",
-    "overlap": "refuted",
-    "rest": "refuted",
-    "unsolved": "refuted",
-    "idle": "refuted",
-    "shortcuts": "refuted",
-    "solved": "unknown",
-    "robust": "unknown",
-    "numerics": "unknown",
-    "necessity": "refuted",
-    "witness": "unknown",
-}
-"""The checks in the order in which they run, and the verdict when one fails.
-
-A failed check refutes the scenario where it shows, by itself, that this is no fair problem: it cannot be, it does not
-stand still, it solves itself, or it has an easy way. Where only the oracle failed the verdict is unknown."""
+from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
+from .settings import QUICK, CertifySettings
 
 CONFIDENCE = 0.95
-PATIENCE = 3.0
-"""How many time limits a shortcut gets that has to be seen to its end: two fallen tiles may rock for 14 s."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One line of a certificate."""
-
-    name: str
-    passed: bool | None
-    """None: skipped, which certifies nothing."""
-    reason: str
-    """Why it failed or was skipped; empty when it passed."""
-    settings: Mapping[str, Any]
-    numbers: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """All checks of one scenario."""
-
-    level: str
-    checks: tuple[Check, ...]
-
-    @property
-    def failed(self) -> Check | None:
-        """The first check that did not pass."""
-        return next((c for c in self.checks if not c.passed), None)
-
-    @property
-    def verdict(self) -> Verdict:
-        return CHECKS[self.failed.name] if self.failed else "certified"
-
-    @property
-    def reason(self) -> str:
-        """What stands against the scenario, or nothing."""
-        return f"{self.failed.name}: {self.failed.reason}" if self.failed else ""
-
-
 @dataclass(frozen=True)
 class Certified:
     """A certificate with the files it speaks of. Texts are empty where the scene was never built."""
 
     certificate: Certificate
     scene_xml: str
-    tape: Tape
+    actions: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
 
 
 def certify(
-    scenario: Scenario, horizon: float, level: Level, embodiment: str = JAW, last: str | None = None
+    scenario: Scenario,
+    horizon: float,
+    settings: CertifySettings = QUICK,
+    embodiment: str = JAW,
+    last: str | None = None,
 ) -> Certified:
     """Run every check on a scenario, cheap ones first, until one fails.
 
     Args:
-        scenario: an instance of a family that has an `oracle`.
+        scenario: an instance of a family that has an oracle.
         horizon: time limit for reaching the goal [s].
-        level: settings of the checks.
+        settings: of the checks.
         embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
         last: the check after which to stop, for those who want to know about it only; nothing is certified then.
     """
-    trial = _Trial(scenario, horizon, level, embodiment)
+    trial = _Trial(scenario, horizon, settings, embodiment)
     checks: list[Check] = []
     for name in CHECKS:
         if checks and (not checks[-1].passed or checks[-1].name == last):
@@ -111,9 +57,9 @@ def certify(
     witness = trial.witness
     empty = np.zeros((0, 7), np.float32)
     return Certified(
-        Certificate(level.level, tuple(checks)),
+        Certificate(settings.name, tuple(checks)),
         trial.text,
-        witness.tape if witness else empty,
+        witness.actions if witness else empty,
         witness.digest if witness else "",
     )
 
@@ -121,10 +67,10 @@ def certify(
 class _Trial:
     """What the checks of one scenario share: its text, its world, its witness."""
 
-    def __init__(self, scenario: Scenario, horizon: float, level: Level, embodiment: str):
-        self.scenario, self.horizon, self.level, self.embodiment = scenario, horizon, level, embodiment
+    def __init__(self, scenario: Scenario, horizon: float, settings: CertifySettings, embodiment: str):
+        self.scenario, self.horizon, self.settings, self.embodiment = scenario, horizon, settings, embodiment
         self.text = ""
-        self.witness: Episode | None = None
+        self.witness: Rollout | None = None
 
     def check(self, name: str) -> Check:
         settings, numbers, reason = getattr(self, f"_{name}")()
@@ -156,34 +102,32 @@ class _Trial:
     def _overlap(self) -> "Finding":
         data = self.world.data
         depth = max((-float(c.dist) for c in data.contact[: data.ncon]), default=0.0)
-        reason = f"bodies overlap by {1000 * depth:.1f} mm" if depth > self.level.overlap else ""
-        return {"overlap": self.level.overlap}, {"deepest": depth}, reason
+        reason = f"bodies overlap by {1000 * depth:.1f} mm" if depth > self.settings.overlap else ""
+        return {"overlap": self.settings.overlap}, {"deepest": depth}, reason
 
     def _rest(self) -> "Finding":
         """Nobody acts; the goal is watched too, at the start and at the end of the time."""
-        world, bars = self.world, self.level.rest
+        world, limits = self.world, self.settings.rest
         self.solved_at_start = self.scenario.success(world)
         bodies = [b for b in world.free_bodies if b not in self.scenario.MOVING]
-        start = {b: (world.com(b), world.frame(b)) for b in bodies}
-        try:
-            for _ in range(round(bars.seconds / Loop.PERIOD)):
-                self.scenario.script(world)
-                world.step(IDLE)
-        except Unstable as error:
-            return asdict(bars), {}, str(error)
+        start = {b: (world.com(b), world.rot(b)) for b in bodies}
+        episode = Episode(self.scenario, world)
+        for _ in range(round(limits.seconds / Loop.PERIOD)):
+            if episode.step(world.filter(IDLE)) == "unstable":
+                return asdict(limits), {}, episode.reason
         self.solved_after_rest = self.scenario.success(world)
         drift = {b: float(np.linalg.norm(world.com(b) - start[b][0])) for b in bodies}
-        turn = {b: _angle(world.frame(b), start[b][1]) for b in bodies}
+        turn = {b: _angle(world.rot(b), start[b][1]) for b in bodies}
         worst, most = (
             max(drift, key=drift.__getitem__, default=""),
             max(turn, key=turn.__getitem__, default=""),
         )
         numbers = {"drift": drift.get(worst, 0.0), "turn": turn.get(most, 0.0)}
-        if numbers["drift"] > bars.drift:
-            return asdict(bars), numbers, f"{worst} drifts {1000 * drift[worst]:.1f} mm while nobody acts"
-        if numbers["turn"] > bars.turn:
-            return asdict(bars), numbers, f"{most} turns {turn[most]:.1f} deg while nobody acts"
-        return asdict(bars), numbers, ""
+        if numbers["drift"] > limits.drift:
+            return asdict(limits), numbers, f"{worst} drifts {1000 * drift[worst]:.1f} mm while nobody acts"
+        if numbers["turn"] > limits.turn:
+            return asdict(limits), numbers, f"{most} turns {turn[most]:.1f} deg while nobody acts"
+        return asdict(limits), numbers, ""
 
     def _unsolved(self) -> "Finding":
         if self.solved_at_start:
@@ -196,57 +140,58 @@ class _Trial:
         return settings, _outcome(episode), "doing nothing reaches the goal" if episode.solved else ""
 
     def _solved(self) -> "Finding":
-        episode = self._run(self.scenario.oracle)  # type: ignore[attr-defined]
+        episode = self._run(self.scenario.oracle)
         if not episode.solved:
             return {"horizon": self.horizon}, _outcome(episode), f"the oracle failed: {episode.reason}"
         self.witness = episode
         return {"horizon": self.horizon}, _outcome(episode), ""
 
     def _shortcuts(self) -> "Finding":
-        episodes = {
-            name: self._run(plan, until_settled=True, patience=PATIENCE if self.scenario.plays_out(name) else 1.0)
-            for name, plan in self.scenario.shortcuts().items()
+        shortcuts = self.scenario.shortcuts()
+        rollouts = {
+            name: try_shortcut(self.scenario, self.world, shortcut, self.horizon, self.settings.settle)
+            for name, shortcut in shortcuts.items()
         }
-        numbers = {name: _outcome(e) for name, e in episodes.items()}
-        for name, e in episodes.items():
+        numbers = {name: _outcome(e) for name, e in rollouts.items()}
+        for name, e in rollouts.items():
             if e.solved:
                 return {}, numbers, f"{name!r} reaches the goal"
-            if e.outcome == "unstable" or (self.scenario.plays_out(name) and e.reason != AT_REST):
+            if e.outcome == "unstable" or (shortcuts[name].to_rest and e.reason != AT_REST):
                 return {}, numbers, f"{name!r} was not seen to its end: {e.reason}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":
-        bars = self.level.robust
-        size = asdict(bars)
+        limits = self.settings.robust
+        size = asdict(limits)
         failures: list[str] = []
-        for k in range(bars.runs):
+        for k in range(limits.runs):
             jitter = Jitter(
                 f"{self.scenario.id}/{k}",
-                bars.position,
-                bars.turn,
-                bars.mass,
-                bars.friction,
-                bars.noise,
-                k % 2 * bars.latency,
+                limits.position,
+                limits.turn,
+                limits.mass,
+                limits.friction,
+                limits.noise,
+                k % 2 * limits.latency,
             )
             episode = run(
                 self.scenario,
                 jitter.disturbed(self.world),
-                self.scenario.oracle,  # type: ignore[attr-defined]
+                self.scenario.oracle,
                 self.horizon,
-                self.level.settle,
+                self.settings.settle,
                 jitter,
             )
             if not episode.solved:
                 failures.append(f"run {k}: {episode.reason}")
-        solved = bars.runs - len(failures)
-        bound = lower_bound(solved, bars.runs)
-        numbers = {"runs": bars.runs, "solved": solved, "bound": bound, "failures": failures}
+        solved = limits.runs - len(failures)
+        bound = lower_bound(solved, limits.runs)
+        numbers = {"runs": limits.runs, "solved": solved, "bound": bound, "failures": failures}
         reason = (
-            f"{solved} of {bars.runs} jittered runs succeed; {failures[0]}" if bound < bars.bound and failures else ""
+            f"{solved} of {limits.runs} jittered runs succeed; {failures[0]}" if bound < limits.bound and failures else ""
         )
-        if bound < bars.bound and not failures:
-            reason = f"{bars.runs} runs cannot show a bound of {bars.bound:g}; ask for more"
+        if bound < limits.bound and not failures:
+            reason = f"{limits.runs} runs cannot show a bound of {limits.bound:g}; ask for more"
         return size, numbers, reason
 
     def _numerics(self) -> "Finding":
@@ -256,26 +201,26 @@ class _Trial:
         patient.model.opt.iterations *= 2
         numbers: dict[str, Any] = {}
         for name, world in {"half time step": half, "twice the iterations": patient}.items():
-            kept = replay(self.scenario, world, self.witness.tape, self.horizon, self.level.settle)
+            kept = replay(self.scenario, world, self.witness.actions, self.horizon, self.settings.settle)
             numbers[name] = {"witness": kept.outcome}
             if not kept.solved:
-                again = run(self.scenario, world, self.scenario.oracle, self.horizon, self.level.settle)  # type: ignore[attr-defined]
+                again = run(self.scenario, world, self.scenario.oracle, self.horizon, self.settings.settle)
                 numbers[name]["oracle"] = again.outcome
                 if not again.solved:
                     return {}, numbers, f"at {name} both witness and oracle fail: {again.reason}"
         return {}, numbers, ""
 
-    def _necessity(self) -> "Finding":
+    def _ablations(self) -> "Finding":
         assert self.witness is not None
         numbers = {}
-        for name, scene in self.scenario.without().items():
+        for name, scene in self.scenario.ablations().items():
             text, _ = scene_text.emit(scene)
             episode = replay(
                 self.scenario,
                 World.load(text, self.embodiment),
-                self.witness.tape,
+                self.witness.actions,
                 self.horizon,
-                self.level.settle,
+                self.settings.settle,
                 until_settled=True,
             )
             numbers[name] = _outcome(episode)
@@ -284,13 +229,13 @@ class _Trial:
         return {}, numbers, ""
 
     def _witness(self) -> "Finding":
-        """The tape alone, in a freshly loaded world, must end in the same bits."""
+        """The recorded actions alone, in a freshly loaded world, must end in the same bits."""
         assert self.witness is not None
-        again = replay(self.scenario, self._load(), self.witness.tape, self.horizon, self.level.settle)
-        settings = {"settle": self.level.settle}
-        numbers = {"periods": len(self.witness.tape), "seconds": self.witness.seconds}
+        again = replay(self.scenario, self._load(), self.witness.actions, self.horizon, self.settings.settle)
+        settings = {"settle": self.settings.settle}
+        numbers = {"periods": len(self.witness.actions), "seconds": self.witness.seconds}
         if not again.solved:
-            return settings, numbers, f"the tape does not solve the scenario: {again.reason}"
+            return settings, numbers, f"the recorded actions do not solve the scenario: {again.reason}"
         return (
             settings,
             numbers,
@@ -300,9 +245,8 @@ class _Trial:
     def _load(self, substeps: int | None = None) -> World:
         return World.load(self.text, self.embodiment, substeps=substeps)
 
-    def _run(self, planner: Planner, until_settled: bool = False, patience: float = 1.0) -> Episode:
-        horizon = patience * self.horizon
-        return run(self.scenario, self.world, planner, horizon, self.level.settle, until_settled=until_settled)
+    def _run(self, planner: Planner) -> Rollout:
+        return run(self.scenario, self.world, planner, self.horizon, self.settings.settle)
 
 
 Finding = tuple[Mapping[str, Any], Mapping[str, Any], str]
@@ -317,7 +261,7 @@ def _nothing(world: World) -> Plan:
     yield from ()
 
 
-def _outcome(episode: Episode) -> dict[str, Any]:
+def _outcome(episode: Rollout) -> dict[str, Any]:
     return {"outcome": episode.outcome, "reason": episode.reason, "seconds": episode.seconds}
 
 

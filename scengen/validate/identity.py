@@ -13,8 +13,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ..assets.domino import Domino
-from ..assets.scene import TABLE_TOP, place, table
+from ..assets.box import Domino
+from ..assets.prop import TABLE_TOP, place, table
 from ..errors import PoolError
 from ..scenario import Scenario
 from ..sim import scene_text
@@ -47,7 +47,7 @@ def fingerprint() -> str:
     """How this machine rounds: a hash of the end of a fixed short rollout of the arm and a falling tile.
 
     Machines with equal fingerprints replay bit by bit; on others (another libm, another instruction set) the same
-    tape ends in nearly the same state.
+    actions ends in nearly the same state.
     """
     scene = table()
     place(scene, Domino(), "tile", [0.1, 0.0, TABLE_TOP + 0.01], yaw=0.3)

@@ -1,35 +1,32 @@
-"""Run one plan, or one recorded tape, in one scenario."""
+"""Run one plan, or recorded actions, in one scenario."""
 
 import copy
 from collections import deque
 from dataclasses import dataclass
-from typing import Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import GaveUp, Unstable
+from ..control.loop import Loop
+from ..episode import Actions, Episode, Outcome
+from ..errors import GaveUp
 from ..samplers.keyed import normal, spread
-from ..scenario import Action, Planner, Scenario
-from ..sim.loop import Loop
+from ..scenario import Action, Planner, Scenario, Shortcut
 from ..sim.world import World
-from .moves import idle
-
-Outcome = Literal["success", "failure", "timeout", "unstable"]
-Tape = NDArray[np.float32]
-"""Shape (n, 7): one row per control period, exactly as the controller received it."""
 
 STILL = 1e-3
 """No coordinate of scene or robot may move faster than this [m/s, rad/s] where an episode is called settled."""
 STILL_FOR = 0.5
 """How long that must last [s]."""
+PATIENCE = 3.0
+"""How many time limits a shortcut gets that is simulated to rest: two fallen tiles may rock for 14 s."""
 AT_REST = "everything came to rest without reaching the goal"
 """The reason of an episode that was seen to its end."""
 
 
 @dataclass(frozen=True)
-class Episode:
+class Rollout:
     """What came of a rollout."""
 
     outcome: Outcome
@@ -37,7 +34,7 @@ class Episode:
     """Why it is no success; empty for a success."""
     seconds: float
     """When the goal was reached, or when the episode ended [s]."""
-    tape: Tape
+    actions: Actions
     digest: str
     """Hash of the final physics state."""
 
@@ -104,7 +101,7 @@ def run(
     settle: float = 1.0,
     jitter: Jitter | None = None,
     until_settled: bool = False,
-) -> Episode:
+) -> Rollout:
     """Play a plan from the start of `world` until success, failure or the horizon.
 
     A success counts only if the goal still holds after `settle` seconds without action. When the plan has ended the
@@ -123,19 +120,27 @@ def run(
 def replay(
     scenario: Scenario,
     world: World,
-    tape: Tape,
+    actions: Actions,
     horizon: float,
     settle: float = 1.0,
     until_settled: bool = False,
-) -> Episode:
+) -> Rollout:
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
     stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
-    return _live(scenario, world, _Recorded(world, tape), horizon, settle, stillness)
+    return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
+
+
+def try_shortcut(
+    scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0
+) -> Rollout:
+    """Play a tempting plan as a certificate does: within the time limit, or where it must come to rest, beyond it."""
+    patience = PATIENCE if shortcut.to_rest else 1.0
+    return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True)
 
 
 def _uneventful(scenario: Scenario) -> bool:
-    return type(scenario).script is Scenario.script
+    return type(scenario).events is Scenario.events
 
 
 class _Planned:
@@ -144,7 +149,7 @@ class _Planned:
     def __init__(self, world: World, planner: Planner, jitter: Jitter | None):
         self.world, self.plan, self.jitter = world, planner(world), jitter
         self.ended, self.note, self.periods = False, "", 0
-        self.late: deque[Action] = deque([idle(world)] * (jitter.latency if jitter else 0))
+        self.late: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
 
     def next(self) -> NDArray[np.float32]:
         """The next action for the controller."""
@@ -167,25 +172,25 @@ class _Planned:
                 self.ended = True
             except GaveUp as error:
                 self.ended, self.note = True, str(error)
-        return idle(self.world)
+        return self.world.idle
 
 
 class _Recorded:
-    """The rows of a tape, then idleness. A tape holds what its author did while the scene settled."""
+    """Recorded actions, then no-ops; the recording covers the settling phase."""
 
     note = ""
 
-    def __init__(self, world: World, tape: Tape):
-        self.world, self.rows, self.ended = world, iter(np.asarray(tape, np.float32)), False
+    def __init__(self, world: World, actions: Actions):
+        self.world, self.rows, self.ended = world, iter(np.asarray(actions, np.float32)), False
 
     def next(self) -> NDArray[np.float32]:
         """The next action for the controller."""
         row = next(self.rows, None)
         self.ended = row is None
-        return idle(self.world).astype(np.float32) if row is None else row
+        return self.world.idle.astype(np.float32) if row is None else row
 
     def stop(self) -> None:
-        """Called when the goal has been reached; a tape goes on."""
+        """Called when the goal has been reached; a recording goes on."""
 
 
 class _Stillness:
@@ -200,24 +205,6 @@ class _Stillness:
         return self.periods * Loop.PERIOD >= STILL_FOR
 
 
-class Judge:
-    """Decides from period to period whether an episode is over: the one place where goal, hold and time limit meet."""
-
-    def __init__(self, scenario: Scenario, horizon: float):
-        self.scenario, self.horizon, self.held = scenario, horizon, 0.0
-
-    def look(self, world: World) -> tuple[Outcome, str] | None:
-        """The outcome and its reason once the episode is over; to be asked after every control period."""
-        if reason := self.scenario.failure(world):
-            return "failure", reason
-        self.held = self.held + Loop.PERIOD if self.scenario.success(world) else 0.0
-        if self.held and self.held >= self.scenario.HOLD - 1e-9:
-            return "success", ""
-        if world.time > self.horizon - 1e-9:
-            return "timeout", f"the goal was not reached in {self.horizon:g} s"
-        return None
-
-
 def _live(
     scenario: Scenario,
     world: World,
@@ -225,43 +212,30 @@ def _live(
     horizon: float,
     settle: float,
     stillness: _Stillness | None,
-) -> Episode:
-    tape: list[NDArray[np.float32]] = []
-    judge = Judge(scenario, horizon)
+) -> Rollout:
+    actions: list[NDArray[np.float32]] = []
+    episode = Episode(scenario, world, horizon)
 
-    def ended(outcome: Outcome, reason: str = "", at: float | None = None) -> Episode:
-        rows = np.array(tape, np.float32).reshape(-1, 7)
-        return Episode(outcome, reason, round(world.time if at is None else at, 6), rows, world.digest)
+    def step() -> Outcome | None:
+        actions.append(source.next())
+        return episode.step(actions[-1])
 
-    def period() -> None:
-        action = source.next()
-        scenario.script(world)
-        world.follow(action)
-        tape.append(action)
+    def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
+        rows = np.array(actions, np.float32).reshape(-1, 7)
+        return Rollout(outcome, reason, round(at, 6), rows, world.digest)
 
-    try:
-        verdict = None
-        while verdict is None:
-            period()
-            verdict = judge.look(world)
-            if verdict is None and stillness and source.ended and not judge.held and stillness.lasts():
-                verdict = "timeout", AT_REST
-        outcome, reason = verdict
-        if outcome == "timeout":
-            return ended(outcome, source.note or reason)
-        if outcome == "failure":
-            return ended(outcome, reason)
-        reached = world.time
-        source.stop()
+    while step() is None:
+        if stillness and source.ended and not episode.held and stillness.lasts():
+            return ended("timeout", source.note or AT_REST, world.time)
+    if episode.outcome == "timeout":
+        return ended("timeout", source.note or episode.reason, world.time)
+    reached = world.time
+    source.stop()
+    if episode.outcome == "success":
         for _ in range(round(settle / Loop.PERIOD)):
-            period()
-            if lost := scenario.failure(world):
-                return ended("failure", f"after the goal was reached: {lost}")
-        if not scenario.success(world):
-            return ended("timeout", f"the goal was reached but did not hold for {settle:g} s")
-        return ended("success", at=reached)
-    except Unstable as error:
-        return ended("unstable", str(error))
+            if step() != "success":
+                return ended(*episode.settled(), world.time)
+    return ended(*episode.settled(), reached)
 
 
 def _subtree(model: mujoco.MjModel, root: int) -> list[int]:

@@ -97,14 +97,14 @@ def examine(job: tuple[Row, type[Scenario] | str]) -> Finding:
 
 def _wrong_names(row: Row, scenario: Scenario) -> list[str]:
     certificate = row["certificate"]
-    scene, tape = sha256(row["scene_xml"]), sha256(row["witness"].tobytes())
+    scene, actions = sha256(row["scene_xml"]), sha256(row["witness"].tobytes())
     passed = [c["passed"] for c in certificate["checks"]]
     facts = {
         "the id does not belong to the parameters": row["id"] == scenario.id,
         "the parameters are not written canonically": row["params"] == canonical(scenario),
         "the scene has another sha256 than its row or certificate": {scene}
         == {row["scene_sha256"], certificate["scene_sha256"]},
-        "the witness has another sha256 than its row or certificate": {tape}
+        "the witness has another sha256 than its row or certificate": {actions}
         == {row["witness_sha256"], certificate["witness_sha256"]},
         "the certificate is not complete": certificate["verdict"] == "certified" and bool(passed) and all(passed),
     }

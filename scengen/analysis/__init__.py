@@ -1,0 +1,1 @@
+"""Statistics of pools and distributions: distances, coverage, selection bias, smallest causes of a failure."""

@@ -1,0 +1,141 @@
+"""How far scenarios and pools are from training and from each other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
+from scipy.stats import permutation_test
+
+from ..params import values, with_values
+from ..samplers.support import nearest
+from ..samplers.task import Task
+from ..scenario import Scenario
+from ..symmetry import images
+from .space import Points, measured, of_parameters, scale
+
+CLOSE = 0.01
+"""Scenarios that differ by less than this in every parameter are near duplicates [training widths]. The jitter of the
+robustness check moves more: a actions that solves one of them solves the other."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """How far a value lies from the training support of its parameter."""
+
+    parameter: str
+    value: float
+    gap: float
+    """In the parameter's unit, signed: negative below the nearest training value."""
+    relative: float
+    """The gap in training widths; in widths of the parameter's bounds where training knows one value only."""
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The energy distance of two samples, and whether chance explains it."""
+
+    distance: float
+    """sqrt(2 E|X - Y| - E|X - X'| - E|Y - Y'|), in the unit of the coordinates; 0 for equal distributions only."""
+    pvalue: float
+    """Share of permutations of the two samples that are as far apart."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two scenarios that are nearly the same, their symmetries considered."""
+
+    one: str
+    other: str
+    distance: float
+    """Largest difference of any parameter [training widths]."""
+
+
+def offsets(task: Task, scenario: Scenario) -> list[Offset]:
+    """The parameters of a scenario that lie outside their training support, farthest first."""
+    found = []
+    for name, value in values(scenario).items():
+        edge = nearest(task.training[name].support, value, task.known[name].period)
+        if value != edge:
+            found.append(Offset(name, value, value - edge, abs(value - edge) / scale(task, name)))
+    return sorted(found, key=lambda o: -o.relative)
+
+
+def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0) -> Energy:
+    """Energy distance of two samples of vectors (Szekely and Rizzo 2013), with a permutation test.
+
+    In one dimension the distance is that of `scipy.stats.energy_distance`.
+
+    Args:
+        x, y: shapes (n, d) and (m, d).
+        permutations: size of the test; all permutations where there are fewer.
+        seed: of the permutations.
+    """
+    pooled = np.concatenate([x, y])
+    apart = cdist(pooled, pooled)
+
+    def squared(a: NDArray[np.int64], b: NDArray[np.int64], axis: int = -1) -> NDArray[np.float64]:
+        weight = np.zeros((*a.shape[:-1], len(pooled)))
+        np.put_along_axis(weight, a, 1 / a.shape[-1], -1)
+        np.put_along_axis(weight, b, -1 / b.shape[-1], -1)
+        return -np.sum((weight @ apart) * weight, axis=-1)
+
+    tested = permutation_test(
+        (np.arange(len(x)), np.arange(len(x), len(pooled))),
+        squared,
+        vectorized=True,
+        n_resamples=permutations,
+        batch=100,
+        alternative="greater",
+        rng=np.random.default_rng(seed),
+    )
+    return Energy(float(np.sqrt(round(max(0.0, tested.statistic), 12))), float(tested.pvalue))
+
+
+def near_duplicates(
+    task: Task,
+    scenarios: Mapping[str, Scenario],
+    others: Mapping[str, Scenario] | None = None,
+    within: float = CLOSE,
+) -> list[Pair]:
+    """Pairs of scenarios that are the same but for trifles, nearest first.
+
+    Between two pools this is leakage; within one pool (`others` left out) these are repetitions. Every symmetric image
+    of a scenario is compared, so that two identical cubes that have changed places do not hide a pair.
+
+    Args:
+        scenarios, others: by any name that tells them apart.
+        within: largest difference of any parameter that counts [training widths].
+    """
+    beside = scenarios if others is None else others
+    if not scenarios or not beside:
+        return []
+    space = of_parameters(task, [*scenarios.values(), *beside.values()])
+    names, here = list(scenarios), space.points(scenarios.values())
+    if not space.columns:  # nothing varies: all are one scenario
+        here = np.zeros((len(names), 1))
+    tree, least = KDTree(here), dict[tuple[str, str], float]()
+    for other, scenario in beside.items():
+        for image in images(values(scenario), task.family.SYMMETRIES, lambda v, about: 2 * about - v):
+            point = space.point(measured(with_values(scenario, image))) or [0.0]
+            for i in tree.query_ball_point(point, within, p=np.inf):
+                if others is None and names[i] >= other:
+                    continue
+                apart = float(np.abs(here[i] - point).max())
+                pair = names[i], other
+                least[pair] = min(apart, least.get(pair, np.inf))
+    return sorted((Pair(*pair, apart) for pair, apart in least.items()), key=lambda p: p.distance)
+
+
+def per_parameter(task: Task, scenarios: Sequence[Scenario]) -> dict[str, tuple[float, float]]:
+    """Least and mean distance of a pool from training, by parameter that leaves it [training widths]."""
+    found: dict[str, list[float]] = {}
+    for scenario in scenarios:
+        for offset in offsets(task, scenario):
+            found.setdefault(offset.parameter, []).append(offset.relative)
+    return {
+        name: (min(far) if len(far) == len(scenarios) else 0.0, sum(far) / len(scenarios))
+        for name, far in found.items()
+    }

@@ -1,0 +1,144 @@
+"""The report of whole pools: what was lost, how far out they are, whether certification bent them, what leaks."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..pictures import render
+from ..pictures.plots import svg
+from ..pictures.report import thumbnail
+from ..pool import Pool
+from ..runs.generate import STAGES
+from ..samplers.task import Task
+from ..scenario import Scenario
+from .bias import Bias, Marginal, bias
+from .coverage import Evenness, evenness
+from .distance import CLOSE, Energy, Pair, energy, near_duplicates, per_parameter
+from .redraw import proposed, scenarios_of, task_of
+from .space import measured, of_features
+
+SHOWN = 4
+"""Marginals that are drawn of each pool, the most telling ones, and scenes that are shown."""
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What is known of one pool."""
+
+    folder: str
+    task: str
+    split: str
+    scenarios: int
+    funnel: Mapping[str, int]
+    reasons: Mapping[str, int]
+    outside: Mapping[str, tuple[float, float]]
+    """Least and mean distance from training by parameter that leaves it [training ranges]."""
+    evenness: Evenness | None
+    """None for a chosen subset, which was not drawn."""
+    bias: Bias | None
+    """Certified against feasible draws; None as above."""
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """What is known of two pools of one task."""
+
+    one: str
+    other: str
+    energy: Energy
+    shared: list[Pair]
+    """Near duplicates: leakage, if one is for training and the other for evaluation."""
+
+
+def gather(pools: Sequence[Pool]) -> tuple[list[Overview], list[Contrast]]:
+    """Look at every pool, and at every two of one task."""
+    known = [(pool, task_of(pool)) for pool in pools]
+    held = [(pool, task, scenarios_of(task, pool)) for pool, task in known]
+    contrasts = [
+        _contrast(task, (a, one), (b, other))
+        for (a, task, one), (b, beside, other) in itertools.combinations(held, 2)
+        if task.name == beside.name and one and other
+    ]
+    return [_overview(*each) for each in held], contrasts
+
+
+def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequence[Contrast], path: Path) -> str:
+    """Write the report as one HTML file. Returns why it has no pictures, or nothing."""
+    remark, pictures = "", {}
+    try:
+        for pool in pools:
+            pictures[str(pool.folder)] = [thumbnail(row) for row in itertools.islice(pool.rows(), SHOWN)]
+    except render.NoPictures as error:
+        remark = str(error)
+    marginals = {o.folder: svg(_marginals(o.bias.marginals[:SHOWN])) for o in overviews if o.bias and o.bias.marginals}
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "templates"), autoescape=True)
+    text = environment.get_template("report.html").render(
+        overviews=overviews,
+        contrasts=contrasts,
+        pictures=pictures,
+        marginals=marginals,
+        steps=("proposed", *STAGES),
+        remark=remark,
+        close=CLOSE,
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return remark
+
+
+def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[str, Any]:
+    """The report as plain data."""
+    return {"pools": [asdict(o) for o in overviews], "contrasts": [asdict(c) for c in contrasts]}
+
+
+def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario]) -> Overview:
+    even = bent = None
+    if "subset" not in pool.manifest and scenarios:
+        drawn = [p for p in proposed(pool) if p.feasible]
+        numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
+        even = evenness(numbers) if numbers.size else None
+        rows = [measured(p.scenario) for p in drawn]
+        table = {name: np.array([row[name] for row in rows], float) for name in rows[0]}
+        bent = bias(table, np.array([p.certified for p in drawn]))
+    return Overview(
+        str(pool.folder),
+        task.name,
+        pool.manifest["config"]["split"],
+        len(scenarios),
+        pool.manifest["funnel"],
+        pool.manifest["reasons"],
+        per_parameter(task, list(scenarios.values())),
+        even,
+        bent,
+    )
+
+
+Side = tuple[Pool, Mapping[str, Scenario]]
+
+
+def _contrast(task: Task, one: Side, other: Side) -> Contrast:
+    (a, here), (b, there) = one, other
+    space = of_features(task, list(here.values()), list(there.values()))
+    apart = energy(space.points(here.values()), space.points(there.values()))
+    return Contrast(str(a.folder), str(b.folder), apart, near_duplicates(task, here, there))
+
+
+def _marginals(marginals: Sequence[Marginal]) -> Figure:
+    """Proposed and accepted draws over the ranges of some parameters."""
+    figure = Figure(figsize=(2.6 * len(marginals), 1.7))
+    for plot, marginal in zip(figure.subplots(1, len(marginals), squeeze=False)[0], marginals, strict=True):
+        cells = marginal.cells
+        left, width = [c.low for c in cells], [max(c.high - c.low, 1e-12) for c in cells]
+        plot.bar(left, [c.proposed for c in cells], width, align="edge", color="#c9d3de", edgecolor="white")
+        plot.bar(left, [c.accepted for c in cells], width, align="edge", color="#4a7fb5", edgecolor="white")
+        plot.set_title(f"{marginal.name}, p = {marginal.pvalue:.2g}", fontsize=8)
+        plot.tick_params(labelsize=7)
+        plot.spines[["right", "top"]].set_visible(False)
+    figure.tight_layout()
+    return figure

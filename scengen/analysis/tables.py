@@ -1,0 +1,86 @@
+"""Tables about distributions."""
+
+from dataclasses import replace
+
+import numpy as np
+from rich.table import Table
+
+from ..evaluate.power import Plan
+from .bias import AcceptanceMap, Bias
+from .distance import Pair
+from .shrink import Shrunk
+
+CORRELATIONS = (0.0, 0.2, 0.5, 1.0)
+"""For which intra-cluster correlations the planner's table says what can be found, besides the one asked for."""
+BASELINES = (0.9, 0.7, 0.5, 0.3)
+"""For which ID success rates."""
+
+
+def bias_table(found: Bias, title: str) -> Table:
+    """One line per parameter or feature: how selection has changed its distribution."""
+    table = Table("parameter", "KS", "energy", "p", "accepted by part of the range", "effective n", title=title)
+    table.title_justify = "left"
+    for m in found.marginals:
+        mark = "[red]" if m.name in found.flagged else ""
+        rates = "  ".join(f"{c.rate:.0%}" for c in m.cells)
+        lost = f", {m.lost:.0%} of the range lost" if m.lost else ""
+        table.add_row(
+            f"{mark}{m.name}", f"{m.ks:.2f}", f"{m.energy:.2f}", _chance(m.pvalue), rates, f"{m.effective:.1f}{lost}"
+        )
+    mark = "[red]" if "(joint)" in found.flagged else ""
+    table.add_section()
+    table.add_row(f"{mark}all together", "", f"{found.joint.distance:.2f}", _chance(found.joint.pvalue), "", "")
+    return table
+
+
+def map_table(found: AcceptanceMap) -> Table:
+    """Accepted of proposed draws over two parameters; the first goes down, the second across."""
+    down, across = found.names
+    table = Table(down, *(_part(found.edges[1], j) for j in range(found.proposed.shape[1])))
+    table.title, table.title_justify = f"accepted of proposed: {down} (down) by {across} (across)", "left"
+    for i, (all_, taken) in enumerate(zip(found.proposed, found.accepted, strict=True)):
+        cells = (f"{k} of {n}" if n else "-" for n, k in zip(all_, taken, strict=True))
+        table.add_row(_part(found.edges[0], i), *cells)
+    return table
+
+
+def pairs_table(pairs: list[Pair], one: str, other: str) -> Table:
+    """Scenarios that are nearly the same."""
+    table = Table(one, other, "distance [training widths]", title="near duplicates", title_justify="left")
+    for pair in pairs[:20]:
+        table.add_row(pair.one, pair.other, f"{pair.distance:.2g}")
+    if len(pairs) > 20:
+        table.add_row(f"and {len(pairs) - 20} more", "", "")
+    return table
+
+
+def plan_table(plan: Plan) -> Table:
+    """The smallest drop that can be told apart, by ID success rate and intra-cluster correlation."""
+    title = (
+        f"smallest drop found with probability {plan.power:g}: {plan.seeds} seeds x {plan.rollouts} rollouts a split"
+    )
+    correlations = sorted({*CORRELATIONS, plan.correlation})
+    table = Table("ID success", *(f"correlation {c:g}" for c in correlations), title=title, title_justify="left")
+    for before in BASELINES:
+        drops = (replace(plan, correlation=c).smallest_drop(before) for c in correlations)
+        table.add_row(f"{before:g}", *("none" if d is None else f"{d:.2f}" for d in drops))
+    return table
+
+
+def shrunk_table(shrunk: Shrunk, units: dict[str, str]) -> Table:
+    """The parameters that matter."""
+    table = Table(
+        "parameter", "centre", "fails at", "was", "training widths", title="what matters", title_justify="left"
+    )
+    for c in shrunk.causes:
+        unit = units[c.parameter]
+        table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.began:.4g}", f"{c.departure:.2f}")
+    return table
+
+
+def _chance(pvalue: float) -> str:
+    return f"{pvalue:.3f}" if pvalue >= 0.001 else "< 0.001"
+
+
+def _part(edges: np.ndarray, i: int) -> str:
+    return f"{edges[i]:.3g} to {edges[i + 1]:.3g}"

@@ -1,0 +1,96 @@
+"""Boxes that stand on the middle of their foot: dominoes, blocks with an unknown filling, cubes."""
+
+import abc
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..geometry import Vec3
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+
+
+class Box(Prop):
+    """What all boxes share. Subclasses are dataclasses that name their edges as their tasks do."""
+
+    mass: float
+    friction: float
+    rgba: Rgba
+
+    @property
+    @abc.abstractmethod
+    def size(self) -> Vec3:
+        """Edges along x, y and z [m]."""
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        half = self.size / 2
+        solid(body, "box", half, [0, 0, half[2]], mass=self.mass, friction=self.friction, rgba=self.rgba)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Domino(Box):
+    """One tile, which stands on its smallest face. x is the thin axis, the way it falls.
+
+    Mass range: paper, App. D.1 ("tile mass 0.02-0.08 kg"); the paper gives no lengths.
+    """
+
+    height: float = param(0.080, "m", 0.03, 0.20)
+    width: float = param(0.040, "m", 0.01, 0.10)
+    thickness: float = param(0.012, "m", 0.006, 0.04)
+    mass: float = param(0.050, "kg", 0.005, 0.5)
+    friction: float = param(0.5, "1", 0.05, 1.5)
+    rgba: Rgba = (0.90, 0.86, 0.76, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.thickness, self.width, self.height])
+
+    @property
+    def tipping_angle(self) -> float:
+        """Tilt at which the centre of mass passes over the edge of the foot [rad]."""
+        return math.atan2(self.thickness, self.height)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block(Box):
+    """A painted box with a square foot and an unknown filling: from outside all are alike, whatever they weigh.
+
+    The paper gives no lengths. The width leaves the 80 mm jaw 20 mm of air on either side; the density that follows
+    from the nominal mass, 3100 kg/m^3, lies between glass and a steel-filled shell.
+    """
+
+    width: float = param(0.040, "m", 0.02, 0.07)
+    height: float = param(0.050, "m", 0.02, 0.12)
+    mass: float = param(0.25, "kg", 0.02, 1.0, hidden=True)
+    friction: float = param(0.8, "1", 0.05, 1.5)
+    """Rubber on painted wood: 0.7 to 0.9."""
+    rgba: Rgba = (0.20, 0.36, 0.66, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.width, self.width, self.height])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cube(Box):
+    """A solid cube to be fetched.
+
+    The paper gives no numbers. The edge leaves the 80 mm jaw 15 mm of air on either side; the mass is that of soft
+    plastic foam to hardwood at this size (125 cm^3: 0.06 kg for pine, 0.09 kg for beech, 0.14 kg for nylon).
+    """
+
+    edge: float = param(0.050, "m", 0.02, 0.07)
+    mass: float = param(0.08, "kg", 0.01, 1.0, hidden=True)
+    friction: float = param(0.5, "1", 0.05, 1.5, hidden=True)
+    rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.edge] * 3)
+
+
+if __name__ == "__main__":
+    for box in (Domino(), Block(), Cube()):
+        show(box)

@@ -1,0 +1,1 @@
+"""The control loop, compiled: operational-space controller, teleoperation filter, MuJoCo called directly."""

@@ -1,0 +1,72 @@
+"""Episode: one run of a scenario. The order of things in a control period is decided here and nowhere else."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .control.loop import Loop
+from .errors import Unstable
+from .scenario import Scenario
+from .sim.world import World
+
+Outcome = Literal["success", "failure", "timeout", "unstable"]
+Actions = NDArray[np.float32]
+"""Shape (n, 7): one row per control period, exactly as the controller received it."""
+
+
+class Episode:
+    """A scenario in a world: first the scene's events, then a control period, then the verdict.
+
+    The world must be at its start. Whoever steps the physics by other means (robosuite) calls `begin` before each
+    control period and `judge` after it.
+    """
+
+    def __init__(self, scenario: Scenario, world: World, horizon: float = math.inf):
+        """`horizon`: time limit for reaching the goal [s]."""
+        self.scenario, self.world, self.horizon = scenario, world, horizon
+        self.outcome: Outcome | None = None
+        """What has come of it; None as long as it is open. A success is lost by a later failure."""
+        self.reason = ""
+        """Why it is no success; empty as long as that is open, and for a success."""
+        self.held = 0.0
+        """How long the goal has held without interruption [s]."""
+
+    def step(self, action: NDArray[np.float32]) -> Outcome | None:
+        """Simulate one control period (10 ms) under an action that has passed the filter, shape (7,).
+
+        Returns:
+            The outcome so far.
+        """
+        self.begin()
+        try:
+            self.world.apply(action)
+        except Unstable as error:
+            self.outcome, self.reason = "unstable", str(error)
+            return self.outcome
+        return self.judge()
+
+    def begin(self) -> None:
+        """Let the events of the coming control period happen."""
+        self.scenario.events(self.world)
+
+    def judge(self) -> Outcome | None:
+        """Decide what the control period that has passed means. Failure comes before success, success before time."""
+        if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
+            self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
+            self.outcome = "failure"
+        elif self.outcome is None:
+            self.held = self.held + Loop.PERIOD if self.scenario.success(self.world) else 0.0
+            if self.held and self.held >= self.scenario.HOLD - 1e-9:
+                self.outcome = "success"
+            elif self.world.time > self.horizon - 1e-9:
+                self.outcome, self.reason = "timeout", f"the goal was not reached in {self.horizon:g} s"
+        return self.outcome
+
+    def settled(self) -> tuple[Outcome, str]:
+        """The final outcome and its reason, once the time in which a reached goal has to last is over."""
+        assert self.outcome is not None
+        if self.outcome == "success" and not self.scenario.success(self.world):
+            return "timeout", "the goal was reached but did not last"
+        return self.outcome, self.reason

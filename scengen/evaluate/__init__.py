@@ -1,0 +1,1 @@
+"""Policies on pools: rollouts, rates with intervals, how many rollouts are enough."""

@@ -1,0 +1,160 @@
+"""Policies: what they are to us, how one is found by name, and four built-in ones that tell whether a pool is sound.
+
+A policy is whatever `factory(env)` returns, as long as it has the two methods of `Policy`. The factory is named
+`module:factory` and called once in every process and for every task.
+"""
+
+import importlib
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..control.teleop import Filter
+from ..envs.gym import Observation, ScenarioEnv
+from ..errors import BadConfig, GaveUp, UnknownName
+from ..pool import Row
+from ..samplers.task import Task
+from ..sim.world import IDLE
+from ..skills.motion import idle
+from ..validate.rollout import Actions
+
+
+class Policy(Protocol):
+    """What evaluation asks of a policy."""
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """An episode begins; everything random in it must come from `seed`."""
+        ...
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """The action for the next control period, shape (7,)."""
+        ...
+
+
+Factory = Callable[[ScenarioEnv], Policy]
+
+
+class Idle:
+    """Does nothing: whatever it solves was no problem."""
+
+    def __init__(self, env: ScenarioEnv):
+        pass
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """Nothing to remember."""
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """No motion, gripper open."""
+        return IDLE
+
+
+class Random:
+    """Uniformly random actions."""
+
+    def __init__(self, env: ScenarioEnv):
+        self._random = np.random.default_rng()
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """Begin the stream of `seed`."""
+        self._random = np.random.default_rng(seed)
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """Seven numbers in [-1, 1]."""
+        return self._random.uniform(-1.0, 1.0, 7)
+
+
+class Oracle:
+    """The task's own scripted solution. It reads the full state: an upper bound, no competitor."""
+
+    def __init__(self, env: ScenarioEnv):
+        self.env, self.filter = env, Filter()
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """Begin the plan anew."""
+        self.plan = self.env.scenario.oracle(self.env.world)  # type: ignore[attr-defined]
+        self.filter.reset()
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """The plan's next action, filtered as for the certificate; idle when it is over."""
+        try:
+            return self.filter(next(self.plan))
+        except (StopIteration, GaveUp):
+            self.plan = iter(())
+            return self.filter(idle(self.env.world))
+
+
+class Replay:
+    """Plays the witness of the nearest training scenario other than the one at hand: what pure memory achieves."""
+
+    def __init__(self, env: ScenarioEnv, memory: Sequence[Row]):
+        """
+        Args:
+            memory: rows of training pools, with `values` and witnesses.
+
+        Raises:
+            BadConfig: there are none for this task.
+        """
+        self.env = env
+        self.memory = [row for row in memory if row["task"] == env.task.name]
+        if len(self.memory) < 2:
+            raise BadConfig(f"policy replay needs a pool of {env.task.name} with split id and at least 2 scenarios")
+        self.places = np.array([place(env.task, row["values"]) for row in self.memory])
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """Look up the nearest actions."""
+        here = place(self.env.task, self.env.values)
+        far = np.linalg.norm(self.places - here, axis=1)
+        far[[row["id"] == info["scenario"] for row in self.memory]] = np.inf
+        self.rows: Actions = self.memory[int(far.argmin())]["witness"]
+        self.next = 0
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """The actions's next row; idle when it is over."""
+        if self.next == len(self.rows):
+            return idle(self.env.world)
+        self.next += 1
+        return self.rows[self.next - 1]
+
+
+BUILT_IN: dict[str, Factory] = {"idle": Idle, "random": Random, "oracle": Oracle}
+REPLAY = "replay"
+
+
+def place(task: Task, values: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Where a scenario lies among the parameters that training varies, each in units of its training range."""
+    coordinates = []
+    for name, dist in task.training.items():
+        low, high = min(i.low for i in dist.support), max(i.high for i in dist.support)
+        if high > low:
+            coordinates.append((values[name] - low) / (high - low))
+    return np.array(coordinates)
+
+
+def find(name: str, memory: Sequence[Row] = ()) -> Factory:
+    """The factory of a policy: a built-in name, or `module:factory` from the path or the working directory.
+
+    Raises:
+        ScengenError: there is no such policy.
+    """
+    if name == REPLAY:
+        return lambda env: Replay(env, memory)
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    module, colon, factory = name.partition(":")
+    if not colon:
+        raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory"])
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        found = getattr(importlib.import_module(module), factory, None)
+    except ModuleNotFoundError as error:
+        if error.name and module.startswith(error.name):
+            raise BadConfig(f"policy = {name}; there is no module {module!r} on the path or in this folder") from None
+        raise
+    if not callable(found):
+        raise BadConfig(f"policy = {name}; {module} has no function or class named {factory!r}")
+    return found

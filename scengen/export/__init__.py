@@ -1,0 +1,1 @@
+"""Pools in the formats of others: plain MJCF, LeRobot data sets."""

@@ -1,0 +1,44 @@
+"""Where a camera stands and how it maps space to pixels."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sim.world import World
+
+WORLD, HAND = "world", "robot0_eef"
+"""Frames in which extrinsics are given: the world's, or the one of `robot0_eef_pos` and `robot0_eef_quat`."""
+TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+"""MuJoCo's cameras look along -z with y up; OpenCV's, which vision tools expect, along z with y down."""
+
+
+def calibration(world: World, name: str, width: int, height: int) -> dict[str, Any]:
+    """Intrinsics and extrinsics of a camera, rounded to a micrometre, as plain data.
+
+    `intrinsics` is the 3 x 3 matrix K in pixels; the middle of the first pixel lies at (0.5, 0.5). `extrinsics` is the
+    4 x 4 matrix that takes points from the camera's frame (x right, y down, z ahead) to `frame` [m].
+    """
+    model, data = world.model, world.data
+    mujoco.mj_camlight(model, data)  # the control loop leaves cameras one physics step behind
+    camera = model.camera(name)
+    focal = height / 2 / np.tan(np.radians(float(camera.fovy[0])) / 2)
+    pose = _pose(data.cam_xpos[camera.id], data.cam_xmat[camera.id].reshape(3, 3) @ TO_OPENCV)
+    fixed = model.body_weldid[camera.bodyid[0]] == 0
+    if not fixed:
+        pose = np.linalg.inv(_pose(world.arm.hand, world.arm.hand_rot)) @ pose
+    return {
+        "model": "pinhole without distortion",
+        "width": width,
+        "height": height,
+        "intrinsics": [[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]],
+        "frame": WORLD if fixed else HAND,
+        "extrinsics": (pose.round(6) + 0.0).tolist(),  # + 0.0 turns -0.0 into 0.0
+    }
+
+
+def _pose(position: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = axes, position
+    return pose

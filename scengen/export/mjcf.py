@@ -1,0 +1,57 @@
+"""Scenes as files that plain MuJoCo opens from anywhere."""
+
+import shutil
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+
+from ..errors import BadConfig
+from ..pool import Row
+from ..robots import panda
+from ..sim.world import compose
+
+
+def export(row: Row, folder: Path, robot: bool) -> None:
+    """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
+
+    The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In
+    scene_with_robot.xml the robot stands as after a reset, in the key frame "home".
+
+    Raises:
+        BadConfig: the folder cannot be written.
+    """
+    target = folder / row["id"]
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        (target / "scene.xml").write_text(row["scene_xml"])
+        if robot:
+            (target / "scene_with_robot.xml").write_text(_with_robot(row, target))
+    except OSError as error:
+        raise BadConfig(f"{target} cannot be written: {error.strerror}") from None
+
+
+def _with_robot(row: Row, target: Path) -> str:
+    spec = compose(row["scene_xml"], row["embodiment"], visual=True)
+    _add_home(spec)
+    root = ET.fromstring(spec.to_xml())
+    meshes = target.parent / "meshes"
+    meshes.mkdir(exist_ok=True)
+    for mesh in root.iterfind("asset/mesh[@file]"):
+        source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
+        copy = meshes / f"{mesh.attrib['name']}{source.suffix}"
+        if not copy.exists():
+            shutil.copyfile(source, copy)
+        mesh.set("file", f"../meshes/{copy.name}")
+    return ET.tostring(root, encoding="unicode")
+
+
+def _add_home(spec: mujoco.MjSpec) -> None:
+    """A key frame with the robot as after a reset: MuJoCo's viewer then starts where episodes start."""
+    model = spec.compile()
+    qpos = model.qpos0.copy()
+    joints = [*panda.Names().joints, *panda.Names().finger_joints]
+    for name, angle in zip(joints, [*panda.HOME, *panda.FINGERS], strict=True):
+        qpos[model.joint(name).qposadr[0]] = angle
+    spec.add_key(name="home", qpos=qpos)
+    spec.compile()

@@ -1,0 +1,178 @@
+"""Recordings: witnesses played again and written as a LeRobot data set, with the paper's streams.
+
+LeRobot gives a data set one rate, `fps`. A row is what was seen at one moment and what was done from then to the next
+row: with 25 rows a second, in four control periods. Nothing of the witness gets lost: `actions` holds the actions of all
+control periods of the row, exactly as the controller received them. They have passed the teleoperation filter; an
+environment takes them as they are.
+"""
+
+import json
+import shutil
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from pathlib import Path
+
+from ..control.loop import ACTION
+from ..envs.observations import CAMERAS, Stream, proprioception, streams_of
+from ..errors import BadConfig, PoolError, UnknownName, at_least
+from ..pictures.film import periods_between
+from ..pictures.render import Camera, Picture
+from ..pictures.video import check_size
+from ..pool import Pool, Row
+from ..samplers.task import Task
+from ..scenario import Scenario
+from ..sim.world import World
+from ..validate.identity import check_versions, versions
+from .cameras import calibration
+from .lerobot import DataSet, Feature
+from .play import play
+
+NONE = "none"
+ABOUT = ("id", "task", "code", "split", "axes", "shifted", "seed", "index", "id_twin", "scene_sha256", "witness_sha256")
+"""Columns of a pool that every episode carries, as `scengen/<column>` in LeRobot's table of episodes."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen record`; meanings stand in conf/command/record.yaml."""
+
+    pool: str | list[str] = ""
+    to: str = ""
+    n: int | None = None
+    fps: int = 25
+    cameras: str | list[str] = field(default_factory=lambda: list(CAMERAS))
+    width: int = 640
+    height: int = 480
+
+    @property
+    def folders(self) -> list[str]:
+        """The pools to record."""
+        return self.pool if isinstance(self.pool, list) else [self.pool]
+
+    @property
+    def eyes(self) -> list[str]:
+        """Names of the cameras to film with."""
+        named = self.cameras if isinstance(self.cameras, list) else [self.cameras]
+        return [] if named == [NONE] else named
+
+    @property
+    def unfinished(self) -> Path:
+        """Where the data set is until everything is in it."""
+        return Path(f"{self.to}.unfinished")
+
+    def check(self) -> None:
+        """Raise `ScengenError` for settings that make no sense."""
+        periods_between(self.fps)
+        check_size(self.width, self.height)
+        at_least(self, n=1)
+        for name in self.eyes:
+            if name not in CAMERAS:
+                raise UnknownName("camera", name, [NONE, *CAMERAS])
+        if Path(self.to).exists():
+            raise BadConfig(f"{self.to} exists already; delete it, or name another folder")
+        if self.unfinished.exists():
+            raise BadConfig(
+                f"{self.unfinished} is left from a recording that was killed, or one is under way; delete it"
+            )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a recording came to."""
+
+    episodes: int
+    rows: int
+    failed: tuple[str, ...]
+    """Scenarios whose witness did not reach the goal here; their episodes say so."""
+
+
+def record(settings: Settings, find_task: Callable[[str], Task], progress: Callable[[int, int], None]) -> Summary:
+    """Write the data set that the settings describe; its folder appears when it is complete.
+
+    Args:
+        find_task: gives the task of a name.
+        progress: told how many episodes are done and how many there are.
+
+    Raises:
+        ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.
+    """
+    settings.check()
+    pools = [Pool.open(folder).check() for folder in settings.folders]
+    robot, count = _robot(pools), sum(map(len, pools))
+    count = min(count, settings.n or count)
+    streams = streams_of(robot)
+    try:
+        settings.unfinished.mkdir(parents=True)
+    except OSError as error:
+        raise BadConfig(f"{settings.unfinished} cannot be written: {error.strerror}") from None
+    try:
+        size, features = (settings.width, settings.height), _features(settings, robot)
+        failed = []
+        with DataSet(settings.unfinished, settings.fps, robot, features, settings.eyes, size) as data:
+            for row in islice(chain.from_iterable(pool.rows() for pool in pools), count):
+                scenario = find_task(row["task"]).scenario(row["params"])
+                if not _episode(data, row, scenario, settings, streams):
+                    failed.append(row["id"])
+                progress(len(data.episodes), count)
+        source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
+        (settings.unfinished / "meta" / "scengen.json").write_text(json.dumps(source, indent=1) + "\n")
+        settings.unfinished.rename(settings.to)
+    except BaseException:
+        shutil.rmtree(settings.unfinished)
+        raise
+    return Summary(len(data.episodes), data.rows, tuple(failed))
+
+
+def _episode(data: DataSet, row: Row, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:
+    """Add one scenario's episode, and say whether it reached the goal."""
+    world, success = World.load(row["scene_xml"], row["embodiment"], visual=bool(settings.eyes)), False
+    with ExitStack() as stack:
+        pictures = _camera(stack, world, settings)
+        for name in settings.eyes:
+            data.calibrate(name, calibration(world, CAMERAS[name], settings.width, settings.height), row["id"])
+        for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
+            data.add(moment.values(proprioception(row["embodiment"])), moment.pictures)
+            success = moment.success
+    about = {f"scengen/{name}": row[name] for name in ABOUT}
+    data.end_episode(row["instruction"], {**about, "scengen/success": success})
+    return success
+
+
+def _camera(stack: ExitStack, world: World, settings: Settings) -> Callable[[], dict[str, Picture]]:
+    """What takes the pictures of a moment, by the paper's names; OpenGL is touched only if there are any."""
+    if not settings.eyes:
+        return dict
+    camera = Camera(world, settings.width, settings.height)
+    stack.callback(camera.close)
+    return lambda: {name: camera.take(CAMERAS[name]) for name in settings.eyes}
+
+
+def _features(settings: Settings, robot: str) -> dict[str, Feature]:
+    """The columns of `Moment.values`."""
+    seen = {name: Feature("float32", stream.shape) for name, stream in streams_of(robot).items()}
+    state = sum(seen[name].shape[0] for name in proprioception(robot))
+    return {
+        **seen,
+        "observation.state": Feature("float32", (state,)),
+        "action": Feature("float32", (ACTION,)),
+        "actions": Feature("float32", (periods_between(settings.fps), ACTION)),
+        "reward": Feature("float32"),
+        "next.reward": Feature("float32"),
+        "next.done": Feature("bool"),
+        "next.success": Feature("bool"),
+    }
+
+
+def _robot(pools: list[Pool]) -> str:
+    """The one embodiment of all scenarios."""
+    robots = set()
+    for pool in pools:
+        check_versions(pool.manifest["versions"], str(pool.folder))
+        robots |= {row["embodiment"] for row in pool.rows(["embodiment"])}
+    if not robots:
+        raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
+    if len(robots) > 1:
+        raise BadConfig(f"pools for {' and '.join(sorted(robots))}; a data set has one robot: record them apart")
+    return robots.pop()

@@ -1,0 +1,60 @@
+"""Statistics of columns and of pictures, as LeRobot's data sets carry them for normalisation."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pictures.render import Picture
+
+QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+THINNING = 4
+"""Pictures are looked at in every fourth row and column; that is enough for their colours."""
+
+Stats = dict[str, Any]
+"""min, max, mean, std, count and quantiles as nested lists."""
+
+
+def describe(values: NDArray[Any]) -> Stats:
+    """Statistics over the first axis, element by element; numbers give lists of one, as LeRobot has it."""
+    rows = values.astype(np.float64)
+    if rows.ndim == 1:
+        rows = rows[:, None]
+    quantiles = np.quantile(rows, list(QUANTILES.values()), axis=0)
+    return {
+        "min": rows.min(axis=0).tolist(),
+        "max": rows.max(axis=0).tolist(),
+        "mean": rows.mean(axis=0).tolist(),
+        "std": rows.std(axis=0).tolist(),
+        "count": [len(rows)],
+        **{name: quantile.tolist() for name, quantile in zip(QUANTILES, quantiles, strict=True)},
+    }
+
+
+class Shades:
+    """How often each channel of some pictures had each of its 256 values."""
+
+    def __init__(self) -> None:
+        self.counts, self.frames = np.zeros((3, 256), np.int64), 0
+
+    def see(self, picture: Picture) -> None:
+        """Count one picture."""
+        thin = picture[::THINNING, ::THINNING]
+        self.counts += [np.bincount(thin[:, :, channel].ravel(), minlength=256) for channel in range(3)]
+        self.frames += 1
+
+    def __iadd__(self, other: "Shades") -> "Shades":
+        self.counts += other.counts
+        self.frames += other.frames
+        return self
+
+    def describe(self) -> Stats:
+        """Statistics of each channel in [0, 1], shape (3, 1, 1)."""
+        shades, total = np.arange(256) / 255, self.counts.sum(axis=1)
+        below = self.counts.cumsum(axis=1)
+        mean = self.counts @ shades / total
+        std = np.sqrt(np.maximum(0.0, self.counts @ shades**2 / total - mean**2))
+        levels = {"min": 0.0, "max": 1.0, **QUANTILES}
+        found = {name: shades[(below > level * (total[:, None] - 1)).argmax(axis=1)] for name, level in levels.items()}
+        numbers = {**found, "mean": mean, "std": std}
+        return {name: value.reshape(3, 1, 1).tolist() for name, value in numbers.items()} | {"count": [self.frames]}

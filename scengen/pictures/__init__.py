@@ -1,0 +1,1 @@
+"""Pictures, films, reports: everything that is looked at."""

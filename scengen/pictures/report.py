@@ -1,0 +1,150 @@
+"""What people see of a run and of a pool: the funnel, tables, and a contact sheet in one HTML file."""
+
+import json
+from collections.abc import Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from rich.table import Table
+
+from ..pool import Pool, Row
+from ..runs.generate import STAGES, Summary
+from ..samplers.axis import spell
+from ..samplers.dists import Fixed
+from ..samplers.task import Task
+from . import render
+
+
+def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table:
+    """How many draws got through each step, and what stopped the others."""
+    table = Table("step", "left", "lost", "share", title="funnel", title_justify="left")
+    before = None
+    for stage in ("proposed", *STAGES):
+        count = funnel[stage]
+        lost = "" if before is None or before == count else str(before - count)
+        table.add_row(stage, str(count), lost, f"{count / max(1, funnel['proposed']):.0%}")
+        before = count
+    if reasons:
+        table.add_section()
+        for reason, count in sorted(reasons.items(), key=lambda item: -item[1])[:8]:
+            table.add_row(f"[dim]{reason[:90]}[/]", "", str(count), "")
+    return table
+
+
+def summary_lines(summary: Summary) -> list[str]:
+    """The end of a run in a few lines."""
+    n, indices = summary.certified, summary.indices
+    pool = summary.pool
+    lines = [
+        f"{pool.folder}: {n} certified of {indices} indices",
+        f"first draws certified: {summary.first_draws} of {indices} ({summary.first_draws / max(1, indices):.0%})",
+    ]
+    if n:
+        lines.append(f"processor time per certified scenario: {summary.cpu / n:.1f} s")
+    return [*lines, f"pool sha256: {pool.sha256}"]
+
+
+def pool_table(pool: Pool) -> Table:
+    """One line per scenario, with the parameters that differ from one to another."""
+    rows = [(row, json.loads(row["params"])) for row in pool.rows(["id", "index", "shifted", "params"])]
+    first = rows[0][1] if rows else {}
+    drawn = [name for name in first if any(params[name] != first[name] for _, params in rows)]
+    split = pool.manifest["config"]["split"]
+    table = Table("id", "index", "parameters", title=f"{pool.folder}: {split}", title_justify="left")
+    for row, params in rows:
+        shown = [name for name in params if name in drawn or name in json.loads(row["shifted"])]
+        table.add_row(row["id"], str(row["index"]), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
+    return table
+
+
+def scenario_tables(row: Row) -> list[Table]:
+    """One scenario: what it is, its parameters, and its certificate."""
+    about = Table(title=f"{row['task']} {row['id']}", title_justify="left", show_header=False)
+    for key in ("instruction", "split", "shifted", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
+        about.add_row(key, str(row[key]))
+    about.add_row("witness", f"{len(row['witness'])} control periods of 10 ms, sha256 {row['witness_sha256'][:16]}...")
+    params = Table("parameter", "value", title="parameters", title_justify="left")
+    for name, value in json.loads(row["params"]).items():
+        params.add_row(name, f"{value:g}")
+    certificate = row["certificate"]
+    checks = Table(
+        "check", "passed", "numbers", title=f"certificate: {certificate['verdict']} ({certificate['level']})"
+    )
+    checks.title_justify = "left"
+    for check in certificate["checks"]:
+        mark = {True: "yes", False: "NO", None: "skipped"}[check["passed"]]
+        checks.add_row(check["name"], mark, check["reason"] or _numbers(json.loads(check["numbers"])))
+    return [about, params, checks]
+
+
+def tasks_table(tasks: list[Task]) -> Table:
+    """All tasks in a few words."""
+    table = Table("task", "code", "category", "splits", "instruction", title="tasks", title_justify="left")
+    for task in tasks:
+        table.add_row(task.name, task.code, task.category, ", ".join(["id", *task.axes]), task.instruction)
+    return table
+
+
+def task_tables(task: Task) -> list[Table]:
+    """One task: every parameter with unit, bounds and ID range, and every axis with its proof."""
+    params = Table("parameter", "unit", "bounds", "nominal", "training (id)", title=f"{task.code} {task.name}")
+    for p in task.known.values():
+        dist = task.training[p.name]
+        spread = "" if dist == Fixed(p.nominal) else spell(dist)
+        hidden = " (hidden)" if p.hidden else ""
+        params.add_row(p.name + hidden, p.unit, f"{p.low:g} to {p.high:g}", f"{p.nominal:g}", spread)
+    axes = Table("axis", "parameter", "goes to", "gap", "proof", "why", title="axes: each lies outside training")
+    for name, axis in task.axes.items():
+        for proof in task.proofs[name]:
+            relative = f" = {proof.relative:.2g} training widths" if proof.relative else ""
+            gap = f"{proof.gap:.3g} {task.known[proof.parameter].unit}{relative}"
+            goes = spell(axis.replace[proof.parameter])
+            axes.add_row(
+                name, proof.parameter, goes, gap, proof.kind, f"{axis.why} [dim]({axis.source or 'no source'})[/]"
+            )
+    params.title_justify = axes.title_justify = "left"
+    return [params, axes]
+
+
+def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
+    """Write one HTML file that shows the scenes of some pools. Returns a remark, or nothing.
+
+    Without OpenGL the page has no pictures and says so.
+    """
+    remark, sections = "", []
+    for pool in pools:
+        cards: list[dict[str, Any]] = []
+        for row in islice(pool.rows(), images):
+            picture = ""
+            if not remark:
+                try:
+                    picture = thumbnail(row)
+                except render.NoPictures as error:
+                    remark = str(error)
+            cards.append({"row": row, "picture": picture, "params": json.loads(row["params"])})
+        sections.append(
+            {
+                "pool": pool,
+                "manifest": pool.manifest,
+                "steps": ("proposed", *STAGES),
+                "cards": cards,
+                "rest": max(0, len(pool) - images),
+            }
+        )
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "pictures/templates"), autoescape=True)
+    page = environment.get_template("contact_sheet.html").render(sections=sections, remark=remark)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page)
+    return remark
+
+
+def thumbnail(row: Row, width: int = 320, height: int = 240) -> str:
+    """A picture of the start of a scenario, as a data address for HTML."""
+    with render.camera(row["scene_xml"], row["embodiment"], width, height) as view:
+        return render.address(render.encode(view.take()), "webp")
+
+
+def _numbers(numbers: Mapping[str, Any]) -> str:
+    return json.dumps(numbers, default=str)[1:-1].replace('"', "")

@@ -1,0 +1,74 @@
+"""MP4 files. Needs PyAV (`pip install scengen[record]`), whose wheels carry FFmpeg."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+from ..errors import BadConfig, ScengenError
+from .render import Picture
+
+CODEC, PIXELS = "h264", "yuv420p"
+"""What every browser and every LeRobot version decodes."""
+
+
+class NoVideo(ScengenError):
+    """PyAV is missing on this machine."""
+
+
+def check_size(width: int, height: int) -> None:
+    """Raise `BadConfig` unless a video can have this size: colours are stored for squares of 2 x 2 pixels."""
+    for name, value in (("width", width), ("height", height)):
+        if value < 2 or value % 2:
+            raise BadConfig(f"{name} = {value}; the pictures of a video have an even number of pixels, at least 2")
+
+
+class Movie:
+    """An MP4 file that is being written: frame k is shown from k / fps on, exactly."""
+
+    def __init__(self, path: Path, fps: int, width: int, height: int, key_every: int = 250):
+        """Begin a file.
+
+        Args:
+            key_every: every how many frames one is stored whole; few make single frames quick to reach. 250 is
+                x264's own.
+
+        Raises:
+            NoVideo: PyAV is missing.
+            BadConfig: the size is odd, or the file cannot be written.
+        """
+        check_size(width, height)
+        try:
+            import av
+        except ImportError:
+            raise NoVideo("no PyAV for MP4 files; say pip install 'scengen[record]'") from None
+        self.path, self.fps, self.frames = path, fps, 0
+        self._encode = av.VideoFrame.from_ndarray
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = av.open(str(path), "w", format="mp4")
+        except OSError as error:
+            raise BadConfig(f"{path} cannot be written: {error.strerror}") from None
+        self._stream = self._file.add_stream("libx264", rate=fps, width=width, height=height, pix_fmt=PIXELS)
+        self._stream.codec_context.gop_size = key_every
+        # no frame waits for a later one, so that times start at 0; crf 20 cannot be told from the original
+        self._stream.options = {"crf": "20", "preset": "veryfast", "bf": "0"}
+
+    def add(self, picture: Picture) -> None:
+        """Append one frame."""
+        frame = self._encode(picture, format="rgb24")
+        frame.pts, frame.time_base = self.frames, Fraction(1, self.fps)
+        self._file.mux(self._stream.encode(frame))
+        self.frames += 1
+
+    def close(self) -> None:
+        """Write what is still waiting, and the index."""
+        self._file.mux(self._stream.encode())
+        self._file.close()
+
+    def __enter__(self) -> "Movie":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,48 @@
+"""What goals and failures ask of a world, by the names that tasks use."""
+
+import math
+
+import numpy as np
+
+from .assets.prop import TABLE_TOP
+from .geometry import Vec3
+from .sim.world import ROBOT, World
+
+
+def fallen(world: World, *bodies: str, below: float = 0.05) -> str | None:
+    """The first body whose centre of mass is more than `below` [m] under the table top, or None: it is lost."""
+    return next((body for body in bodies if world.com(body)[2] < TABLE_TOP - below), None)
+
+
+def displaced(world: World, body: str, start: Vec3) -> float:
+    """How far a body's centre of mass is from `start`, measured along the table [m]."""
+    offset = world.com(body) - start
+    return math.hypot(offset[0], offset[1])
+
+
+def still(world: World, body: str, below: float) -> bool:
+    """Whether a body's centre of mass moves slower than `below` [m/s]."""
+    velocity = world.velocity(body)[3:]
+    return math.sqrt(velocity @ velocity) < below
+
+
+def held(world: World, body: str) -> bool:
+    """Whether the robot touches a body that nothing else touches."""
+    others = (name for name in world.touching_bodies(body) if name != ROBOT)
+    return world.touching(ROBOT, body) and not any(others)
+
+
+def rests_on(world: World, body: str, support: str) -> bool:
+    """Whether a body touches `support`, and neither the robot nor anything else."""
+    return world.touching(body, support) and world.touching_bodies(body) == {support}
+
+
+def inside(world: World, body: str, container: str, low: Vec3, high: Vec3) -> bool:
+    """Whether a body's origin lies between two corners, given in the container's axes [m]."""
+    place = world.rot(container).T @ (world.pos(body) - world.pos(container))
+    return bool(np.all(place >= low) and np.all(place <= high))
+
+
+def touched_only(world: World, *allowed: str) -> str | None:
+    """The first free body that the robot has touched since the start although it is not allowed, or None."""
+    return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)

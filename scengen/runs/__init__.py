@@ -1,0 +1,1 @@
+"""Long runs: generation of pools, their journals, progress."""

@@ -1,0 +1,165 @@
+"""An OOD axis: which parameters leave their training support, where they go, and why."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ..errors import BadConfig
+from ..params import Parameter, Value
+from ..symmetry import Symmetry, images
+from .dists import Choice, Dist, Fixed, Integer
+from .support import Interval, Support, distance, meet, nearest, width
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Evidence that one parameter of an axis takes no training value."""
+
+    parameter: str
+    kind: str
+    """`interval`, or `categorical` when one of the two supports is a finite set; `, modulo P` if periodic."""
+    gap: float
+    """Smallest distance between a training value and a value of the axis, in the parameter's unit."""
+    relative: float | None
+    """The gap in widths of the training range; None when training knows one value only."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A named departure from the training distribution."""
+
+    name: str
+    why: str
+    """What it probes, and why a habit from training fails there."""
+    source: str
+    replace: Mapping[str, Dist]
+    """New distribution of every parameter that moves; all others keep theirs."""
+    levels: int = 0
+    """How many levels of severity there are, `name@1` to `name@levels`; 0 for none."""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """Measured ends of the way by parameter, from conf/limits: where the oracle dies."""
+
+    def prove(
+        self,
+        training: Mapping[str, Dist],
+        known: Mapping[str, Parameter],
+        symmetries: Sequence[Symmetry] = (),
+    ) -> list[Proof]:
+        """Prove that every named parameter leaves its training support, and that no symmetry leads back into it.
+
+        Args:
+            training: the ID distribution of every parameter, constants included.
+            known: the family's parameters by name.
+            symmetries: changes of the parameters that give the same scene.
+
+        Raises:
+            BadConfig: a support touches or overlaps the training support.
+        """
+        if not self.replace:
+            raise BadConfig(f"axis {self.name} replaces no parameter; name at least one under `replace`")
+        proofs = [self._prove(known[name], dist, training[name]) for name, dist in self.replace.items()]
+        self._not_training_again(training, known, symmetries)
+        return proofs
+
+    def at(self, level: int, training: Mapping[str, Dist], known: Mapping[str, Parameter]) -> "Axis":
+        """The axis at one level: every value is `level / levels` of the way from training to the far end.
+
+        The way of a value begins at the nearest training value. It ends at the far end of its range, or at the
+        measured limit if there is one. A range thus becomes one value, several separate values remain several.
+
+        Raises:
+            BadConfig: there is no such level, or a whole number would have to be a fraction.
+        """
+        if not 1 <= level <= self.levels:
+            has = f"has levels 1 to {self.levels}" if self.levels else "has none: give it `levels: N` in the task file"
+            raise BadConfig(f"level {self.name}@{level}: the axis {has}")
+        dists = self.along(level / self.levels, training, known)
+        return replace(self, name=f"{self.name}@{level}", replace=dists, levels=0)
+
+    def along(
+        self, fraction: float, training: Mapping[str, Dist], known: Mapping[str, Parameter]
+    ) -> dict[str, Fixed | Choice]:
+        """Where the axis' parameters are at a fraction of the way: 0 the edge of training, 1 the far end.
+
+        Raises:
+            BadConfig: a whole number would have to be a fraction.
+        """
+        return {n: self._on_the_way(fraction, known[n], d, training[n].support) for n, d in self.replace.items()}
+
+    def _prove(self, parameter: Parameter, there: Dist, here: Dist) -> Proof:
+        gap = distance(here.support, there.support, parameter.period)
+        if gap <= 0:
+            modulo = f" modulo {parameter.period:g}" if parameter.period else ""
+            shared = meet(here.support, there.support, parameter.period)
+            how = "both have values in common" if shared else "no value in common, but no gap either"
+            raise BadConfig(
+                f"axis {self.name}: {parameter.name} goes to {spell(there)}, which touches or overlaps its "
+                f"training range {spell(here)}{modulo} [{parameter.unit}] ({how}); move it outside, "
+                f"narrow the range in `id`, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
+            )
+        finite = (Fixed, Choice, Integer)
+        kind = "categorical" if isinstance(there, finite) or isinstance(here, finite) else "interval"
+        kind += f", modulo {parameter.period:g}" if parameter.period else ""
+        span = width(here.support)
+        return Proof(parameter.name, kind, gap, gap / span if span > 0 else None)
+
+    def _not_training_again(
+        self, training: Mapping[str, Dist], known: Mapping[str, Parameter], symmetries: Sequence[Symmetry]
+    ) -> None:
+        """Raise if a symmetric image of the training scenes takes in scenes of the axis.
+
+        Scenes are apart where any one parameter is, named by the axis or not.
+        """
+        here = {name: dist.support for name, dist in training.items()}
+        there = {**here, **{name: dist.support for name, dist in self.replace.items()}}
+        for image in images(here, symmetries, reflected):
+            if all(distance(there[n], image[n], known[n].period) <= 0 for n in there):
+                raise BadConfig(
+                    f"axis {self.name}: {', '.join(self.replace)} move, but the scenes are training scenes again under "
+                    f"the symmetries of the family ({', '.join(s.name for s in symmetries)}); move a parameter that "
+                    f"they do not take back, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
+                )
+
+    def _on_the_way(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:
+        whole = isinstance(dist, Integer)  # its values are separate, but lie on one way
+        ways = (Interval(dist.low, dist.high),) if whole else dist.support
+        listed = [Interval(v, v) for v in dist.options] if isinstance(dist, Choice) else ways
+        values = [self._value(fraction, parameter, way, training) for way in listed]
+        return Fixed(values[0]) if len(set(values)) == 1 else Choice(tuple(values))
+
+    def _value(self, fraction: float, parameter: Parameter, way: Interval, training: Support) -> Value:
+        period = parameter.period
+        far = max(way.low, way.high, key=lambda v: abs(nearest(training, v, period) - v))
+        edge = nearest(training, far, period)
+        far = self.limits.get(parameter.name, far)
+        value = edge + fraction * (far - edge)
+        if period:
+            while value < parameter.low:
+                value += period
+            while value > parameter.high:
+                value -= period
+        if not parameter.integer:
+            return value
+        if abs(value - round(value)) > 1e-9:
+            raise BadConfig(
+                f"axis {self.name}: {fraction:.0%} of its way puts {parameter.name} at {value:g}, which must be a "
+                f"whole number; from {edge:g} to {far:g} there are {abs(far - edge):g} steps"
+            )
+        return round(value)
+
+
+def reflected(support: Support, about: float) -> Support:
+    """The mirror image of a support about a value."""
+    return tuple(sorted((i.reflected(about) for i in support), key=lambda i: i.low))
+
+
+def spell(dist: Dist) -> str:
+    """The distribution's values in a few words: `0.6 to 1.2` or `{0, 90}`."""
+    points = [i.low for i in dist.support if i.low == i.high]
+    spans = [_spell(i) for i in dist.support if i.low < i.high]
+    return " or ".join([*spans, "{" + ", ".join(f"{p:g}" for p in points) + "}"] if points else spans)
+
+
+def _spell(span: Interval) -> str:
+    open_ends = [e for e, is_open in ((span.low, span.open_low), (span.high, span.open_high)) if is_open]
+    without = f" without {' and '.join(f'{e:g}' for e in open_ends)}" if open_ends else ""
+    return f"{span.low:g} to {span.high:g}{without}"

@@ -1,0 +1,224 @@
+"""Moves of one arm. Each yields actions, one per control period, until a condition on the world holds.
+
+A move steers the hand by feedback: the action asks for the velocity of a setpoint that runs along a straight
+line, plus a correction towards it. Positions in [m], speeds in [m/s], orientations as 3 x 3 matrices. A move takes
+the arm that it steers; `together` joins the moves of several.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..control import osc
+from ..control.loop import Loop
+from ..errors import GaveUp
+from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
+from ..scenario import Action, Plan
+from ..sim.world import Arm
+
+OPEN, CLOSED = -1.0, 1.0
+"""Gripper commands: jaw open or suction off, jaw closed or suction on."""
+
+STEP = np.array([osc.STEP] * 3 + [osc.TURN] * 3)
+"""What an action of 1 asks for [m, rad]: robosuite's OSC_POSE output range."""
+RATE = math.sqrt(osc.KP) / 2
+"""Velocity [m/s] that the controller settles at per metre of asked displacement: kp / kd = sqrt(kp) / 2."""
+STIFFNESS = 1.5
+"""Share of the distance to the setpoint that is asked for as displacement; above 2.5 the hand starts to ring."""
+ALIGNED = 0.05
+"""Angle at which the hand has the orientation that was asked for [rad]."""
+WRIST_SPARE = math.radians(10.0)
+"""How far joint 7 stays away from its limits when a hand may be turned either way [rad]."""
+
+Condition = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast the hand goes, how exactly it must arrive, and when a move gives up."""
+
+    speed: float
+    """[m/s]"""
+    within: float
+    """Distance from the target at which it has arrived [m]."""
+    give_up: float = 6.0
+    """[s]"""
+
+
+COARSE = Pace(0.30, 0.02)
+"""Transit through free space, as fast as an action of 1 goes."""
+STEADY = Pace(0.25, 0.005)
+"""To a place beside things."""
+FINE = Pace(0.15, 0.003)
+"""Up to a thing that is to be grasped, put down or touched."""
+
+
+def facing_down(yaw: float = 0.0) -> Mat3:
+    """Orientation of a hand that points down; at `yaw` = 0 [rad], as after a reset, the fingers close along y."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([[-s, c, 0.0], [c, s, 0.0], [0.0, 0.0, -1.0]])
+
+
+def hand_yaw(arm: Arm) -> float:
+    """The `yaw` of `facing_down` for a hand that points about down [rad]."""
+    x = arm.hand_rot[:, 0]
+    return math.atan2(-x[0], x[1])
+
+
+def closing_along(arm: Arm, direction: ArrayLike) -> Mat3:
+    """Orientation of a hand that points down and whose fingers close along a level direction.
+
+    Two wrist turns look alike. It is the nearer one, unless it would take joint 7 to its limit.
+    """
+    along = np.asarray(direction, float)
+    turn = math.remainder(math.atan2(-along[0], along[1]) - hand_yaw(arm), math.pi)
+    low, high = arm.wrist_range
+    if not low + WRIST_SPARE < arm.joint_pos[6] - turn < high - WRIST_SPARE:
+        turn -= math.copysign(math.pi, turn)
+    return facing_down(hand_yaw(arm) + turn)
+
+
+def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY, grip: float | None = None) -> Plan:
+    """Take the hand in a straight line to `pos`, turning it to `rot` (default: as it is now).
+
+    Ends when the hand has arrived and is within `ALIGNED` of the orientation.
+
+    Raises:
+        GaveUp: that took too long.
+    """
+    world, goal, setpoint = arm.world, np.asarray(pos, float), arm.hand
+    end, rot = world.time + pace.give_up, arm.hand_rot if rot is None else rot
+    while True:
+        left = goal - arm.hand
+        turn = between(arm.hand_rot, rot)
+        if math.sqrt(left @ left) < pace.within and math.sqrt(turn @ turn) < ALIGNED:
+            return
+        if world.time > end:
+            short = f"{1000 * math.sqrt(left @ left):.0f} mm and {math.degrees(math.sqrt(turn @ turn)):.0f} deg short"
+            raise GaveUp(f"the hand stayed {short} of its target for {pace.give_up:g} s")
+        ahead = goal - setpoint
+        distance = math.sqrt(ahead @ ahead)
+        speed = min(pace.speed, 4.0 * distance)
+        velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)
+        setpoint = setpoint + velocity * Loop.PERIOD
+        yield steer(arm, setpoint, velocity, turn, grip)
+
+
+def push(arm: Arm, velocity: ArrayLike, until: Condition, grip: float | None = None, give_up: float = 3.0) -> Plan:
+    """Move at a constant `velocity`, orientation held, until something happens.
+
+    Raises:
+        GaveUp: it did not happen within `give_up` [s].
+    """
+    world, along, setpoint, rot = arm.world, np.asarray(velocity, float), arm.hand, arm.hand_rot
+    end = world.time + give_up
+    while not until():
+        if world.time > end:
+            raise GaveUp(f"end condition not met after pushing for {give_up:g} s")
+        setpoint = setpoint + along * Loop.PERIOD
+        yield steer(arm, setpoint, along, between(arm.hand_rot, rot), grip)
+
+
+def turn_to(
+    arm: Arm,
+    rot: Mat3,
+    rate: float = 1.0,
+    until: Condition = lambda: False,
+    grip: float | None = None,
+    within: float = 0.03,
+    give_up: float = 6.0,
+) -> Plan:
+    """Turn the hand on the spot to `rot` at an even `rate` [rad/s], until it is there or something happens.
+
+    Turns the shorter way; ends within `within` [rad].
+
+    Raises:
+        GaveUp: it was not there within `give_up` [s].
+    """
+    world, here, start = arm.world, arm.hand, arm.hand_rot
+    end, way, turned = world.time + give_up, between(start, rot), 0.0
+    angle = math.sqrt(way @ way)
+    while not until():
+        left = between(arm.hand_rot, rot)
+        if math.sqrt(left @ left) < within:
+            return
+        if world.time > end:
+            raise GaveUp(f"the hand stayed {math.degrees(math.sqrt(left @ left)):.0f} deg short for {give_up:g} s")
+        turned = min(angle, turned + rate * Loop.PERIOD)
+        aim = rotation(turned / max(angle, 1e-9) * way) @ start
+        yield steer(arm, here, np.zeros(3), between(arm.hand_rot, aim), grip)
+
+
+def turn_about_vertical(arm: Arm, angle: float, rate: float = 2.0) -> Plan:
+    """Turn the hand about the vertical by up to a full turn [rad], the way that the sign says."""
+    for _ in range(2):  # each half is the shorter way
+        yield from turn_to(arm, about_z(angle / 2) @ arm.hand_rot, rate)
+
+
+def hold(arm: Arm, seconds: float, grip: float | None = None) -> Plan:
+    """Keep the hand where it is, against whatever pulls at it."""
+    end, here, rot = arm.world.time + seconds, arm.hand, arm.hand_rot
+    while arm.world.time < end:
+        yield steer(arm, here, np.zeros(3), between(arm.hand_rot, rot), grip)
+
+
+def wait(arm: Arm, until: Condition, give_up: float) -> Plan:
+    """Ask for nothing until something happens.
+
+    Raises:
+        GaveUp: it did not happen within `give_up` [s].
+    """
+    end = arm.world.time + give_up
+    while not until():
+        if arm.world.time > end:
+            raise GaveUp(f"the condition did not hold within {give_up:g} s")
+        yield arm.idle
+
+
+def retreat(arm: Arm, height: float = 0.10, pace: Pace = COARSE) -> Plan:
+    """Go straight up by `height` [m]."""
+    yield from go_to(arm, arm.hand + height * UP, pace=pace)
+
+
+def until(plan: Plan, condition: Condition) -> Plan:
+    """A plan that is broken off as soon as the condition holds."""
+    while not condition():
+        try:
+            yield next(plan)
+        except StopIteration:
+            return
+
+
+def together(*plans: Plan) -> Plan:
+    """Several plans at once, one for each arm in their order: actions of shape (7 * arms,).
+
+    A plan that has ended asks for no motion and keeps its last gripper command; it must have yielded one action.
+    Ends with the last plan.
+    """
+    last: list[Action | None] = [None] * len(plans)
+    running = list(range(len(plans)))
+    while True:
+        for i in list(running):
+            try:
+                last[i] = next(plans[i])
+            except StopIteration:
+                running.remove(i)
+                if (before := last[i]) is None:
+                    raise ValueError(f"plan {i} has no action") from None
+                last[i] = np.append(np.zeros(6), before[6])
+        if not running:
+            return
+        yield np.concatenate([action for action in last if action is not None])
+
+
+def steer(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3, grip: float | None) -> Action:
+    """The action that follows a moving setpoint and turns the hand by a rotation vector [rad]."""
+    action = np.empty(7)
+    action[:3] = velocity / RATE + STIFFNESS * (setpoint - arm.hand)
+    action[3:6] = turn
+    action[:6] = np.clip(action[:6] / STEP, -1.0, 1.0)
+    action[6] = arm.grip if grip is None else grip
+    return action

@@ -1,0 +1,224 @@
+"""The command line as its users meet it: exit status, one clear line, nothing lost."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from test_pool import QUICKLY, make
+
+from scengen import cli, config
+from scengen.errors import BadConfig
+from scengen.pictures import film, render
+from scengen.pool import Pool
+from scengen.sim import scene_text
+from scengen.sim.world import World
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli") / "pool"
+    make(folder, n=2)
+    return folder
+
+
+def said(capsys, *argv):
+    """Exit status and what stood on standard error."""
+    status = cli.run(argv)
+    return status, capsys.readouterr().err
+
+
+GENERATE = ("generate", "task=domino_single")
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        (("generat",), "no command named 'generat' (did you mean 'generate'?)"),
+        (("generate",), "which task? say task=NAME; known: "),
+        (("generate", "task=domino_singel"), "no task named 'domino_singel' (did you mean 'domino_single'?)"),
+        ((*GENERATE, "split=diagnal"), "did you mean 'diagonal'"),
+        ((*GENERATE, "split=diagonal+diagonal"), "two of its axes move heading"),
+        ((*GENERATE, "workrs=2"), "no setting of generate named 'workrs' (did you mean 'workers'?)"),
+        ((*GENERATE, "n=many"), "n = 'many'; it must be a whole number"),
+        ((*GENERATE, "n=2.5"), "n = 2.5; it must be a whole number"),
+        ((*GENERATE, "n=0"), "n = 0; it must be at least 1"),
+        ((*GENERATE, "task.id.tile.mass=9"), "domino_single.id.tile.mass = 9 kg; it must lie in [0.005, 0.5] kg"),
+        ((*GENERATE, "task.id.tile.mas=0.04"), "no key in task.id.tile named 'mas' (did you mean 'mass'?)"),
+        ((*GENERATE, "+task.id.tile.mas=0.04"), "did you mean 'tile.mass'"),
+        ((*GENERATE, "task.id.gap_ratio=[unifrm,1,2]"), "no distribution named 'unifrm' (did you mean 'uniform'?)"),
+        ((*GENERATE, "task.id.count=[uniform,3,6]"), "it must be a whole number in [2, 15] tiles"),
+        ((*GENERATE, "task.axes.wide_gaps.replace.gap_ratio=[uniform,1.1,1.4]"), "touches or overlaps its training"),
+        ((*GENERATE, "certify=quik"), "did you mean 'quick'"),
+        ((*GENERATE, "certify.robust.run=3"), "did you mean 'runs'"),
+        ((*GENERATE, "certify.robust.runs=few"), "certify.robust.runs = 'few'; it must be a whole number"),
+        ((*GENERATE, "keep=good"), "keep = good; it must be refuted, unknown, or both"),
+        ((*GENERATE, "task.horizon=-1"), "it must be a positive number of seconds"),
+        ((*GENERATE, "split=a=b"), "'split=a=b' is no override"),
+        ((*GENERATE, "--workers=2"), "'--workers=2' is no option"),
+        (("verify",), "verify needs pool="),
+        (("verify", "pool=nowhere"), "no pool at nowhere"),
+        (("show", "pool=nowhere"), "no pool at nowhere"),
+        (("export", "pool=nowhere", "to=x"), "no pool at nowhere"),
+        (("tasks", "name=domino_singel"), "did you mean 'domino_single'"),
+    ],
+)
+def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
+    status, err = said(capsys, *argv)
+    assert status == 2 and says in err
+    assert err.startswith("scengen: ") and err.count("\n") == 1 and "Traceback" not in err
+
+
+def test_a_pool_that_cannot_be_written_is_one_line(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    status, err = said(capsys, *GENERATE, "n=1", f"pool={tmp_path}/file/pool")
+    assert status == 2 and "cannot be written" in err
+
+
+def test_a_damaged_pool_is_shown_and_exported_by_nobody(capsys, made, tmp_path):
+    import shutil
+
+    broken = shutil.copytree(made, tmp_path / "broken")
+    shard = Path(broken, "scenarios-00000.parquet")
+    shard.write_bytes(shard.read_bytes()[:-50])
+    assert said(capsys, "show", f"pool={broken}")[0] == 2
+    assert said(capsys, "export", f"pool={broken}", f"to={tmp_path / 'out'}")[0] == 2
+    status, err = said(capsys, "verify", f"pool={broken}")
+    assert status == 1 and "truncated" in err
+
+
+def test_a_failed_verification_is_status_1(capsys, made, tmp_path):
+    import shutil
+
+    broken = shutil.copytree(made, tmp_path / "flipped")
+    shard = Path(broken, "scenarios-00000.parquet")
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 2] ^= 4
+    shard.write_bytes(content)
+    status, err = said(capsys, "verify", f"pool={broken}", f"json={tmp_path / 'v.json'}")
+    assert status == 1 and "FAILED" in err and "Traceback" not in err
+    assert '"failed": [' in (tmp_path / "v.json").read_text()
+
+
+def test_fewer_than_asked_for_is_status_1_and_keeps_what_there_is(capsys, tmp_path):
+    folder = tmp_path / "few"
+    hopeless = ("+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=2", "n=2", "keep=unknown")
+    status, err = said(capsys, *GENERATE, *QUICKLY, *hopeless, f"pool={folder}")
+    assert status == 1 and "only 0 of 2 could be certified among 2 indices" in err
+    opened = Pool.open(folder)
+    assert len(opened) == 0 and opened.manifest["funnel"]["not trivial"] == 2
+    assert [r["certificate"]["verdict"] for r in opened.rejected] == ["unknown", "unknown"]
+    assert all("the oracle failed" in r["certificate"]["reason"] for r in opened.rejected)
+
+
+def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
+    """Indices that were drawn again, and one that could not be drawn at all."""
+    far = ("task.id.x=[uniform,0.1,0.4]", "+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=3", "n=1")
+    assert said(capsys, *GENERATE, *QUICKLY, *far, f"pool={tmp_path / 'far'}")[0] == 1
+    manifest = Pool.open(tmp_path / "far").manifest
+    infeasible = {why: n for why, n in manifest["reasons"].items() if why.startswith("feasible: ")}
+    lost = manifest["funnel"]["proposed"] - manifest["funnel"]["feasible"]
+    assert infeasible.keys() == {"feasible: the chain leaves the table"} and sum(infeasible.values()) == lost > 0
+
+
+@pytest.mark.parametrize("verb", list(cli.VERBS))
+def test_every_command_explains_its_settings(capsys, verb):
+    assert cli.run((verb, "--help")) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"# scengen {verb}:") and "=" not in out.split("\n")[0]
+    assert cli.run(()) == 0 and verb in capsys.readouterr().out
+
+
+def test_an_axis_from_the_command_line_is_proved_like_any_other(capsys, tmp_path):
+    slick = "+task.axes.slick={why: slippery, replace: {tile: {friction: [uniform, 0.2, 0.3]}}}"
+    assert cli.run((*GENERATE, slick, "split=slick", "n=1", *QUICKLY, f"pool={tmp_path / 'slick'}")) == 0
+    (row,) = Pool.open(tmp_path / "slick").rows()
+    assert row["axes"] == ["slick"] and '"tile.friction": 0.2' in row["shifted"]
+    same = slick.replace("[uniform, 0.2, 0.3]", "0.5")
+    assert said(capsys, *GENERATE, same, "split=slick")[0] == 2
+
+
+def test_show_prints_pools_and_scenarios(capsys, made):
+    row = next(Pool.open(made).rows())
+    assert cli.run(("show", f"pool={made}")) == 0 and row["id"] in capsys.readouterr().out
+    assert cli.run(("show", f"pool={made}", f"id={row['id'][:5]}")) == 0
+    out = capsys.readouterr().out
+    assert "certified" in out and "gap_ratio" in out and "necessity" in out
+
+
+def test_tasks_lists_every_task_with_units_bounds_and_proofs(capsys):
+    assert cli.run(("tasks",)) == 0
+    assert "domino_single" in capsys.readouterr().out
+    assert cli.run(("tasks", "name=domino_single")) == 0
+    out = capsys.readouterr().out
+    assert "tile.mass" in out and "0.005 to 0.5" in out and "stout_starter" in out
+
+
+def test_exported_scenes_open_from_anywhere(made, tmp_path):
+    assert cli.run(("export", f"pool={made}", f"to={tmp_path / 'out'}")) == 0
+    moved = (tmp_path / "out").rename(tmp_path / "elsewhere")
+    for row in Pool.open(made).rows():
+        folder = moved / row["id"]
+        alone = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+        whole = mujoco.MjModel.from_xml_path(str(folder / "scene_with_robot.xml"))
+        world = World.load(row["scene_xml"], row["embodiment"], visual=True)
+        assert alone.nbody < whole.nbody == world.model.nbody and whole.nq == world.model.nq
+        start = mujoco.MjData(whole)
+        mujoco.mj_resetDataKeyframe(whole, start, whole.key("home").id)
+        assert np.allclose(start.qpos, world.data.qpos, atol=1e-5)
+        assert str(tmp_path) not in (folder / "scene_with_robot.xml").read_text()
+
+
+def test_a_contact_sheet_shows_every_scene_or_says_why_not(made, tmp_path):
+    page = tmp_path / "sheet.html"
+    assert cli.run(("show", f"pool={made}", f"to={page}")) == 0
+    text = page.read_text()
+    assert all(row["id"] in text for row in Pool.open(made).rows())
+    assert (text.count("data:image/webp") == 2) != ("No pictures: no OpenGL" in text)
+
+
+def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys, tmp_path):
+    row = next(Pool.open(made).rows())
+    try:
+        scenario = config.task(row["task"]).scenario(row["params"])
+        picture = film.strip(film.Take.witness(row, scenario), frames=4)
+    except render.NoPictures as error:
+        assert "libegl1" in str(error)
+    else:
+        first, last = picture[:, :320].astype(int), picture[:, -320:].astype(int)
+        assert picture.shape == (240, 1280, 3) and picture.std() > 20
+        assert np.abs(first - last).max() > 50, "the arm moves and tiles fall"
+
+
+def test_it_runs_from_any_folder_as_a_module(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "scengen", "--version"], cwd=tmp_path, capture_output=True, text=True, env=os.environ
+    )
+    assert done.returncode == 0 and "mujoco 3.5" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<mujoco", "no well-formed XML"),
+        ("<robot/>", "expected <mujoco>"),
+        ("<!DOCTYPE m [<!ENTITY a 'b'>]><mujoco>&a;</mujoco>", "document type or entities"),
+        ("<mujoco><include file='x.xml'/></mujoco>", "contains <include>"),
+        ("<mujoco><asset><mesh file='/etc/passwd'/></asset></mujoco>", "reads '/etc/passwd'"),
+        ("<mujoco><asset><texture fileright='a.png'/></asset></mujoco>", "must stand alone"),
+        ("<mujoco><compiler meshdir='/'/></mujoco>", "must stand alone"),
+        ("<mujoco><extension><plugin plugin='p'/></extension></mujoco>", "contains <extension>"),
+        ("<mujoco><asset><model file='a.xml' name='b'/></asset></mujoco>", "must stand alone"),
+    ],
+)
+def test_a_scene_that_reaches_outside_itself_is_refused(text, says):
+    with pytest.raises(BadConfig, match=says):
+        scene_text.check(text)
+
+
+def test_every_task_file_is_found_without_registration():
+    files = {path.stem for path in (config.conf_dir() / "task").glob("*.yaml")}
+    assert set(config.tasks()) == files and "domino_single" in files

@@ -1,0 +1,210 @@
+"""The Gymnasium environment plays what the certificate speaks of, and nothing else reaches the simulator."""
+
+import shutil
+import warnings
+from pathlib import Path
+
+import gymnasium
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from helpers import REFERENCE, pictures_are_possible
+
+from scengen import config
+from scengen.envs import observations
+from scengen.envs.gym import ScenarioEnv
+from scengen.errors import PoolError, UnknownName
+from scengen.pool import Pool
+from scengen.sim.world import IDLE
+
+EVERYTHING = (*observations.STREAMS,)
+
+
+@pytest.fixture
+def env():
+    with gymnasium.make("scengen/domino_single-v0", pool=REFERENCE) as made:
+        yield made
+
+
+def test_gymnasiums_own_checker_has_nothing_to_say():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(ScenarioEnv("domino_single", REFERENCE, observations=EVERYTHING), skip_render_check=True)
+
+
+def test_every_task_is_registered():
+    assert {f"scengen/{name}-v0" for name in config.tasks()} <= set(gymnasium.registry)
+
+
+def test_witnesses_reach_the_goal_and_end_in_the_certified_seconds(env):
+    for row in Pool.open(REFERENCE).rows():
+        _, info = env.reset(options={"scenario": row["id"]})
+        assert (info["scenario"], info["scene_sha256"]) == (row["id"], row["scene_sha256"])
+        for action in row["witness"]:
+            _, reward, terminated, truncated, info = env.step(action)
+            if terminated or truncated:
+                break
+            assert reward == 0.0
+        assert reward == 1.0 and terminated and not truncated and info["success"] and info["is_success"]
+
+
+def test_doing_nothing_is_cut_off_at_the_time_limit(env):
+    env.reset(seed=0)
+    over, steps = False, 0
+    while not over:
+        _, reward, terminated, truncated, info = env.step(IDLE)
+        over, steps = terminated or truncated, steps + 1
+    assert truncated and not terminated and reward == 0.0 and not info["success"]
+    assert steps == round(config.task("domino_single").horizon * 100) and "was not reached" in info["reason"]
+
+
+def test_a_rule_broken_ends_the_episode_with_its_reason(env):
+    env.reset(seed=0)
+    world = env.unwrapped.world
+    for _ in range(400):
+        toward = world.pos("tile_1") - world.hand
+        action = np.zeros(7, np.float32)
+        action[:3], action[6] = np.clip(8 * toward, -1, 1), 1.0
+        _, _, terminated, _, info = env.step(action)
+        if terminated:
+            break
+    assert terminated and not info["success"] and info["reason"] == "the robot touched a tile other than the first"
+
+
+def test_the_seed_chooses_and_without_one_the_next_scenario_follows(env):
+    ids = env.unwrapped.scenarios
+    assert [env.reset(seed=k)[1]["scenario"] for k in (4, 1, 4)] == [ids[4], ids[1], ids[4]]
+    assert env.reset()[1]["scenario"] == ids[5] and env.reset()[1]["scenario"] == ids[0]
+
+
+def test_a_used_environment_repeats_itself_bit_by_bit(env):
+    def run():
+        seen, _ = env.reset(seed=2)
+        for k in range(50):
+            seen, *_ = env.step(np.sin(0.1 * k + np.arange(7)).astype(np.float32))
+        return np.concatenate([np.ravel(v) for v in seen.values()])
+
+    first = run()
+    env.reset(seed=3)
+    assert (run() == first).all()
+
+
+@pytest.mark.parametrize("action", [np.zeros(6), np.full(7, np.nan), np.zeros((1, 7)), [0, 0, 0, 0, 0, 0, np.inf]])
+def test_what_is_no_action_never_reaches_the_simulator(env, action):
+    env.reset(seed=0)
+    world = env.unwrapped.world
+    before = world.digest
+    with pytest.raises(ValueError, match=r"7 finite numbers in \[-1, 1\]"):
+        env.unwrapped.step(action)
+    assert world.digest == before
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "says"),
+    [
+        (lambda: ScenarioEnv("domino_singel", REFERENCE), UnknownName, "did you mean 'domino_single'"),
+        (lambda: ScenarioEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
+        (lambda: ScenarioEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
+        (lambda: ScenarioEnv("domino_single", []), PoolError, "no pool"),
+        (
+            lambda: ScenarioEnv("domino_single", REFERENCE, ["robot0_eef_poss"]),
+            UnknownName,
+            "did you mean 'robot0_eef_pos'",
+        ),
+        (
+            lambda: ScenarioEnv("domino_single", REFERENCE, render_mode="human"),
+            UnknownName,
+            "known: rgb_array",
+        ),
+        (
+            lambda: ScenarioEnv("domino_single", REFERENCE).reset(options={"scenario": "0000"}),
+            UnknownName,
+            "no scenario named '0000'",
+        ),
+        (
+            lambda: ScenarioEnv("domino_single", REFERENCE).reset(options={"scenari": 1}),
+            UnknownName,
+            "did you mean 'scenario'",
+        ),
+    ],
+)
+def test_bad_input_is_told_in_one_line(make, error, says):
+    with pytest.raises(error) as raised:
+        make()
+    assert says in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_pool_made_with_another_mujoco_is_refused(tmp_path):
+    shutil.copytree(REFERENCE, tmp_path / "pool")
+    manifest = tmp_path / "pool" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace(f'"mujoco": "{mujoco.__version__}"', '"mujoco": "3.1.0"'))
+    with pytest.raises(PoolError, match=r"certified with mujoco 3\.1\.0, this is"):
+        ScenarioEnv("domino_single", tmp_path / "pool")
+
+
+def test_readings_have_the_papers_shapes_and_mean_what_they_say():
+    env = ScenarioEnv("domino_single", REFERENCE, observations=EVERYTHING)
+    seen, _ = env.reset(seed=0)
+    shapes = {name: value.shape for name, value in seen.items()}
+    assert (
+        shapes["robot0_eef_quat"] == (4,) and shapes["force_torque"] == (6,) and shapes["robot0_gripper_qpos"] == (2,)
+    )
+    assert shapes["robot0_tactile_left"] == shapes["robot0_tactile_right"] == (8, 8)
+    world = env.world
+    assert np.allclose(seen["robot0_eef_pos"], world.hand, atol=1e-6)
+    x, y, z, w = seen["robot0_eef_quat"]
+    turned = np.empty(9)
+    mujoco.mju_quat2Mat(turned, np.array([w, x, y, z], float))
+    assert np.allclose(turned.reshape(3, 3), world.hand_rot, atol=1e-6)
+
+
+def test_the_wrist_carries_the_weight_of_the_hand_at_rest():
+    env = ScenarioEnv("domino_single", REFERENCE, observations=["force_torque_world"])
+    env.reset(seed=0)
+    for _ in range(100):
+        seen, *_ = env.step(IDLE)
+    model = env.world.model
+    hand = int(model.site_bodyid[model.site("gripper0_right_ft_frame").id])
+    weight = model.body_subtreemass[hand] * 9.81
+    assert np.allclose(np.abs(seen["force_torque_world"]), [0, 0, weight], atol=0.05 * weight)
+
+
+def test_the_fingers_feel_what_they_press_and_nothing_else():
+    env = ScenarioEnv("domino_single", REFERENCE, observations=["robot0_tactile_left", "robot0_tactile_right"])
+    seen, _ = env.reset(seed=0)
+    assert not seen["robot0_tactile_left"].any()
+    closed = np.array([0, 0, 0, 0, 0, 0, 1.0])
+    for _ in range(150):  # the pads meet each other; the joints' end stops carry most of the grip force then
+        seen, *_ = env.step(closed)
+    left, right = seen["robot0_tactile_left"].sum(), seen["robot0_tactile_right"].sum()
+    assert left > 0.1 and left == pytest.approx(right, rel=1e-3)
+
+
+def test_vectors_of_environments_step_together():
+    envs = gymnasium.make_vec("scengen/domino_single-v0", num_envs=2, vectorization_mode="sync", pool=REFERENCE)
+    _, info = envs.reset(seed=[1, 3])
+    assert info["scenario"][0] != info["scenario"][1]
+    seen, reward, *_ = envs.step(np.zeros((2, 7), np.float32))
+    assert seen["robot0_eef_pos"].shape == (2, 3) and reward.shape == (2,)
+    envs.close()
+
+
+@pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
+def test_cameras_see_the_scene():
+    env = ScenarioEnv(
+        "domino_single",
+        REFERENCE,
+        observations=list(observations.CAMERAS),
+        render_mode="rgb_array",
+        width=64,
+        height=48,
+    )
+    seen, _ = env.reset(seed=0)
+    for name in observations.CAMERAS:
+        assert seen[name].shape == (48, 64, 3) and seen[name].std() > 5
+    assert (env.render() == seen["rgb_exo_right_cam"]).all()
+    env.camera = "agentviw"
+    with pytest.raises(UnknownName, match="did you mean 'agentview'"):
+        env.render()
+    env.close()

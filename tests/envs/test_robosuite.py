@@ -1,0 +1,372 @@
+"""robosuite plays the very scene of the certificate, with its own controller, and comes to the same verdict."""
+
+import json
+import logging
+
+import mujoco
+import numpy as np
+import pytest
+from helpers import REFERENCE, pictures_are_possible
+
+from scengen import config
+from scengen.cli import run as scengen
+from scengen.envs import agreement
+from scengen.envs.agreement import Comparison, compare, compare_all
+from scengen.envs.robosuite import ScenarioEnv, environment
+from scengen.envs.robosuite_models import SceneModel
+from scengen.errors import BadConfig, PoolError, UnknownName
+from scengen.params import canonical
+from scengen.pool import Pool
+from scengen.sim import scene_text
+from scengen.sim.world import World
+from scengen.validate.identity import versions
+from scengen.validate.rollout import Judge
+
+# isort: split
+import robosuite
+
+BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
+LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}
+"""Numbers that may differ: what things look like, where strings lie in memory, and how much memory there is."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quiet():
+    logger = logging.getLogger("robosuite_logs")
+    logger.disabled = True
+    yield
+    logger.disabled = False
+
+
+@pytest.fixture(scope="module")
+def row():
+    return next(Pool.open(REFERENCE).rows())
+
+
+def drawn(task):
+    """A row as in a pool, of a scenario that nobody has certified."""
+    found = config.task(task)
+    scenario = found.draw("id", 0, 0).scenario
+    return {
+        "id": scenario.id,
+        "task": task,
+        "horizon": found.horizon,
+        "params": canonical(scenario),
+        "embodiment": found.embodiment,
+        "scene_xml": scene_text.emit(scenario.build())[0],
+        "certificate": {"versions": json.dumps(versions())},
+    }
+
+
+def made(row, **arguments):
+    return environment(row["task"])(scenario=row, **{**BLIND, **arguments})
+
+
+@pytest.fixture(scope="module")
+def env(row):
+    return made(row, hard_reset=False, ignore_done=True)
+
+
+@pytest.fixture(scope="module")
+def sucking():
+    return made(drawn("packing"), hard_reset=False)
+
+
+def different(one, other, tolerance):
+    """Names of the numbers in which two compiled models differ, apart from `LOOKS` and the places of names."""
+    names = [n for n in dir(one) if not n.startswith(("_", "name", "nnames", "npaths")) and n not in LOOKS]
+    options = [f"opt.{n}" for n in dir(one.opt) if not n.startswith("_")]
+    found = []
+    for name in [*names, *options]:
+        holders = (one.opt, other.opt) if name.startswith("opt.") else (one, other)
+        a, b = (getattr(holder, name.removeprefix("opt.")) for holder in holders)
+        if isinstance(a, (int, float, np.ndarray)) and not (
+            np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=tolerance)
+        ):
+            found.append(name)
+    return found
+
+
+def names(model, kind, count):
+    return [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+
+
+# --- the model ----------------------------------------------------------------------------
+
+
+def test_robosuite_knows_every_task():
+    for task in config.tasks():
+        name = "".join(part.capitalize() for part in task.split("_"))
+        assert robosuite.environments.base.REGISTERED_ENVS[name].NAME == task
+
+
+@pytest.mark.parametrize("task", config.tasks())
+def test_the_text_of_a_scene_means_the_same_to_robosuite(task):
+    text = drawn(task)["scene_xml"]
+    assert different(SceneModel(text).get_model(), mujoco.MjModel.from_xml_string(text), 0.0) == []
+
+
+def test_robosuite_compiles_the_certified_model(row, env):
+    ours = World.load(row["scene_xml"], row["embodiment"], visual=True).model
+    assert different(env.world.model, ours, 0.0) == []
+    for kind, count in ((mujoco.mjtObj.mjOBJ_BODY, ours.nbody), (mujoco.mjtObj.mjOBJ_ACTUATOR, ours.nu)):
+        assert names(env.world.model, kind, count) == names(ours, kind, count)
+
+
+def test_robosuite_compiles_the_certified_model_with_a_suction_cup(sucking):
+    ours = World.load(sucking.row["scene_xml"], sucking.row["embodiment"], visual=True).model
+    # The cup passes through a text of six digits; `site_size` differs in numbers that a sphere does not have.
+    assert set(different(sucking.world.model, ours, 1e-12)) <= {"site_size"}
+
+
+def test_an_episode_begins_in_the_certified_state(row, env):
+    for action in row["witness"][:50]:
+        env.step(action)
+    env.reset()
+    world = World.load(row["scene_xml"], row["embodiment"])
+    for name in ("qpos", "qvel", "qacc_warmstart", "ctrl", "act", "time"):
+        np.testing.assert_array_equal(getattr(env.world.data, name), getattr(world.data, name), err_msg=name)
+
+
+# --- the motion ---------------------------------------------------------------------------
+
+
+def test_until_it_touches_something_the_arm_moves_as_certified_to_the_last_bits(row, env):
+    world = World.load(row["scene_xml"], row["embodiment"])
+    env.reset()
+    start, apart = world.hand, 0.0
+    for action in row["witness"][:100]:
+        world.apply(action)
+        env.step(action)
+        apart = max(apart, float(np.linalg.norm(world.hand - env.world.hand)))
+    assert not world.loop.touched[-1].any(), "the actions is too short for a claim about free motion"
+    assert np.linalg.norm(world.hand - start) > 0.05
+    assert apart <= 1e-12
+
+
+def test_a_witness_succeeds_in_robosuite(row):
+    found = compare(row)
+    assert (found.ours, found.theirs, found.reason) == ("success", "success", "")
+    assert found.apart <= 1e-3
+    assert abs(found.later) <= 0.1
+
+
+def test_contacts_are_latched_in_robosuite_as_here(row, env):
+    world = World.load(row["scene_xml"], row["embodiment"])
+    env.reset()
+    for action in row["witness"][:250]:
+        world.apply(action)
+        env.step(action)
+    assert world.loop.touched[-1].any()
+    np.testing.assert_array_equal(env.world.loop.touched, world.loop.touched)
+
+
+def test_a_robot_that_does_not_obey_is_seen_as_a_difference(row, monkeypatch):
+    pre_action = ScenarioEnv._pre_action
+    monkeypatch.setattr(ScenarioEnv, "_pre_action", lambda env, action, new: pre_action(env, 0.0 * action, new))
+    horizon = len(row["witness"]) * 0.01 - 0.9  # just enough, because a witness goes on for a second
+    found = compare({**row, "horizon": horizon})
+    assert (found.ours, found.theirs, found.agrees) == ("success", "timeout", False)
+    assert found.apart > 0.1
+
+
+def test_suction_pulls_only_what_closes_the_cup(sucking):
+    sucking.reset()
+    world = sucking.world
+    cup = world.model.actuator("gripper0_right_suction").id
+    for _ in range(5):
+        sucking.step(np.array([0, 0, 0, 0, 0, 0, 1.0]))
+    assert not world.sealed and world.data.ctrl[cup] == 0.0
+    for action in sucking.scenario.oracle(world):
+        sucking.step(world.filter(action))
+        if world.sealed:
+            break
+    assert world.sealed and world.data.ctrl[cup] == 1.0 and world.touching("gripper0_right_suction_pad", "piece_0")
+    sucking.step(np.array([0, 0, 0, 0, 0, 0, -1.0]))
+    assert not world.sealed and world.data.ctrl[cup] == 0.0
+
+
+# --- verdict and clock --------------------------------------------------------------------
+
+
+class Stub:
+    """A scenario that is what the test says."""
+
+    HOLD = 0.02
+
+    def __init__(self):
+        self.reached, self.lost, self.events = False, None, 0
+
+    def success(self, world):
+        return self.reached
+
+    def failure(self, world):
+        return self.lost
+
+    def events(self, world):
+        self.events += 1
+
+
+@pytest.fixture
+def stub(env, monkeypatch):
+    stub = Stub()
+    monkeypatch.setattr(env, "scenario", stub)
+    env.reset()
+    return stub
+
+
+IDLE = np.zeros(7)
+
+
+def test_the_goal_must_hold_and_then_stays_reached(env, stub):
+    stub.reached = True
+    assert env.step(IDLE)[1] == 0.0
+    assert env.step(IDLE)[1] == 1.0
+    stub.reached = False
+    _, reward, _, info = env.step(IDLE)
+    assert reward == env.reward() == 1.0 and info == {"scenario": env.row["id"], "success": True, "reason": ""}
+
+
+def test_a_failure_is_final(env, stub):
+    stub.lost = "the slab is broken"
+    env.step(IDLE)
+    stub.lost, stub.reached = None, True
+    for _ in range(3):
+        _, reward, _, info = env.step(IDLE)
+    assert reward == 0.0 and info["reason"] == "the slab is broken"
+
+
+def test_a_failure_undoes_a_success(env, stub):
+    stub.reached = True
+    env.step(IDLE), env.step(IDLE)
+    stub.lost = "the slab is broken"
+    _, reward, _, info = env.step(IDLE)
+    assert reward == 0.0 and info["reason"] == "after the goal was reached: the slab is broken"
+
+
+def test_events_and_verdict_keep_their_clock_under_any_control_frequency(row, monkeypatch):
+    looks = []
+    look = Judge.look
+    monkeypatch.setattr(Judge, "look", lambda judge, world: looks.append(world.time) or look(judge, world))
+    slow = made(row, control_freq=20, hard_reset=False)
+    slow.reset()
+    slow.step(IDLE), slow.step(IDLE)
+    np.testing.assert_allclose(looks, 0.01 * np.arange(1, 11), atol=1e-9)
+    assert slow.horizon == 20 * row["horizon"]
+
+
+# --- robosuite's habits -------------------------------------------------------------------
+
+
+def test_robosuite_makes_it_with_its_usual_arguments(row):
+    env = robosuite.make(
+        "DominoSingle",
+        robots=["Panda"],
+        pool=REFERENCE,
+        scenario=row["id"][:6],
+        has_renderer=False,
+        control_freq=100,
+        horizon=3,
+        initialization_noise="default",
+        seed=5,
+        **BLIND,
+    )
+    observations = env.reset()
+    assert {"robot0_eef_pos", "robot0_joint_pos", "robot0_proprio-state", "object-state"} <= observations.keys()
+    np.testing.assert_array_equal(observations["slab_pos"], env.world.pos("slab"))
+    np.testing.assert_array_equal(observations["slab_quat"], np.roll(env.world.data.body("slab").xquat, -1))
+    assert np.abs(env.world.data.qpos[env.robots[0]._ref_joint_pos_indexes] - env.robots[0].init_qpos).max() > 1e-3
+    assert env.action_dim == 7
+    assert [env.step(IDLE)[2] for _ in range(3)] == [False, False, True]
+
+
+def test_a_pool_gives_scenarios_by_seed_with_what_lies_in_them():
+    first, again = (environment("domino_single")(pool=REFERENCE, seed=7, **BLIND) for _ in range(2))
+    seen = set()
+    for _ in range(4):
+        observations = first.reset()
+        again.reset()
+        assert first.row["id"] == again.row["id"]
+        seen.add(first.row["id"])
+        tiles = {key for key in observations if key.startswith("tile_") and key.endswith("_pos")}
+        assert len(tiles) == sum(name.startswith("tile_") for name in first.world.free_bodies)
+    assert len(seen) > 1
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "says"),
+    [
+        ({"robots": "Sawyer"}, BadConfig, "certified with Panda"),
+        ({"gripper_types": "RethinkGripper"}, BadConfig, "certified with PandaGripper"),
+        ({"scenario": None}, BadConfig, "which scenario"),
+        ({"scenario": "nothing begins so", "pool": REFERENCE}, UnknownName, "no scenario in"),
+        ({"scenario": None, "pool": REFERENCE / "not"}, PoolError, "no pool at"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(row, change, error, says):
+    with pytest.raises(error, match=says) as caught:
+        environment("domino_single")(**{"scenario": row, **change})
+    assert "\n" not in str(caught.value)
+
+
+def test_scenarios_of_other_tasks_or_versions_are_refused(row):
+    with pytest.raises(PoolError, match="belongs to domino_single, not to packing"):
+        environment("packing")(scenario=row)
+    old = {"versions": json.dumps({**versions(), "mujoco": "2.0"})}
+    with pytest.raises(PoolError, match="with mujoco 2.0"):
+        environment("domino_single")(scenario={**row, "certificate": old})
+
+
+@pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
+def test_cameras_show_the_things_of_the_scene(row):
+    env = robosuite.make(
+        "DominoSingle",
+        robots="Panda",
+        scenario=row,
+        camera_names="agentview",
+        camera_heights=64,
+        camera_widths=64,
+        camera_segmentations="instance",
+    )
+    with_slab = env._get_observations(force_update=True)
+    image = with_slab["agentview_image"].astype(int)
+    assert image.shape == (64, 64, 3)
+    slab = 1 + list(env.model.instances_to_ids).index("slab")
+    red = image[with_slab["agentview_segmentation_instance"][..., 0] == slab].mean(axis=0)
+    assert red[0] > red[1] + 50 and red[0] > red[2] + 50
+    env.close()
+
+
+# --- the command --------------------------------------------------------------------------
+
+
+def test_comparisons_come_in_the_order_of_ids_and_no_more_than_asked_for(monkeypatch):
+    monkeypatch.setattr(
+        agreement, "compare", lambda row, search: Comparison(row["task"], row["id"], "success", "success", "", 0.0, 0.0)
+    )
+    counts = []
+    found = compare_all([Pool.open(REFERENCE)], 1, counts.append, first=4)
+    assert [c.id for c in found] == sorted(c.id for c in found)
+    assert counts == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(("differing", "status"), [(0, 0), (1, 1)])
+def test_the_command_fails_below_the_bar(differing, status, monkeypatch, tmp_path):
+    def fake(row, search):
+        fails = fake.left > 0
+        fake.left -= 1
+        return Comparison(row["task"], row["id"], "success", "failure" if fails else "success", "", 0.0, 0.0)
+
+    fake.left = differing
+    monkeypatch.setattr(agreement, "compare", fake)
+    file = tmp_path / "result.json"
+    assert scengen(["robosuite", f"pool={REFERENCE}", f"json={file}"]) == status
+    result = json.loads(file.read_text())
+    assert result["same"] == len(Pool.open(REFERENCE)) - differing == len(result["scenarios"]) - differing
+
+
+@pytest.mark.parametrize("given", ["bar=1.5", "first=0", "workers=0", "bat=1", "pool=nowhere"])
+def test_the_command_explains_bad_input(given, capsys):
+    pool = [] if given.startswith("pool") else [f"pool={REFERENCE}"]
+    assert scengen(["robosuite", *pool, given]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

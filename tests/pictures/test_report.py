@@ -1,0 +1,29 @@
+"""The page about whole pools says what is true of them."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from helpers import REFERENCE
+
+from scengen import cli
+
+
+
+def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):
+    copy = shutil.copytree(REFERENCE, tmp_path / "copy")
+    page, numbers = tmp_path / "report.html", tmp_path / "report.json"
+    assert cli.run(("report", f"pool={REFERENCE},{copy}", f"to={page}", f"json={numbers}")) == 0
+    told = json.loads(numbers.read_text())
+    assert len(told["contrasts"][0]["shared"]) == 6 and told["contrasts"][0]["energy"]["distance"] == 0.0
+    assert [p["scenarios"] for p in told["pools"]] == [6, 6] and told["pools"][0]["outside"] == {}
+    assert "6 pairs" in page.read_text() and "6 near duplicates" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "a report is an .html file")],
+)
+def test_bad_input_is_told_in_one_line(argv, says, capsys):
+    assert cli.run(("report", *argv)) == 2 and says in capsys.readouterr().err

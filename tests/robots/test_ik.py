@@ -1,0 +1,137 @@
+"""Inverse kinematics agrees with forward kinematics, and what is claimed to be out of reach is out of reach."""
+
+import functools
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from scengen import config
+from scengen.assets.prop import UP
+from scengen.robots import ik, panda
+from scengen.skills.motion import facing_down, turn_between
+from scengen.tasks.tool_retrieve import ARM, ToolRetrieve
+
+LIMITS = [(-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698)]
+LIMITS += [(-2.8973, 2.8973), (-0.0175, 3.7525), (-2.8973, 2.8973)]
+"""Franka Emika, limits of the Panda's joints [rad]."""
+POSTURES = st.tuples(*(st.floats(low + 0.02, high - 0.02) for low, high in LIMITS)).map(np.array)
+
+
+@functools.cache
+def robot():
+    """The robot alone, with the names of nothing but its own files."""
+    spec = mujoco.MjSpec()
+    panda.attach(spec)
+    model = spec.compile()
+    return model, mujoco.MjData(model)
+
+
+def posed(angles, opening=0.0):
+    """The model and data of the robot in a posture, each finger `opening` [m] from the middle."""
+    model, data = robot()
+    for i, angle in enumerate(angles):
+        data.joint(f"robot0_joint{i + 1}").qpos = angle
+    data.joint("gripper0_right_finger_joint1").qpos, data.joint("gripper0_right_finger_joint2").qpos = opening, -opening
+    mujoco.mj_kinematics(model, data)
+    return model, data
+
+
+def grip_site(angles):
+    site = posed(angles)[1].site("gripper0_right_grip_site")
+    return site.xpos.copy(), site.xmat.reshape(3, 3).copy()
+
+
+def farthest_of_gripper(angles):
+    """Largest distance of a corner of link 7, hand or open fingers from the shoulder [m]."""
+    model, data = posed(angles, 0.04)
+    farthest, links = 0.0, {"robot0_link7"}
+    for body in range(model.nbody):
+        if model.body(body).name not in links and model.body(model.body_parentid[body]).name not in links:
+            continue
+        links.add(model.body(body).name)
+        for g in np.flatnonzero(model.geom_bodyid == body):
+            if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH:
+                mesh = model.geom_dataid[g]
+                corners = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+            else:
+                corners = model.geom_size[g] * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
+            points = corners @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g]
+            farthest = max(farthest, float(np.linalg.norm(points - panda.SHOULDER, axis=1).max()))
+    return farthest
+
+
+# --- inverse against forward kinematics -------------------------------------------------
+
+
+@given(angles=POSTURES)
+@settings(max_examples=30, deadline=None)
+def test_every_place_to_which_a_posture_leads_is_found_again(angles):
+    place, _ = grip_site(angles)
+    nearest = ik.reach(place)
+    assert nearest.residual < 1e-4
+    assert grip_site(nearest.angles)[0] == pytest.approx(place, abs=2e-4)
+
+
+@given(angles=POSTURES, target=st.tuples(st.floats(-0.6, 0.6), st.floats(-0.8, 0.8), st.floats(0.5, 2.0)))
+@settings(max_examples=8, deadline=None)
+def test_residual_and_turn_are_those_of_the_posture_that_is_returned_and_it_keeps_the_limits(angles, target):
+    _, frame = grip_site(angles)
+    nearest = ik.reach(target, frame)
+    place, here = grip_site(nearest.angles)
+    assert np.linalg.norm(place - target) == pytest.approx(nearest.residual, abs=1e-9)
+    assert np.linalg.norm(turn_between(here, frame)) == pytest.approx(nearest.turn, abs=1e-6)
+    low, high = np.transpose(LIMITS)
+    assert (low <= nearest.angles).all() and (nearest.angles <= high).all()
+
+
+@pytest.mark.parametrize(("away", "reached"), [(ARM, True), (0.76, True), (0.80, False)])
+def test_a_hand_that_points_down_reaches_760_mm_and_not_800_mm(away, reached):
+    place = panda.BASE + np.array([away, 0, -0.092])
+    nearest = ik.reach(place, facing_down())
+    assert (nearest.residual < 0.002 and nearest.turn < 0.02) == reached
+
+
+# --- out of reach -----------------------------------------------------------------------
+
+
+@given(angles=POSTURES)
+@settings(max_examples=150, deadline=None)
+def test_no_posture_leads_the_grip_site_or_the_gripper_beyond_its_bound(angles):
+    assert ik.shortfall(grip_site(angles)[0]) < 0
+    assert farthest_of_gripper(angles) < ik.TOUCH
+
+
+def test_the_bounds_are_not_idle():
+    """A stretched arm comes within 4 cm of what they allow."""
+    farthest = panda.SHOULDER + np.array([2.0, 0.0, 0.0])
+    stretched = ik.reach(farthest)
+    assert -0.04 < ik.shortfall(grip_site(stretched.angles)[0]) < 0
+    assert ik.TOUCH - 0.04 < farthest_of_gripper(stretched.angles) < ik.TOUCH
+
+
+@given(direction=st.tuples(*[st.floats(-1, 1)] * 3), away=st.floats(0.0, 0.5))
+@settings(max_examples=4, deadline=None)
+def test_the_search_never_comes_nearer_than_the_bound(direction, away):
+    assume(np.linalg.norm(direction) > 0.1)
+    target = panda.SHOULDER + (panda.REACH + away) * np.array(direction) / np.linalg.norm(direction)
+    assert ik.shortfall(target) == pytest.approx(away)
+    assert ik.reach(target).residual >= away
+
+
+@pytest.mark.parametrize("split", ["id", "far_corner"])  # the others have the cubes of id
+def test_no_cube_that_is_drawn_can_be_touched_without_the_hook(split):
+    """Two proofs that share nothing but the robot: the bound, and a search from eight postures."""
+    for index in range(2):
+        scenario = config.task("tool_retrieve").draw(split, 0, index).scenario
+        middle = scenario.spot + scenario.half * UP
+        assert scenario.out_of_touch > 0
+        assert ik.reach(middle).residual > max(0.07, ik.shortfall(middle))
+
+
+def test_a_cube_that_the_arm_can_grasp_is_refuted_for_that():
+    scenario = ToolRetrieve(distance=0.75)
+    assert scenario.infeasible().reason == "the arm may touch the cube without the hook"
+    assert ik.reach(scenario.spot + scenario.half * UP, facing_down()).residual < 0.001

@@ -1,0 +1,318 @@
+"""A pool is the same bytes however it was made, and every damage to it is found."""
+
+import ast
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from scengen import config, pool
+from scengen.errors import PoolError, UnknownName
+from scengen.pool import Pool
+from scengen.runs.generate import Settings, generate
+from scengen.validate.verify import verify
+
+ROOT = Path(__file__).parents[2]
+QUICKLY = ["certify.robust.runs=1", "certify.robust.bound=0.04"]
+"""Settings that keep every check, with one jittered run."""
+
+
+def make(folder, *overrides, n=3, workers=1, seed=0):
+    composed = config.read("generate", ["task=domino_single", f"n={n}", f"seed={seed}", *QUICKLY, *overrides])
+    settings = Settings(n=n, seed=seed, workers=workers, pool=str(folder), split=composed.settings["split"])
+    return generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None)
+
+
+def failures(folder, strict=True, workers=1):
+    return verify(Pool.open(folder), config.task, workers, strict, lambda _: None).failed
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pools") / "made"
+    make(folder)
+    return folder
+
+
+@pytest.fixture
+def mine(made, tmp_path):
+    """A copy to damage."""
+    return Path(shutil.copytree(made, tmp_path / "mine"))
+
+
+def rewritten(folder, change):
+    """Change the rows of a pool and write hashes to match, as a forger would."""
+    opened = Pool.open(folder)
+    rows = [change(row) or row for row in opened.rows()]
+    kept = {k: v for k, v in opened.manifest.items() if k not in ("format", "shards")}
+    pool.write(folder, kept, rows)
+
+
+# --- reading --------------------------------------------------------------------------------
+
+
+def test_a_pool_holds_the_first_certified_indices_in_order(made):
+    rows = list(Pool.open(made).rows())
+    assert [r["index"] for r in rows] == [0, 1, 2]
+    assert all(r["certificate"]["verdict"] == "certified" and r["split"] == "id" for r in rows)
+    assert all(r["witness"].dtype == np.float32 and r["witness"].shape[1] == 7 for r in rows)
+
+
+def test_plain_pyarrow_reads_it(made):
+    table = pq.read_table(made / "scenarios-00000.parquet")
+    assert table.num_rows == 3 and len(table["witness"][0].as_py()[0]) == 7
+
+
+def test_nothing_in_a_pool_names_the_machine_or_the_time(made):
+    text = (made / "manifest.json").read_text() + "".join(map(str, Pool.open(made).rows()))
+    assert str(made.parent) not in text and os.uname().nodename not in text.split() and str(Path.home()) not in text
+
+
+def test_the_instruction_names_neither_axis_nor_values(made):
+    task = config.task("domino_single")
+    for axis in task.axes:
+        assert axis not in task.instruction and axis.replace("_", " ") not in task.instruction
+
+
+def test_a_scenario_is_found_by_the_beginning_of_its_id(made):
+    opened = Pool.open(made)
+    first = next(opened.rows())
+    assert opened.row(first["id"][:6])["index"] == 0
+    with pytest.raises(UnknownName, match="no scenario in"):
+        opened.row("zzz")
+
+
+# --- the same bytes -----------------------------------------------------------------------------
+
+
+def test_two_workers_write_the_bytes_of_one(made, tmp_path):
+    assert make(tmp_path / "two", workers=2).pool.sha256 == Pool.open(made).sha256
+
+
+def test_a_pool_can_be_extended_and_comes_out_as_if_made_at_once(mine, made, tmp_path):
+    shutil.copytree(made.with_name("made.run"), mine.with_name("mine.run"))
+    assert make(mine, n=4).pool.sha256 == make(tmp_path / "four", n=4).pool.sha256
+
+
+def test_killed_and_continued_is_the_same_as_never_killed(made, tmp_path):
+    """SIGKILL in the middle of a run with two workers; nothing survives it, not even the workers."""
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "scengen", "generate", "task=domino_single", "n=3", "workers=2", *QUICKLY]
+    process = subprocess.Popen([*command, f"pool={folder}"], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    wal = folder.with_name("killed.run") / "journal.sqlite-wal"
+    while process.poll() is None and not (wal.exists() and wal.stat().st_size > 40_000):
+        time.sleep(0.02)
+    assert process.poll() is None, "the run must be under way when it is killed"
+    children = children_of(process.pid)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (folder / "manifest.json").exists()
+    deadline = time.monotonic() + 10
+    while any(alive(child) for child in children):
+        assert time.monotonic() < deadline, "a worker outlived its parent"
+        time.sleep(0.05)
+    done = subprocess.run([*command, f"pool={folder}"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert Pool.open(folder).sha256 == Pool.open(made).sha256
+
+
+def children_of(pid):
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and (parts := stat_of(int(entry.name))) and int(parts[1]) == pid:
+            found.append(int(entry.name))
+    return found
+
+
+def alive(pid):
+    parts = stat_of(pid)
+    return bool(parts) and parts[0] != "Z"
+
+
+def stat_of(pid):
+    """State and parent of a process, or nothing."""
+    try:
+        return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[:2]
+    except OSError:
+        return []
+
+
+def test_a_second_run_on_the_same_pool_is_refused(tmp_path):
+    from scengen.runs.journal import Journal
+
+    first = Journal(tmp_path / "pool", {"a": 1})
+    with pytest.raises(PoolError, match="another run is writing"):
+        Journal(tmp_path / "pool", {"a": 1})
+    first.close()
+    Journal(tmp_path / "pool", {"a": 1}).close()
+
+
+def test_other_settings_cannot_continue_a_run(made):
+    with pytest.raises(PoolError, match=r"other settings \(config.seed\)"):
+        make(made, seed=1)
+    with pytest.raises(PoolError, match=r"config.task.id.gap_ratio"):
+        make(made, "task.id.gap_ratio=[uniform,0.7,1.0]")
+
+
+# --- damage ---------------------------------------------------------------------------------------
+
+
+def test_a_sound_pool_holds_with_one_worker_and_with_two(made):
+    assert failures(made) == [] and failures(made, workers=2) == []
+
+
+def test_one_flipped_byte_anywhere_in_a_shard_is_found(mine):
+    shard = mine / "scenarios-00000.parquet"
+    content = shard.read_bytes()
+    for place in np.linspace(4, len(content) - 5, 7).astype(int):
+        shard.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        assert failures(mine)[0] == {
+            "id": shard.name,
+            "reason": "the shard has another sha256 than the manifest says",
+        }
+
+
+def test_a_truncated_shard_is_found_and_nothing_reads_it(mine):
+    shard = mine / "scenarios-00000.parquet"
+    shard.write_bytes(shard.read_bytes()[:-100])
+    assert "truncated" in failures(mine)[0]["reason"]
+    with pytest.raises(PoolError, match="truncated"):
+        Pool.open(mine).check()
+
+
+def flip_scene(row):
+    row["scene_xml"] = row["scene_xml"].replace('mass="0.0', 'mass="0.1', 1)
+
+
+def flip_tape(row):
+    row["witness"] = row["witness"].copy()
+    row["witness"].view(np.uint8)[100, 3] ^= 1
+
+
+def flip_params(row):
+    params = json.loads(row["params"])
+    row["params"] = json.dumps({**params, "count": params["count"] - 1}, sort_keys=True)
+
+
+def forge_tape(row):
+    """Cut the actions short and write hashes to match: only the replay can tell."""
+    row["witness"] = row["witness"][:120]
+    forged = pool.sha256(row["witness"].tobytes())
+    row["witness_sha256"] = row["certificate"]["witness_sha256"] = forged
+
+
+def forge_scene(row):
+    row["scene_xml"] = row["scene_xml"].replace('name="tile_1"', 'name="tile_1" pos2=""', 1)
+    row["scene_sha256"] = row["certificate"]["scene_sha256"] = pool.sha256(row["scene_xml"])
+
+
+def hostile_scene(row):
+    row["scene_xml"] = row["scene_xml"].replace("<worldbody>", '<include file="/etc/passwd"/><worldbody>', 1)
+    row["scene_sha256"] = row["certificate"]["scene_sha256"] = pool.sha256(row["scene_xml"])
+
+
+def skip_a_check(row):
+    row["certificate"]["checks"][8]["passed"] = None
+
+
+def foreign_task(row):
+    row["task"] = "domino_singel"
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (flip_scene, "the scene has another sha256"),
+        (flip_tape, "the witness has another sha256"),
+        (flip_params, "the id does not belong to the parameters"),
+        (forge_tape, "the witness fails"),
+        (forge_scene, "XML"),
+        (hostile_scene, "contains <include>"),
+        (skip_a_check, "the certificate is not complete"),
+        (foreign_task, "did you mean 'domino_single'"),
+    ],
+)
+def test_a_forged_row_is_found_by_its_id(mine, damage, says):
+    victim = next(Pool.open(mine).rows())["id"]
+    rewritten(mine, lambda row: damage(row) if row["id"] == victim else None)
+    found = failures(mine)
+    assert [f["id"] for f in found] == [victim] and says in found[0]["reason"]
+
+
+def test_a_scenario_that_occurs_twice_is_found(mine):
+    first = next(Pool.open(mine).rows())
+    rewritten(mine, lambda row: first if row["index"] == 1 else None)
+    assert [f["reason"] for f in failures(mine)] == ["the id occurs twice"]
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 1}', '{"format": 99, "shards": []}', "\x00"])
+def test_a_damaged_manifest_is_one_clear_error(mine, text):
+    (mine / "manifest.json").write_text(text)
+    with pytest.raises(PoolError, match="damaged|format"):
+        Pool.open(mine)
+
+
+def test_a_certificate_expires_with_the_code_of_its_family(mine):
+    def age(row):
+        row["certificate"]["source_sha256"] = "0" * 64
+
+    rewritten(mine, age)
+    assert all("expired" in f["reason"] for f in failures(mine)) and len(failures(mine)) == 3
+    assert failures(mine, strict=False) == []
+
+
+def test_on_a_machine_that_rounds_otherwise_the_verdict_counts_and_not_the_bits(mine):
+    def elsewhere(row):
+        row["certificate"]["fingerprint"] = row["certificate"]["final_state"] = "0" * 16
+
+    rewritten(mine, elsewhere)
+    report = verify(Pool.open(mine), config.task, 1, True, lambda _: None)
+    assert report.holds and report.drifted == 3
+
+
+def test_on_the_same_machine_other_bits_fail(mine):
+    def other_end(row):
+        row["certificate"]["final_state"] = "0" * 16
+
+    rewritten(mine, other_end)
+    assert all("ends in another state" in f["reason"] for f in failures(mine))
+
+
+def test_verification_needs_no_oracle(made, tmp_path):
+    """Delete every `oracle` from a copy of the package and verify with the copy."""
+    copy = tmp_path / "tree"
+    shutil.copytree(ROOT / "scengen", copy / "scengen", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "conf", copy / "conf")
+    removed = 0
+    for path in (copy / "scengen").rglob("*.py"):
+        tree = ast.parse(path.read_text())
+        lines = path.read_text().splitlines(keepends=True)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef) and node.name == "oracle":
+                lines[node.lineno - 1 : node.end_lineno] = [""] * (node.end_lineno - node.lineno + 1)
+                removed += 1
+        path.write_text("".join(lines))
+    assert removed >= 1
+    result = subprocess.run(
+        [sys.executable, "-m", "scengen", "verify", f"pool={made}", f"json={tmp_path / 'v.json'}"],
+        cwd=copy,
+        env={**os.environ, "PYTHONPATH": str(copy)},
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result.stderr
+    assert json.loads((tmp_path / "v.json").read_text()) | {"pool_sha256": ""} == {
+        "pool_sha256": "",
+        "checked": 3,
+        "failed": [],
+        "expired": 0,
+        "drifted": 0,
+    }

@@ -1,0 +1,128 @@
+"""The suction cup holds what forty newtons hold, and nothing at all unless its lip is closed."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from scengen.assets.l_piece import LPiece
+from scengen.assets.prop import PRIORITY, STIFF, TABLE_TOP, UP, place, table
+from scengen.control import osc
+from scengen.robots import suction
+from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES
+from scengen.sim import scene_text
+from scengen.sim.world import ROBOT, SUCTION, World
+from scengen.skills.motion import CLOSED, facing_down, go_to, hold, push, release
+
+GRAVITY = 9.81
+FRICTION = 0.4
+LIP = np.array([sign * (PITCH / 2 + end * PAD / 2) for sign in (-1, 1) for end in (-1, 1)])
+"""Where the corners of the pads are, along one axis of the cup [m]."""
+FACES = {4: (0.0, -0.021), 3: (-0.002, -0.002), 2: (0.0, -0.040), 1: (0.040, -0.040)}
+"""Number of pads that find a face of an L-piece if the cup comes down with its middle there [m]."""
+
+
+def hangs(weight, beside=0.0, level=True, pull=1.0):
+    """Whether a plate of a weight [N] stays on a cup that nothing moves, its middle `beside` the cup's [m].
+
+    The cup points down, or to the side if not `level`. The weight grows within 0.5 s, so that nothing swings.
+    """
+    scene = table()
+    tool = mujoco.MjSpec.from_string(suction.xml())
+    frame = scene.worldbody.add_frame(pos=[0.0, 0.0, 1.3], quat=[0.0, 1.0, 0.0, 0.0])
+    frame.attach_body(tool.body("right_gripper"), "", "")
+    plate = scene.worldbody.add_body(name="plate", pos=[beside, 0.0, 1.3 - LENGTH - 0.005 + 2e-5])
+    plate.add_freejoint()
+    plate.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.05, 0.05, 0.005],
+        mass=weight / GRAVITY,
+        friction=[FRICTION, 0.005, 0.0001],
+        condim=4,
+        solref=STIFF,
+        priority=PRIORITY,
+    )
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    data.ctrl[:] = pull
+    down = np.array([0.0, 0.0, -GRAVITY] if level else [GRAVITY, 0.0, 0.0])
+    start = data.qpos[:3].copy()
+    while data.time < 1.0:
+        model.opt.gravity = down * min(1.0, data.time / 0.5)
+        mujoco.mj_step(model, data)
+    return bool(np.linalg.norm(data.qpos[:3] - start) < 0.001)
+
+
+def put_on(pads):
+    """A world in which the cup, switched on, was pressed onto a piece with that many pads, and then lifted by 40 mm."""
+    scene, piece = table(), LPiece(mass=0.15)
+    place(scene, piece, "piece", [0.0, 0.0, TABLE_TOP])
+    world = World.load(scene_text.emit(scene)[0], SUCTION)
+    spot = np.array([*FACES[pads], TABLE_TOP + piece.thickness])
+    play(world, go_to(world, spot + 0.01 * UP, facing_down(), within=0.0005, grip=CLOSED))
+    play(world, push(world, -0.05 * UP, until=lambda: world.touching(ROBOT, "piece")))
+    play(world, hold(world, 0.3))
+    play(world, go_to(world, world.hand + 0.04 * UP, within=0.005))
+    return world
+
+
+def play(world, plan):
+    for action in plan:
+        world.step(action)
+
+
+def test_a_cup_of_30_mm_at_0_6_bar_below_the_air_pulls_as_hard():
+    assert pytest.approx(6e4 * math.pi * 0.015**2, rel=0.06) == PULL
+
+
+@pytest.mark.parametrize(("factor", "held"), [(0.98, True), (1.02, False)])
+def test_it_holds_its_own_pull_and_drops_what_is_heavier(factor, held):
+    assert hangs(factor * PULL) == held
+
+
+@pytest.mark.parametrize(("factor", "held"), [(0.97, True), (1.03, False)])
+def test_a_face_that_hangs_upright_slips_at_the_pull_times_its_friction(factor, held):
+    assert hangs(factor * FRICTION * PULL, level=False) == held
+
+
+@pytest.mark.parametrize("beside", [0.005, 0.0135, 0.025])
+@pytest.mark.parametrize(("factor", "held"), [(0.93, True), (1.07, False)])
+def test_a_weight_beside_the_cup_peels_it_off_where_the_pressure_at_the_lip_vanishes(beside, factor, held):
+    """The law of the core of a section: (pull - weight) / n = weight * beside * lip / (n * mean square of the lip)."""
+    peels = PULL / (1 + beside * LIP.max() / np.mean(LIP**2))
+    assert hangs(factor * peels, beside) == held
+
+
+def test_switched_off_it_does_not_stick():
+    assert not hangs(0.1, pull=0.0)
+
+
+@pytest.mark.parametrize("pads", FACES)
+def test_it_pulls_only_while_three_of_its_four_pads_find_a_face(pads):
+    world = put_on(pads)
+    lifted = world.pos("piece")[2] - TABLE_TOP
+    assert world.sealed == (pads >= osc.SEAL)
+    assert (lifted > 0.03) == (pads >= osc.SEAL)
+    assert lifted > 0.03 or lifted < 0.001
+
+
+def test_what_it_lets_go_falls_freely():
+    world = put_on(4)
+    height, start = world.pos("piece")[2], world.time
+    play(world, release(world, 0.06))
+    assert not world.sealed
+    fallen, elapsed = height - world.pos("piece")[2], world.time - start
+    assert fallen == pytest.approx(GRAVITY * elapsed**2 / 2, rel=0.15)
+
+
+def test_four_pads_cover_a_square_of_27_mm_around_the_grip_site_in_the_plane_of_the_lip():
+    scene = table()
+    place(scene, LPiece(), "piece", [0.0, 0.0, TABLE_TOP])
+    world = World.load(scene_text.emit(scene)[0], SUCTION)
+    names = [f"gripper0_right_pad{i}_collision" for i in range(4)]
+    middles = np.array([world.data.geom(name).xpos for name in names])
+    away = (middles - world.hand) @ world.hand_rot
+    sizes = np.array([world.model.geom(name).size for name in names])
+    assert np.abs(away[:, :2]).max() + sizes[:, :2].max() == pytest.approx(REACHES) == 0.0135
+    assert away[:, 2] + sizes[:, 2] == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,230 @@
+"""Certificates of scenes that deserve one, and of scenes that do not: computed, not guessed."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from scengen import config
+from scengen.assets.prop import UP
+from scengen.sim import scene_text
+from scengen.sim.world import ROBOT, World
+from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
+from scengen.validate.certify import CHECKS, certify, lower_bound
+from scengen.validate.rollout import Jitter, replay, run
+from scengen.validate.settings import CertifySettings, Robust
+
+HORIZON = 12.0
+
+
+@pytest.fixture(scope="module")
+def good():
+    return certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
+
+
+def test_a_good_scene_passes_every_check(good):
+    assert good.certificate.verdict == "certified" and good.certificate.reason == ""
+    assert [c.name for c in good.certificate.checks] == list(CHECKS)
+    assert all(c.passed is True for c in good.certificate.checks)
+
+
+def test_the_certificate_keeps_how_every_shortcut_ended(good):
+    ends = next(c for c in good.certificate.checks if c.name == "shortcuts").numbers
+    assert {name: end["outcome"] for name, end in ends.items()} == dict.fromkeys(ends, "failure") and len(ends) == 3
+
+
+def test_the_certificate_keeps_what_the_physics_depends_on(good):
+    features = config.task("domino_single").draw("id", 0, 1).scenario.features()
+    assert good.certificate.checks[0].name == "feasible" and good.certificate.checks[0].numbers == features
+
+
+def test_certifying_twice_gives_the_same_bits(good):
+    again = certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
+    assert again.digest == good.digest and np.array_equal(again.actions, good.actions)
+    assert again.certificate == good.certificate
+
+
+# --- scenes that must not be certified ------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlabAway(DominoSingle):
+    """The slab stands 6 cm from where the chain ends."""
+
+    def build(self):
+        scene = super().build()
+        scene.body("slab").pos = [SLAB_MOVES + 0.01, 0, 0]  # in the frame that it was placed with
+        return scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class TileGone(DominoSingle):
+    """The fourth tile is missing. At gap 1.2, two gaps and a tile are 108 mm, more than the 80 mm of a tile."""
+
+    def build(self):
+        scene = super().build()
+        scene.delete(scene.body("tile_3"))
+        return scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaning(DominoSingle):
+    """The third tile leans back by more than its tipping angle."""
+
+    def build(self):
+        scene = super().build()
+        angle = -1.3 * self.tile.tipping_angle
+        tile = scene.body("tile_2")
+        tile.quat = [math.cos(angle / 2), 0, math.sin(angle / 2), 0]
+        tile.pos = self.tile.thickness / 2 * math.sin(-angle) * UP
+        return scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTheEdge(DominoSingle):
+    """Half of the chain has no table under it, and nobody noticed."""
+
+    def infeasible(self):
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overlapping(DominoSingle):
+    """Two tiles share their place in part."""
+
+    def build(self):
+        scene = super().build()
+        scene.body("tile_2").pos = [-self.gap - 0.004, 0, 0]
+        return scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Broken(DominoSingle):
+    """A scene that MuJoCo cannot compile."""
+
+    def build(self):
+        scene = super().build()
+        scene.body("slab").add_geom(name="point", size=[0, 0, 0])
+        return scene
+
+
+NEGATIVES = {
+    "gap beyond a tile's height": (DominoSingle(gap_ratio=2.2, count=3), "refuted", "feasible", "cannot reach"),
+    "chain off the table": (DominoSingle(x=0.35), "refuted", "feasible", "leaves the table"),
+    "chain out of reach": (
+        DominoSingle(count=2, x=0.34, y=0.34, heading=-135.0),
+        "refuted",
+        "feasible",
+        "out of reach",
+    ),
+    "half the chain in the air": (OverTheEdge(x=0.35), "refuted", "rest", "drifts"),
+    "slab already displaced": (SlabAway(), "refuted", "unsolved", "already holds at the start"),
+    "tile removed": (TileGone(gap_ratio=1.2), "unknown", "solved", "the oracle failed"),
+    "tile that falls by itself": (Leaning(gap_ratio=1.2), "refuted", "rest", "drifts"),
+    "tiles that overlap": (Overlapping(), "refuted", "overlap", "overlap by 4"),
+    "scene that does not compile": (Broken(), "refuted", "compiles", "does not compile"),
+}
+
+
+@pytest.mark.parametrize("name", NEGATIVES)
+def test_a_bad_scene_gets_the_right_verdict_and_reason(name):
+    scenario, verdict, check, says = NEGATIVES[name]
+    certificate = certify(scenario, HORIZON, CertifySettings()).certificate
+    assert (certificate.verdict, certificate.failed.name) == (verdict, check)
+    assert says in certificate.reason
+    after = list(CHECKS).index(check) + 1
+    assert all(c.passed is None for c in certificate.checks[after:]), "a check after a failed one counts as skipped"
+
+
+def test_a_scene_that_solves_itself_is_refuted():
+    @dataclass(frozen=True, kw_only=True)
+    class TooEasy(DominoSingle):
+        def success(self, world):
+            return world.time > 6.0
+
+    certificate = certify(TooEasy(), HORIZON, CertifySettings()).certificate
+    assert certificate.verdict == "refuted" and certificate.reason == "idle: doing nothing reaches the goal"
+
+
+def test_a_shortcut_that_works_refutes_the_scene():
+    @dataclass(frozen=True, kw_only=True)
+    class Permissive(DominoSingle):
+        """The paper's own rule, under which pushing the last tile is as good as pushing the first."""
+
+        def failure(self, world):
+            return "the robot touched the slab" if world.touched(ROBOT, "slab") else None
+
+    certificate = certify(Permissive(), HORIZON, CertifySettings()).certificate
+    assert certificate.verdict == "refuted" and "'push the last tile' reaches the goal" in certificate.reason
+
+
+def test_a_means_that_is_not_needed_refutes_the_scene():
+    @dataclass(frozen=True, kw_only=True)
+    class Needless(DominoSingle):
+        def ablations(self):
+            return {"no change": self.build()}
+
+    certificate = certify(Needless(), HORIZON, CertifySettings()).certificate
+    assert certificate.reason == "necessity: the witness succeeds with 'no change'"
+
+
+# --- robustness -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("k", "n", "bound"), [(14, 14, 0.807), (4, 4, 0.473), (0, 5, 0.0), (9, 10, 0.606)])
+def test_the_lower_bound_is_clopper_and_pearsons(k, n, bound):
+    assert lower_bound(k, n) == pytest.approx(bound, abs=5e-4)
+
+
+def test_too_few_runs_cannot_show_a_high_bound():
+    certificate = certify(DominoSingle(), HORIZON, CertifySettings(robust=Robust(runs=2, bound=0.8))).certificate
+    assert certificate.verdict == "unknown" and "ask for more" in certificate.reason
+
+
+def test_a_scene_that_only_works_undisturbed_is_not_certified():
+    wild = CertifySettings(robust=Robust(runs=4, bound=0.45, position=0.06, turn=60.0))
+    assert certify(DominoSingle(), HORIZON, wild).certificate.failed.name == "robust"
+
+
+def test_jitter_moves_what_it_should_by_what_its_key_says():
+    world = World.load(scene_text.emit(DominoSingle().build())[0])
+    jitter = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0)
+    moved, again = jitter.disturbed(world), jitter.disturbed(world)
+    other = Jitter("l", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world)
+    shift = moved.pos("slab") - world.pos("slab")
+    assert 0 < np.abs(shift[:2]).max() <= 0.002 and shift[2] == 0
+    assert np.array_equal(moved.pos("slab"), again.pos("slab")) and not np.array_equal(
+        moved.pos("slab"), other.pos("slab")
+    )
+    slab = world.body("slab")
+    assert 0.95 <= moved.model.body_mass[slab] / world.model.body_mass[slab] <= 1.05
+    assert moved.model.body_mass[slab] != world.model.body_mass[slab]
+    assert np.array_equal(moved.model.body_mass[: world.body("tile_0")], world.model.body_mass[: world.body("tile_0")])
+
+
+# --- rollouts -----------------------------------------------------------------------------------
+
+
+def test_a_replay_after_a_used_world_ends_in_the_same_bits(good):
+    scenario = config.task("domino_single").draw("id", 0, 1).scenario
+    world = World.load(good.scene_xml)
+    run(scenario, world, scenario.shortcuts()["push the slab"], 3.0)
+    assert replay(scenario, world, good.actions, HORIZON).digest == good.digest
+
+
+def test_a_success_that_does_not_last_is_none():
+    @dataclass(frozen=True, kw_only=True)
+    class Fleeting(DominoSingle):
+        def success(self, world):
+            return 1.0 < world.time < 1.2
+
+    episode = run(Fleeting(), World.load(scene_text.emit(DominoSingle().build())[0]), DominoSingle().oracle, HORIZON)
+    assert episode.outcome == "timeout" and "did not hold" in episode.reason
+
+
+def test_a_touch_of_the_slab_between_two_looks_is_remembered():
+    scenario = DominoSingle()
+    world = World.load(scene_text.emit(scenario.build())[0])
+    episode = run(scenario, world, scenario.shortcuts()["push the slab"], HORIZON)
+    assert episode.outcome == "failure" and world.touched(ROBOT, "slab")
