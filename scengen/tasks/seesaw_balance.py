@@ -26,7 +26,7 @@ Decisions where the paper is silent (it gives the story, the 5 deg, the pivot of
 * Level counts only hands off, with both blocks standing on the deck and nowhere else, the target where it was: else the
   hand could hold the beam, the counterweight could prop it up from the table, or both blocks could be moved to the
   axle, where they weigh nothing. None of these needs any balance of moments.
-* CertifySettings must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
+* Level must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
 """
 
 import math
