@@ -4,37 +4,35 @@ from dataclasses import dataclass
 
 import mujoco
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, STIFF, show
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+
+PLASTIC = 1000.0
+"""Density [kg/m^3]; without effect while the bin is fixed."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bin:
-    """The space inside is `width` along x by `height` along y. The origin is the middle of the foot.
+class Bin(Prop):
+    """The space inside is `width` along x by `length` along y. The origin is the middle of the foot.
 
     The paper gives no sizes (App. B, T33).
     """
 
     width: float = param(0.12, "m", 0.04, 0.40)
-    height: float = param(0.14, "m", 0.04, 0.40)
+    length: float = param(0.14, "m", 0.04, 0.40)
     depth: float = param(0.012, "m", 0.003, 0.10)
     wall: float = param(0.008, "m", 0.002, 0.02)
     floor: float = param(0.004, "m", 0.002, 0.02)
     friction: float = param(0.4, "1", 0.05, 1.5)
-    rgba: tuple[float, float, float, float] = (0.30, 0.36, 0.44, 1.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    rgba: Rgba = (0.30, 0.36, 0.44, 1.0)
 
     @property
     def area(self) -> float:
         """Of the floor inside [m^2]."""
-        return self.width * self.height
+        return self.width * self.length
 
-    def spec(self) -> mujoco.MjSpec:
-        spec = mujoco.MjSpec()
-        body = spec.worldbody.add_body(name="body")
-        half_x, half_y = self.width / 2, self.height / 2
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        half_x, half_y = self.width / 2, self.length / 2
         rim, thick = (self.floor + self.depth) / 2, self.wall / 2
         parts = {
             "floor": ((half_x, half_y, self.floor / 2), (0.0, 0.0, self.floor / 2)),
@@ -44,19 +42,8 @@ class Bin:
             "far": ((thick, half_y, rim), (half_x + thick, 0.0, rim)),
         }
         for name, (size, pos) in parts.items():
-            body.add_geom(
-                name=name,
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=size,
-                pos=pos,
-                mass=1000 * 8 * size[0] * size[1] * size[2],  # a plastic of 1 kg a litre; unused while the bin is fixed
-                friction=[self.friction, 0.005, 0.0001],
-                condim=4,
-                solref=STIFF,
-                priority=PRIORITY,
-                rgba=self.rgba,
-            )
-        return spec
+            mass = PLASTIC * 8 * size[0] * size[1] * size[2]
+            solid(body, name, size, pos, mass=mass, friction=self.friction, rgba=self.rgba)
 
 
 if __name__ == "__main__":

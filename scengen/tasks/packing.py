@@ -143,7 +143,7 @@ class Packing(Scenario):
     @cached_property
     def bin(self) -> Bin:
         width, height = (self.unit * float(side) for side in (self.footprint.width, self.footprint.height))
-        return Bin(width=width, height=height, depth=RIM * self.thickness)
+        return Bin(width=width, length=height, depth=RIM * self.thickness)
 
     @cached_property
     def pieces(self) -> tuple[LPiece, ...]:
