@@ -1,8 +1,19 @@
-"""scengen: physical puzzles for robot manipulation, each proved solvable before anyone meets it."""
+"""scengen: physical puzzles for robot manipulation, each proved solvable before anyone meets it.
+
+    import scengen
+
+    task = scengen.load_task("domino_single")
+    draw = task.draw("wide_gaps", seed=0, index=7)
+    certified = scengen.certify(draw.scenario, task.horizon)
+
+The names below are the public face; they are imported when they are first used.
+"""
 
 import ctypes.util
+import importlib
 import os
 import sys
+from typing import TYPE_CHECKING, Any
 
 if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
     # MuJoCo chooses its OpenGL back end when it is imported, and without a display its own choice cannot draw.
@@ -10,3 +21,59 @@ if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
         if ctypes.util.find_library(_library):
             os.environ["MUJOCO_GL"] = _backend
             break
+
+if TYPE_CHECKING:
+    from .certificate import Certificate
+    from .config import task as load_task
+    from .config import tasks as list_tasks
+    from .params import param
+    from .pool import Pool
+    from .samplers.task import Draw, Task
+    from .scenario import Scenario, Shortcut
+    from .sim.world import World
+    from .validate.certify import certify
+    from .validate.rollout import replay, run
+
+__all__ = [
+    "Certificate",
+    "Draw",
+    "Pool",
+    "Scenario",
+    "Shortcut",
+    "Task",
+    "World",
+    "certify",
+    "list_tasks",
+    "load_task",
+    "param",
+    "replay",
+    "run",
+]
+
+_HOME = {
+    "Certificate": ("certificate", "Certificate"),
+    "Draw": ("samplers.task", "Draw"),
+    "Pool": ("pool", "Pool"),
+    "Scenario": ("scenario", "Scenario"),
+    "Shortcut": ("scenario", "Shortcut"),
+    "Task": ("samplers.task", "Task"),
+    "World": ("sim.world", "World"),
+    "certify": ("validate.certify", "certify"),
+    "list_tasks": ("config", "tasks"),
+    "load_task": ("config", "task"),
+    "param": ("params", "param"),
+    "replay": ("validate.rollout", "replay"),
+    "run": ("validate.rollout", "run"),
+}
+"""Where each public name lives: importing scengen alone costs nothing, and no module below imports this one."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'scengen' has no attribute {name!r}; public names: {', '.join(__all__)}")
+    module, inner = _HOME[name]
+    return getattr(importlib.import_module(f".{module}", __name__), inner)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -19,13 +19,16 @@ from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
 CONFIDENCE = 0.95
+"""Of the one-sided bound on the oracle's success rate."""
+
+
 @dataclass(frozen=True)
 class Certified:
     """A certificate with the files it speaks of. Texts are empty where the scene was never built."""
 
     certificate: Certificate
     scene_xml: str
-    actions: Actions
+    witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
 
@@ -73,7 +76,22 @@ class _Trial:
         self.witness: Rollout | None = None
 
     def check(self, name: str) -> Check:
-        settings, numbers, reason = getattr(self, f"_{name}")()
+        """Run one of `CHECKS`; some rely on what earlier ones have left here."""
+        look = {
+            "feasible": self._feasible,
+            "compiles": self._compiles,
+            "overlap": self._overlap,
+            "rest": self._rest,
+            "unsolved": self._unsolved,
+            "idle": self._idle,
+            "shortcuts": self._shortcuts,
+            "solved": self._solved,
+            "robust": self._robust,
+            "numerics": self._numerics,
+            "ablations": self._ablations,
+            "witness": self._witness,
+        }
+        settings, numbers, reason = look[name]()
         return Check(name, not reason, reason, settings, numbers)
 
     # Each check returns its settings, its numbers, and the reason of its failure (empty when it passed).
@@ -187,12 +205,11 @@ class _Trial:
         solved = limits.runs - len(failures)
         bound = lower_bound(solved, limits.runs)
         numbers = {"runs": limits.runs, "solved": solved, "bound": bound, "failures": failures}
-        reason = (
-            f"{solved} of {limits.runs} jittered runs succeed; {failures[0]}" if bound < limits.bound and failures else ""
-        )
-        if bound < limits.bound and not failures:
-            reason = f"{limits.runs} runs cannot show a bound of {limits.bound:g}; ask for more"
-        return size, numbers, reason
+        if bound >= limits.bound:
+            return size, numbers, ""
+        if failures:
+            return size, numbers, f"{solved} of {limits.runs} jittered runs succeed; {failures[0]}"
+        return size, numbers, f"{limits.runs} runs cannot show a bound of {limits.bound:g}; ask for more"
 
     def _numerics(self) -> "Finding":
         """The witness with half the time step and with twice the iterations; where it flips, the oracle must do."""
@@ -200,7 +217,7 @@ class _Trial:
         half, patient = self._load(substeps=2 * self.world.loop.substeps), self._load()
         patient.model.opt.iterations *= 2
         numbers: dict[str, Any] = {}
-        for name, world in {"half time step": half, "twice the iterations": patient}.items():
+        for name, world in {"half_time_step": half, "twice_the_iterations": patient}.items():
             kept = replay(self.scenario, world, self.witness.actions, self.horizon, self.settings.settle)
             numbers[name] = {"witness": kept.outcome}
             if not kept.solved:

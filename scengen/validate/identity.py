@@ -1,4 +1,4 @@
-"""What a certificate was made with: versions, the code of the family, and how this machine rounds."""
+"""What a certificate was made with: versions, the code that it depends on, and how this machine rounds."""
 
 import ast
 import hashlib
@@ -6,10 +6,11 @@ import importlib.metadata
 import importlib.util
 import inspect
 import platform
-from collections.abc import Mapping
+import re
+import sys
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
@@ -57,60 +58,94 @@ def fingerprint() -> str:
     return world.digest
 
 
+JUDGES = ("scengen.episode", "scengen.validate.rollout", "scengen.validate.certify")
+"""Modules that decide what a certificate says, besides those that a family imports."""
+
+
 @cache
 def source_sha256(family: type[Scenario]) -> str:
-    """Hash of the code that gives a family its meaning: its module and the assets that it uses.
+    """Hash of the code that a certificate depends on: the family's module, and everything below it.
 
-    Comments, docstrings, formatting and the methods `oracle` and `features` do not count: a certificate rests on the
-    witness, not on how it was found or how its scene is described.
+    Imports are followed through scengen, the family's own package and any other code that lies open on the path:
+    assets, skills, predicates, helpers of third parties. An installed distribution counts by its name and version;
+    those that scengen itself depends on stand under `versions`, and the standard library under nothing. Comments,
+    docstrings, formatting and the methods `oracle` and `features` of the family do not count: a certificate rests on
+    the witness, not on how it was found or how its scene is described.
     """
-    text = "".join(_essence(path) for path in _sources(inspect.getmodule(family)))
-    return hashlib.sha256(text.encode()).hexdigest()
+    module = inspect.getmodule(family)
+    assert module is not None
+    files, installed = _sources(module.__name__, *JUDGES)
+    parts = [_essence(path, family.__name__ if name == module.__name__ else "") for name, path in sorted(files.items())]
+    return hashlib.sha256("\n".join([*parts, *sorted(installed)]).encode()).hexdigest()
 
 
-def _sources(module: ModuleType | None) -> list[Path]:
-    """The module's file and, in order of their names, the files of `scengen.assets` that it imports."""
-    assert module is not None and module.__file__
-    found: dict[str, Path] = {}
-    todo = [(module.__name__, Path(module.__file__))]
+def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:
+    """Files of some modules and of all that they import, by module; and installed distributions, as `name version`."""
+    own = {name.partition(".")[0] for name in names}
+    files: dict[str, Path] = {}
+    installed: set[str] = set()
+    todo = [("", name) for name in names]
     while todo:
-        name, path = todo.pop()
-        if name in found:
+        importer, name = todo.pop()
+        top = name.partition(".")[0]
+        ours = importer.startswith("scengen.") and top != "scengen"  # what scengen needs stands under `versions`
+        if name in files or ours or top in sys.stdlib_module_names or not (path := _file(name)):
             continue
-        found[name] = path
-        todo.extend((n, p) for n, p in _imports(name, path) if n.startswith("scengen.assets."))
-    return [found.pop(module.__name__), *(found[name] for name in sorted(found))]
+        if top not in own and (distributions := _distributions().get(top)):
+            installed.update(f"{d} {importlib.metadata.version(d)}" for d in distributions if d not in _dependencies())
+            continue
+        files[name] = path
+        todo.extend((name, imported) for imported in _imports(name, path))
+    return files, installed
 
 
-def _imports(name: str, path: Path) -> list[tuple[str, Path]]:
-    package = name.rpartition(".")[0]
-    names = []
+def _imports(name: str, path: Path) -> Iterator[str]:
+    """Names that a file imports, wherever in it; of `from a import b` both `a` and `a.b`, which may be a module."""
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom):
-            target = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
-            names += [target, *(f"{target}.{alias.name}" for alias in node.names)]
-    specs = [(n, _find(n)) for n in names if n.startswith("scengen.assets.")]
-    return [(n, p) for n, p in specs if p]
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            told = "." * node.level + (node.module or "")
+            base = importlib.util.resolve_name(told, package) if node.level else told
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
-def _find(name: str) -> Path | None:
+def _file(name: str) -> Path | None:
+    """The Python file of a module; None if there is none, as for names that are no modules."""
     try:
         spec = importlib.util.find_spec(name)
-    except ModuleNotFoundError:
+    except (ModuleNotFoundError, ValueError):
         return None
-    return Path(spec.origin) if spec and spec.origin else None
+    return Path(spec.origin) if spec and spec.origin and spec.origin.endswith(".py") else None
 
 
-def _essence(path: Path) -> str:
-    """The code of a file without comments, docstrings, `oracle` and `features`."""
+@cache
+def _distributions() -> Mapping[str, list[str]]:
+    """Installed distributions by the package that they provide."""
+    return importlib.metadata.packages_distributions()
+
+
+@cache
+def _dependencies() -> frozenset[str]:
+    """Names of the distributions that scengen depends on."""
+    return frozenset(re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in importlib.metadata.requires("scengen") or [])
+
+
+def _essence(path: Path, family: str) -> str:
+    """The code of a file without comments and docstrings, and without `oracle` and `features` of the class `family`."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
-            node.body = [s for s in body if not _beside_the_point(s)] or [ast.Pass()]  # type: ignore[attr-defined]
+            spared = isinstance(node, ast.ClassDef) and node.name == family
+            node.body = [s for s in body if not _ignored(s, spared)] or [ast.Pass()]  # type: ignore[attr-defined]
     return ast.unparse(tree)
 
 
-def _beside_the_point(statement: ast.stmt) -> bool:
+def _ignored(statement: ast.stmt, of_family: bool) -> bool:
     documents = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-    return documents or (isinstance(statement, ast.FunctionDef) and statement.name in ("oracle", "features"))
+    return documents or (
+        of_family and isinstance(statement, ast.FunctionDef) and statement.name in ("oracle", "features")
+    )

@@ -131,9 +131,7 @@ def replay(
     return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
 
 
-def try_shortcut(
-    scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0
-) -> Rollout:
+def try_shortcut(scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0) -> Rollout:
     """Play a tempting plan as a certificate does: within the time limit, or where it must come to rest, beyond it."""
     patience = PATIENCE if shortcut.to_rest else 1.0
     return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True)

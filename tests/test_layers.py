@@ -1,0 +1,95 @@
+"""Imports go one way: no module imports from a layer above its own, and none imports itself in a circle."""
+
+import ast
+import graphlib
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+import scengen
+
+LAYERS = (
+    ("errors", "statistics", "geometry", "certificate"),
+    ("params", "symmetry"),
+    ("robots",),
+    ("control",),
+    ("parallel", "sim"),
+    ("assets",),
+    ("scenario", "predicates"),
+    ("episode",),
+    ("skills",),
+    ("tasks",),
+    ("samplers", "pool"),
+    ("validate",),
+    ("config",),
+    ("runs",),
+    ("pictures",),
+    ("envs",),
+    ("export", "evaluate"),
+    ("analysis",),
+    ("ood",),
+    ("conformance", "bench"),
+    ("commands",),
+    ("cli",),
+    ("__init__", "__main__"),
+)
+"""Packages and modules of scengen from the ground up. What stands in one line knows nothing of its neighbours."""
+HEIGHT = {name: height for height, layer in enumerate(LAYERS) for name in layer}
+ROOT = Path(scengen.__file__).parent
+
+
+def modules():
+    """Every module's dotted name and file."""
+    for path in sorted(ROOT.rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        yield ".".join(("scengen", *parts)).removesuffix(".__init__"), path
+
+
+MODULES = dict(modules())
+
+
+def imports(name):
+    """The modules of scengen that a module imports, whether at its top or in a function."""
+    path = MODULES[name]
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            told = "." * node.level + (node.module or "")
+            base = importlib.util.resolve_name(told, package) if node.level else told
+            for alias in node.names:
+                target = f"{base}.{alias.name}" if f"{base}.{alias.name}" in MODULES else base
+                if target in MODULES and target != name:
+                    yield target
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in MODULES)
+
+
+def room(name):
+    """The package, or the loose module, that a module belongs to."""
+    return name.split(".")[1] if "." in name else "__init__"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_imports_point_down(name):
+    here = room(name)
+    assert here in HEIGHT, f"{here} has no layer"
+    up = [t for t in imports(name) if room(t) != here and HEIGHT[room(t)] >= HEIGHT[here]]
+    assert not up or here == "__init__", f"{name} imports {', '.join(up)} from its own layer or above"
+
+
+def test_no_circles():
+    graph = {name: {t for t in imports(name) if t != "scengen"} for name in MODULES if name != "scengen"}
+    assert len(list(graphlib.TopologicalSorter(graph).static_order())) == len(graph)
+
+
+def test_an_import_that_points_up_is_seen():
+    """The negative control: the certifier is above the skills."""
+    assert HEIGHT["validate"] > HEIGHT["skills"]
+    assert "scengen.episode" in set(imports("scengen.validate.rollout"))
+
+
+def test_task_families_are_flat_and_found_by_their_files_alone():
+    """Ids hash the module's path; nothing else imports a family."""
+    assert {p.parent for p in (ROOT / "tasks").rglob("*.py")} == {ROOT / "tasks"}
+    assert not [n for n in MODULES if room(n) != "tasks" for t in imports(n) if t.startswith("scengen.tasks.")]
