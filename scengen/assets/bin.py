@@ -31,6 +31,11 @@ class Bin(Prop):
         """Of the floor inside [m^2]."""
         return self.width * self.length
 
+    @property
+    def outer(self) -> tuple[float, float]:
+        """Full length along x and y, walls included [m]."""
+        return self.width + 2 * self.wall, self.length + 2 * self.wall
+
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half_x, half_y = self.width / 2, self.length / 2
         rim, thick = (self.floor + self.depth) / 2, self.wall / 2

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, STIFF, show
+from ..geometry import Mat3, Vec3
+from ..params import param
+from .prop import BOX, Prop, Rgba, show, shown, solid
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -39,12 +40,13 @@ BOTTOM, END, SIDE, TOP = range(4)
 FACES = {BOTTOM: (2, -1, 0), END: (0, 1, 1), SIDE: (1, 1, 0), TOP: (2, 1, 0)}
 """For each face: the axis it looks along, which way, and the axis along which `offset` is measured."""
 
-Box = tuple[NDArray[np.float64], NDArray[np.float64]]
+MESH = mujoco.mjtGeom.mjGEOM_MESH
+Box = tuple[Vec3, Vec3]
 """Centre and full size of a cuboid [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class HoledCage:
+class HoledCage(Prop):
     """A closed box with one round hole. x is the long axis; the origin is the centre of its foot.
 
     The paper gives no lengths (App. C: "one circular hole on a configurable face"). Ours fit the task's hand: the
@@ -68,37 +70,34 @@ class HoledCage:
     friction: float = param(0.6, "1", 0.05, 1.5)
     closed: bool = False
     """Whether the hole is stopped up: the same cage without its way out."""
-    rgba: tuple[float, float, float, float] = (0.35, 0.62, 0.85, 0.25)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    rgba: Rgba = (0.35, 0.62, 0.85, 0.25)
 
     # --- geometry, in the cage's own axes -------------------------------------------------
 
     @property
-    def size(self) -> NDArray[np.float64]:
-        """Outer edges [m], shape (3,)."""
+    def size(self) -> Vec3:
+        """Outer edges [m]."""
         return np.array([self.length, self.width, self.height])
 
     @property
-    def middle(self) -> NDArray[np.float64]:
-        """Centre of the cuboid [m], shape (3,)."""
+    def middle(self) -> Vec3:
+        """Centre of the cuboid [m]."""
         return np.array([0.0, 0.0, self.height / 2])
 
     @property
-    def cavity(self) -> NDArray[np.float64]:
-        """Inner edges [m], shape (3,)."""
+    def cavity(self) -> Vec3:
+        """Inner edges [m]."""
         return self.size - 2 * self.wall
 
     @property
-    def normal(self) -> NDArray[np.float64]:
-        """Unit vector out of the holed face, shape (3,)."""
+    def normal(self) -> Vec3:
+        """Unit vector out of the holed face."""
         axis, sign, _ = FACES[self.face]
         return sign * np.eye(3)[axis]
 
     @property
-    def hole_centre(self) -> NDArray[np.float64]:
-        """Centre of the hole, halfway through the wall [m], shape (3,)."""
+    def hole_centre(self) -> Vec3:
+        """Centre of the hole, halfway through the wall [m]."""
         axis, _, along = FACES[self.face]
         return self.middle + (self.size[axis] - self.wall) / 2 * self.normal + self.offset * np.eye(3)[along]
 
@@ -119,10 +118,24 @@ class HoledCage:
         """
         return math.acos(max(0.0, 1 - self.sill / radius))
 
+    def least_tilt(self, radius: float) -> float:
+        """Tilt that lets a ball roll over the sill and, where the hole is in an upright wall, over its rim [rad]."""
+        over_sill = self.tilt_over_sill(radius)
+        if self.face in (BOTTOM, TOP):
+            return over_sill
+        rim = self.cavity[2] / 2 - self.hole
+        return max(over_sill, math.acos(max(-1.0, 1 - rim / radius)))
+
+    def pocket(self, radius: float) -> tuple[float, float]:
+        """Where the centre of a ball behind the sill may lie: least and largest x [m]."""
+        sill = min(self.sill, radius)
+        touching = self.wall / 2 + math.sqrt(2 * radius * sill - sill**2)
+        return radius - self.cavity[0] / 2, self.sill_x - touching
+
     # --- mass -----------------------------------------------------------------------------
 
-    def inertial(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Centre of mass [m], shape (3,), and inertia about it [kg m^2], shape (3, 3).
+    def inertial(self) -> tuple[Vec3, Mat3]:
+        """Centre of mass [m] and inertia about it [kg m^2].
 
         The body is cuboid - cavity - hole + sill, all of one density:
         inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass;
@@ -215,11 +228,11 @@ class HoledCage:
 
     # --- body -----------------------------------------------------------------------------
 
-    def solid(self) -> "Manifold":
+    def manifold(self) -> "Manifold":
         """The true body by constructive solid geometry: what is shown, and what the decomposition is tested against."""
         from manifold3d import Manifold
 
-        def block(centre: NDArray[np.float64], size: NDArray[np.float64]) -> Manifold:
+        def block(centre: Vec3, size: Vec3) -> Manifold:
             return Manifold.cube(size.tolist(), True).translate(centre.tolist())
 
         body = block(self.middle, self.size) - block(self.middle, self.cavity)
@@ -232,54 +245,32 @@ class HoledCage:
         outwards = self.hole_centre + self.wall / 2 * self.normal  # the bore begins at the cavity, and spares the sill
         return body - bore.rotate(turn).translate(outwards.tolist())
 
-    def spec(self) -> mujoco.MjSpec:
-        spec = mujoco.MjSpec()
-        body = spec.worldbody.add_body(name="body")
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         com, inertia = self.inertial()
         body.explicitinertial, body.mass, body.ipos = True, self.mass, com
         body.fullinertia = np.array([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
         for i, (centre, size) in enumerate(self.boxes()):
-            geom = self._touchable(body, f"box_{i}")
-            geom.type, geom.pos, geom.size = mujoco.mjtGeom.mjGEOM_BOX, centre, size / 2
+            self._touchable(body, f"box_{i}", BOX, size / 2, centre)
         for i, corners in enumerate(self.wedges()):
             spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
-            geom = self._touchable(body, f"wedge_{i}")
-            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, f"wedge_{i}"
-        shown = self.solid().to_mesh()
+            self._touchable(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
+        look = self.manifold().to_mesh()
         spec.add_mesh(
             name="look",
-            uservert=np.asarray(shown.vert_properties, float)[:, :3].ravel().tolist(),
-            userface=np.asarray(shown.tri_verts).ravel().tolist(),
+            uservert=np.asarray(look.vert_properties, float)[:, :3].ravel().tolist(),
+            userface=np.asarray(look.tri_verts).ravel().tolist(),
         )
-        body.add_geom(
-            name="look",
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname="look",
-            group=1,
-            contype=0,
-            conaffinity=0,
-            mass=0,
-            rgba=self.rgba,
-        )
-        return spec
+        shown(body, "look", self.rgba, type=MESH).meshname = "look"
 
-    def _touchable(self, body: mujoco.MjsBody, name: str) -> mujoco.MjsGeom:
+    def _touchable(
+        self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom, size: ArrayLike = (), pos: ArrayLike = (0, 0, 0)
+    ) -> mujoco.MjsGeom:
         """A geom of the decomposition; group 3 is not drawn, the picture is the mesh's."""
-        return body.add_geom(
-            name=name,
-            group=3,
-            mass=0,
-            friction=[self.friction, 0.005, 0.0001],
-            condim=4,
-            solref=STIFF,
-            priority=PRIORITY,
-        )
+        return solid(body, name, size, pos, type=type, friction=self.friction, mass=0.0, group=3)
 
 
-def _cuboid(
-    centre: NDArray[np.float64], size: NDArray[np.float64], sign: float
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Signed volume [m^3], centre [m], and inertia about it per volume [m^2], shape (3, 3)."""
+def _cuboid(centre: Vec3, size: Vec3, sign: float) -> tuple[float, Vec3, Mat3]:
+    """Signed volume [m^3], centre [m], and inertia about it per volume [m^2]."""
     own = (size @ size - size**2) / 12
     return sign * float(np.prod(size)), centre, np.diag(own)
 

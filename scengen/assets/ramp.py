@@ -24,10 +24,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, show
+from ..geometry import Vec3, quat
+from ..params import param
+from .prop import PRIORITY, Prop, Rgba, show, solid
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s^2], MuJoCo's own."""
@@ -56,13 +56,13 @@ FLOOR = (0.62, 0.60, 0.57, 1.0)
 GOAL = (0.20, 0.70, 0.30, 1.0)
 GLASS = (0.55, 0.70, 0.80, 0.35)
 
-Point = NDArray[np.float64]
-"""Shape (3,), in the frame of the ramp: x along the ramp, y across, z up from the table [m]."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Ramp:
-    """The whole ramp. x points from the near side to the far one; the origin is on the table, below the valley."""
+class Ramp(Prop):
+    """The whole ramp. x points from the near side to the far one; the origin is on the table, below the valley.
+
+    Points and directions are in its axes: x along the ramp, y across, z up from the table [m].
+    """
 
     angle: float = param(24.0, "deg", 10.0, 60.0)
     """Slope of both inclines."""
@@ -78,9 +78,6 @@ class Ramp:
     """Height of the patch's middle above the valley, relative to the top of the ramp."""
     band: float = param(0.006, "m", 0.002, 0.05)
     """How much higher the patch's upper edge lies than its lower edge."""
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     # --- geometry of the floor, by the distance s from the middle of the valley -----------
 
@@ -118,11 +115,11 @@ class Ramp:
         """Slope of the floor, negative on the near side [rad]."""
         return max(-self.foot, min(self.foot, s)) / self.bend
 
-    def normal(self, s: float) -> Point:
+    def normal(self, s: float) -> Vec3:
         """Unit vector out of the floor."""
         return np.array([-math.sin(self.tilt(s)), 0.0, math.cos(self.tilt(s))])
 
-    def floor(self, s: float) -> Point:
+    def floor(self, s: float) -> Vec3:
         """A point on the middle line of the floor."""
         arc = max(-self.foot, min(self.foot, s))
         x = self.bend * math.sin(arc / self.bend) + (s - arc) * math.cos(self.slope)
@@ -174,18 +171,15 @@ class Ramp:
 
     # --- scene ----------------------------------------------------------------------------
 
-    def spec(self) -> mujoco.MjSpec:
-        spec = mujoco.MjSpec()
-        body = spec.worldbody.add_body(name="body")
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         for name, rgba, stretches in self._floors():
             part = body.add_body(name=name)
             for i, (start, end) in enumerate(stretches):
                 self._slab(part, f"{name}_{i}", start, end, rgba)
         for side in (-1, 1):
             self._walls(body, side)
-        return spec
 
-    def _floors(self) -> Iterator[tuple[str, tuple[float, ...], list[tuple[Point, Point]]]]:
+    def _floors(self) -> Iterator[tuple[str, Rgba, list[tuple[Vec3, Vec3]]]]:
         """Name, colour and stretches of each part of the floor: the ends of every slab's surface."""
         low, high = self.patch
         facets = max(2, math.ceil(2 * self.slope / FACET))
@@ -198,12 +192,12 @@ class Ramp:
         yield "patch", GOAL, [(self.floor(low), self.floor(high))]
         yield "beyond", FLOOR, [(self.floor(high), self.floor(self.top))]
 
-    def _along(self, s: float, further: float) -> Point:
+    def _along(self, s: float, further: float) -> Vec3:
         """A point on the tangent of the floor at s."""
         tilt = self.tilt(s)
         return self.floor(s) + further * np.array([math.cos(tilt), 0.0, math.sin(tilt)])
 
-    def _slab(self, body: mujoco.MjsBody, name: str, start: Point, end: Point, rgba: tuple[float, ...]) -> None:
+    def _slab(self, body: mujoco.MjsBody, name: str, start: Vec3, end: Vec3, rgba: Rgba) -> None:
         """A slab whose upper side runs from `start` to `end`."""
         run = end - start
         tilt = math.atan2(run[2], run[0])
@@ -226,21 +220,19 @@ class Ramp:
         middle = np.array([0.0, y, (foot[2] + RIM) / 2])
         self._board(body, f"wall_{side}_0", middle, [foot[0] + WALL, WALL / 2, (foot[2] + RIM) / 2], 0.0, GLASS)
 
-    def _board(
-        self, body: mujoco.MjsBody, name: str, pos: Point, size: list[float], tilt: float, rgba: tuple[float, ...]
-    ) -> None:
-        body.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=size,
-            pos=pos.tolist(),
-            quat=[math.cos(tilt / 2), 0, -math.sin(tilt / 2), 0],
-            friction=[self.friction, 0.005, 0.0001],
+    def _board(self, body: mujoco.MjsBody, name: str, pos: Vec3, size: list[float], tilt: float, rgba: Rgba) -> None:
+        solid(
+            body,
+            name,
+            size,
+            pos,
+            quat=quat("y", -tilt),
+            friction=self.friction,
+            mass=0.1,
+            rgba=rgba,
             condim=3,
             solref=ELASTIC,
             priority=OWN,
-            mass=0.1,
-            rgba=rgba,
         )
 
 

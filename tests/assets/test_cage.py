@@ -76,7 +76,7 @@ def test_no_collision_geometry_lies_in_the_cavity_or_in_the_hole(cage):
 def test_collision_geometry_and_picture_differ_by_a_thin_ring_round_the_hole_alone(cage):
     """What is missing lies between the circle and the corners of the polygon. Seams of single precision are ignored."""
     seams = 1e-7 * float(cage.size.sum()) ** 2
-    solid, touched = cage.solid(), union(cage)
+    solid, touched = cage.manifold(), union(cage)
     polygons = WEDGES * math.tan(math.pi / WEDGES) - SEGMENTS / 2 * math.sin(2 * math.pi / SEGMENTS)
     missing = solid - touched
     assert missing.volume() == pytest.approx(polygons * cage.hole**2 * cage.wall, abs=seams)
@@ -91,7 +91,7 @@ def test_collision_geometry_and_picture_differ_by_a_thin_ring_round_the_hole_alo
 @settings(max_examples=15, deadline=None)
 def test_mass_and_inertia_are_those_of_the_solid(cage):
     """The formula of the parts against MuJoCo's integral over the surface of the picture."""
-    shown, spec = cage.solid().to_mesh(), mujoco.MjSpec()
+    shown, spec = cage.manifold().to_mesh(), mujoco.MjSpec()
     mesh = spec.add_mesh(name="solid", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT)
     mesh.uservert = np.asarray(shown.vert_properties, float)[:, :3].ravel().tolist()
     mesh.userface = np.asarray(shown.tri_verts).ravel().tolist()
