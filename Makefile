@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test check types format certify axes reference bench clean
+.PHONY: setup demo test check types format certify axes docs reference bench clean
 
 setup: $(READY)
 
@@ -49,6 +49,10 @@ certify: setup
 TASKS ?=
 axes: setup
 	$(BIN)/python tools/all_axes.py $(N) $(TASKS)
+
+# A page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
+docs: setup
+	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # The small pool in the repository; write it anew when a family or the format changes.
 reference: setup

@@ -1,0 +1,134 @@
+"""docs/tasks: a page for each task, from its family, its task file, one certificate and docs/axes.md. `make docs`
+
+`python tools/task_pages.py [task ...]`; pages of tasks that are not named stay as they are. Pictures need OpenGL.
+"""
+
+import inspect
+import io
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from scengen import config
+from scengen.pictures.film import Take, strip
+from scengen.pictures.render import Picture
+from scengen.samplers.axis import spell
+from scengen.samplers.dists import Fixed
+from scengen.samplers.task import ID, Task
+from scengen.validate.certify import Certified, certify
+
+FOLDER = Path("docs/tasks")
+AXES = Path("docs/axes.md")
+SCENARIO = 0
+"""Index of the training scenario that is shown."""
+FRAMES, WIDTH, HEIGHT = 8, 320, 240
+
+
+def main(*names: str) -> None:
+    """Write the pages."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in names or config.tasks():
+        task = config.task(name)
+        scenario = task.draw(ID, 0, SCENARIO).scenario
+        certified = certify(scenario, task.horizon, embodiment=task.embodiment)
+        if certified.certificate.verdict != "certified":
+            sys.exit(f"{name}: scenario {SCENARIO} is {certified.certificate.reason}")
+        take = Take(scenario, certified.scene_xml, task.embodiment, certified.witness)
+        _save(FOLDER / f"{name}.jpg", strip(take, FRAMES, WIDTH, HEIGHT))
+        (FOLDER / f"{name}.md").write_text(page(task, certified, take.seconds))
+        print(f"wrote {FOLDER / name}.md", flush=True)
+
+
+def page(task: Task, certified: Certified, seconds: float) -> str:
+    """The page of one task."""
+    return "\n".join(
+        [
+            *_story(task),
+            f"![The witness of scenario {SCENARIO}: {FRAMES} pictures in {seconds:g} s]({task.name}.jpg)",
+            "",
+            f"*Witness of training scenario {SCENARIO}, {seconds:g} s from the upper left to the lower right.*",
+            "",
+            *_facts(task),
+            *_parameters(task),
+            *_axes(task),
+            *_plans(certified),
+            "",
+        ]
+    )
+
+
+def _story(task: Task) -> Iterator[str]:
+    """The docstring of the family's module; its sketch is indented, and so stands as it is in Markdown too."""
+    told = inspect.getdoc(inspect.getmodule(task.family)) or ""
+    title, _, rest = told.partition("\n")
+    yield from (f"# {title.rstrip('.')}", "", rest.strip("\n"), "")
+
+
+def _facts(task: Task) -> Iterator[str]:
+    yield f"> {task.instruction}"
+    yield ""
+    yield f"Paper: {task.code}, category {task.category}. Time limit {task.horizon:g} s. Robot: `{task.embodiment}`. "
+    yield f"Family: `{task.family.__module__}.{task.family.__name__}`; distributions: `conf/task/{task.name}.yaml`."
+    yield ""
+
+
+def _parameters(task: Task) -> Iterator[str]:
+    yield from ("## Parameters", "")
+    rows = []
+    for p in task.known.values():
+        dist = task.training[p.name]
+        spread = "" if dist == Fixed(p.nominal) else spell(dist)
+        hidden = ", hidden" if p.hidden else ""
+        rows.append((f"`{p.name}`{hidden}", p.unit, f"{p.low:g} to {p.high:g}", f"{p.nominal:g}", spread))
+    yield from _table(("parameter", "unit", "bounds", "nominal", "training"), rows)
+    yield "Where nothing stands under *training*, the parameter has its nominal value there."
+    yield ""
+
+
+def _axes(task: Task) -> Iterator[str]:
+    """Every axis with where it goes, and its line of figures in docs/axes.md."""
+    yield from ("## OOD axes", "")
+    rows = []
+    for axis in task.axes.values():
+        goes = "; ".join(f"`{name}`: {spell(dist)}" for name, dist in axis.replace.items())
+        rows.append((f"`{axis.name}`", goes, " ".join(axis.why.split()), axis.source))
+    yield from _table(("axis", "goes to", "why", "source"), rows)
+    lines = AXES.read_text().splitlines() if AXES.is_file() else []
+    head = next((i for i, line in enumerate(lines) if line.startswith("| task |")), None)
+    if head is not None and (mine := [line for line in lines if line.startswith(f"| {task.name} |")]):
+        yield "Measured ([what the columns mean](../axes.md)):"
+        yield ""
+        yield from (*lines[head : head + 2], *mine, "")
+
+
+def _plans(certified: Certified) -> Iterator[str]:
+    """What came of shortcuts and ablations in the scenario that is shown."""
+    certificate = certified.certificate
+    yield from ("## Shortcuts that must fail", "")
+    yield from _table(("shortcut", "ends in", "because", "after"), _ends(certificate["shortcuts"].numbers))
+    yield from ("## Ablations in which the witness must fail", "")
+    yield from _table(("without", "ends in", "because", "after"), _ends(certificate["ablations"].numbers))
+
+
+def _ends(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    return [(f"`{name}`", end["outcome"], end["reason"], f"{end['seconds']:g} s") for name, end in numbers.items()]
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+    yield f"| {' | '.join(head)} |"
+    yield "|---" * len(head) + "|"
+    yield from (f"| {' | '.join(row)} |" for row in rows)
+    yield ""
+
+
+def _save(path: Path, picture: Picture) -> None:
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, "jpeg", quality=85, optimize=True)
+    path.write_bytes(content.getvalue())
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
