@@ -106,10 +106,14 @@ class Ramp(Prop):
         return self.foot + (height - self.height(self.foot)) / math.sin(self.slope)
 
     @property
+    def goal(self) -> float:
+        """Height of the patch's middle above the middle of the valley [m]."""
+        return self.level * self.height(self.top)
+
+    @property
     def patch(self) -> tuple[float, float]:
         """Lower and upper edge of the patch [m]."""
-        middle = self.level * self.height(self.top)
-        return self.at_height(middle - self.band / 2), self.at_height(middle + self.band / 2)
+        return self.at_height(self.goal - self.band / 2), self.at_height(self.goal + self.band / 2)
 
     def tilt(self, s: float) -> float:
         """Slope of the floor, negative on the near side [rad]."""
@@ -161,7 +165,7 @@ class Ramp(Prop):
 
         Raises nothing: a height above the top of the ramp is an answer too.
         """
-        goal = self.level * self.height(self.top)
+        goal = self.goal
         low, high = goal, 4.0 * goal
         while high - low > 1e-4:
             middle = (low + high) / 2
