@@ -23,9 +23,10 @@ from .motion import (
 )
 
 SQUEEZE = 0.3
-"""How long the fingers need to close and to build up force [s]."""
+"""How long the fingers need to close and to build up force [s]: enough, by `robots.jaw.time_to_grip` from the widest
+gap, for things 13 mm wide and wider. A thinner one takes as long as that function says, up to 0.51 s at 2 mm."""
 LET_GO = 0.15
-"""How long they need to let go [s]."""
+"""How long they need to let go of anything [s]: `robots.jaw.time_to_free` of the widest thing, 0.12 s, and latency."""
 
 
 def grasp(arm: Arm, seconds: float = SQUEEZE) -> Plan:
