@@ -11,6 +11,7 @@ The handle starts at x = -length / 2, where it is held, and ends at x = length /
 underside. The tip points to +y, or to -y if the hook is mirrored.
 """
 
+import abc
 import math
 from dataclasses import dataclass
 
@@ -18,8 +19,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, STIFF, show
+from ..geometry import quat
+from ..params import param
+from .prop import Prop, Rgba, show, solid
 
 Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
 """Two ends of a straight stretch in the plane [m], shape (2,) each, and how far the box goes on beyond both [m]."""
@@ -30,8 +32,53 @@ SHORTEST = 1e-6
 """A barb shorter than this is none [m]: MuJoCo refuses boxes without extent."""
 
 
+class Hook(Prop):
+    """What all hooks share: bars of one cross section that lie on z = 0. Subclasses are dataclasses."""
+
+    width: float
+    height: float
+    mass: float
+    friction: float
+    rgba: Rgba
+
+    @property
+    @abc.abstractmethod
+    def bars(self) -> list[Bar]:
+        """Its straight stretches, in the plane."""
+
+    @property
+    @abc.abstractmethod
+    def engaging(self) -> float:
+        """Width of what pulls: of the face beside the handle, or of the opening of the bend [m]."""
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners of its bars seen from above [m], shape (n, 2)."""
+        corners = []
+        for start, end, more in self.bars:
+            along = (end - start) / np.linalg.norm(end - start)
+            left = self.width / 2 * np.array([-along[1], along[0]])
+            corners += [spot + side * left for spot in (start - more * along, end + more * along) for side in (1, -1)]
+        return np.array(corners)
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        lengths = [float(np.linalg.norm(end - start)) for start, end, _ in self.bars]
+        for i, ((start, end, more), length) in enumerate(zip(self.bars, lengths, strict=True)):
+            along, middle = end - start, (start + end) / 2
+            solid(
+                body,
+                f"bar_{i}",
+                [length / 2 + more, self.width / 2, self.height / 2],
+                [*middle, self.height / 2],
+                quat=quat("z", math.atan2(along[1], along[0])),
+                mass=self.mass * length / sum(lengths),
+                friction=self.friction,
+                rgba=self.rgba,
+            )
+
+
 @dataclass(frozen=True, kw_only=True)
-class LHook:
+class LHook(Hook):
     """A handle with a straight tip at a right angle to its end."""
 
     length: float = param(0.37, "m", 0.20, 0.50)
@@ -43,10 +90,7 @@ class LHook:
     mass: float = param(0.10, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
-    rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
 
     @property
     def side(self) -> float:
@@ -60,7 +104,6 @@ class LHook:
 
     @property
     def engaging(self) -> float:
-        """Width of the face that pulls, beside the handle [m]."""
         return self.tip
 
     @property
@@ -72,12 +115,9 @@ class LHook:
             (corner, corner + _point(0, self.side * self.tip), 0.0),
         ]
 
-    def spec(self) -> mujoco.MjSpec:
-        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
-
 
 @dataclass(frozen=True, kw_only=True)
-class JHook:
+class JHook(Hook):
     """A handle that runs into a half circle. The variants differ in the barb, a straight end that leads back."""
 
     length: float = param(0.30, "m", 0.15, 0.50)
@@ -91,10 +131,7 @@ class JHook:
     mass: float = param(0.12, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
-    rgba: tuple[float, float, float, float] = (0.20, 0.45, 0.70, 1.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
 
     @property
     def side(self) -> float:
@@ -103,7 +140,6 @@ class JHook:
 
     @property
     def engaging(self) -> float:
-        """Width of the opening: the diameter of the inner circle [m]."""
         return 2 * self.radius - self.width
 
     @property
@@ -129,9 +165,6 @@ class JHook:
             bars.append((foot - half * along, foot + half * along, more))
         return bars
 
-    def spec(self) -> mujoco.MjSpec:
-        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
-
 
 ROUND_J = JHook()
 """First variant: the bend alone."""
@@ -140,7 +173,7 @@ BARBED_J = JHook(barb=0.05, rgba=(0.15, 0.55, 0.55, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
-class THook:
+class THook(Hook):
     """A handle with a crossbar at its end: it pulls on either side."""
 
     length: float = param(0.34, "m", 0.20, 0.50)
@@ -151,14 +184,10 @@ class THook:
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.14, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
-    rgba: tuple[float, float, float, float] = (0.45, 0.35, 0.65, 1.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    rgba: Rgba = (0.45, 0.35, 0.65, 1.0)
 
     @property
     def engaging(self) -> float:
-        """Width of the face that pulls, on each side of the handle [m]."""
         return self.tip
 
     @property
@@ -169,42 +198,9 @@ class THook:
             (_point(middle, -half - self.tip), _point(middle, half + self.tip), 0.0),
         ]
 
-    def spec(self) -> mujoco.MjSpec:
-        return _flat(self.bars, self.width, self.height, self.mass, self.friction, self.rgba)
-
 
 def _point(x: float, y: float) -> NDArray[np.float64]:
     return np.array([x, y])
-
-
-def _flat(
-    bars: list[Bar],
-    width: float,
-    height: float,
-    mass: float,
-    friction: float,
-    rgba: tuple[float, float, float, float],
-) -> mujoco.MjSpec:
-    """Bars of one cross section lying on z = 0, as one body."""
-    lengths = [float(np.linalg.norm(end - start)) for start, end, _ in bars]
-    spec = mujoco.MjSpec()
-    body = spec.worldbody.add_body(name="body")
-    for i, ((start, end, more), length) in enumerate(zip(bars, lengths, strict=True)):
-        (x, y), yaw = (start + end) / 2, math.atan2(*(end - start)[::-1])
-        body.add_geom(
-            name=f"bar_{i}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[length / 2 + more, width / 2, height / 2],
-            pos=[x, y, height / 2],
-            quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
-            mass=mass * length / sum(lengths),
-            friction=[friction, 0.005, 0.0001],
-            condim=4,
-            solref=STIFF,
-            priority=PRIORITY,
-            rgba=rgba,
-        )
-    return spec
 
 
 if __name__ == "__main__":
