@@ -17,6 +17,7 @@ from scengen.control.teleop import ALPHA, LARGEST_CHANGE, Filter
 from scengen.robots import panda
 
 BALL_RADIUS = 0.02
+NAMES = panda.Names()
 
 
 def scene(timestep: float = 0.002) -> mujoco.MjSpec:
@@ -50,7 +51,7 @@ def loop(visual: bool = False) -> Loop:
 
 
 def downward(n: int) -> NDArray[np.float32]:
-    """A actions that drives the closing jaw down onto box and table, shape (n, 7)."""
+    """Actions that drive the closing jaw down onto box and table, shape (n, 7)."""
     time = np.arange(n) * Loop.PERIOD
     actions = np.zeros((n, 7))
     actions[:, 0] = 0.2 * np.sin(3 * time)
@@ -60,7 +61,7 @@ def downward(n: int) -> NDArray[np.float32]:
     return actions.astype(np.float32)
 
 
-TAPE = downward(150)
+DOWN = downward(150)
 
 
 @pytest.fixture(scope="module")
@@ -70,48 +71,48 @@ def shared() -> Loop:
 
 
 def run(one: Loop, actions: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Tick through `actions` and return the state at the end."""
+    """Step through `actions` and return the state at the end."""
     for action in actions:
         assert one.step(action) == 0
     return one.state()
 
 
 def test_a_used_loop_after_reset_is_a_fresh_one(shared: Loop) -> None:
-    run(shared, TAPE)
+    run(shared, DOWN)
     shared.reset()
     fresh = loop()
     np.testing.assert_array_equal(shared.state(), fresh.state())
-    np.testing.assert_array_equal(run(shared, TAPE), run(fresh, TAPE))
+    np.testing.assert_array_equal(run(shared, DOWN), run(fresh, DOWN))
 
 
 def test_restoring_a_state_continues_with_the_same_bits(shared: Loop) -> None:
     shared.reset()
-    run(shared, TAPE[:90])
+    run(shared, DOWN[:90])
     middle, poses = shared.state(), shared.data.xpos.copy()
-    end = run(shared, TAPE[90:])
+    end = run(shared, DOWN[90:])
     for other in (shared, loop()):
         other.restore(middle)
         np.testing.assert_array_equal(other.state(), middle)
         np.testing.assert_array_equal(other.data.xpos, poses)
-        np.testing.assert_array_equal(run(other, TAPE[90:]), end)
+        np.testing.assert_array_equal(run(other, DOWN[90:]), end)
 
 
-def test_replay_is_as_many_ticks(shared: Loop) -> None:
+def test_replay_is_as_many_steps(shared: Loop) -> None:
     shared.reset()
-    end, poses = run(shared, TAPE), shared.data.xpos.copy()
+    end, poses = run(shared, DOWN), shared.data.xpos.copy()
     touching = shared.touching.copy()
     shared.reset()
-    assert shared.replay(TAPE) == 0
+    assert shared.replay(DOWN) == 0
     np.testing.assert_array_equal(shared.state(), end)
     np.testing.assert_array_equal(shared.data.xpos, poses)
     np.testing.assert_array_equal(shared.touching, touching)
 
 
 def test_recorded_controls_through_plain_mj_step_end_in_the_same_bits(shared: Loop) -> None:
-    controls = np.zeros((len(TAPE) * shared.substeps, shared.model.nu))
+    controls = np.zeros((len(DOWN) * shared.substeps, shared.model.nu))
     shared.reset()
     start = shared.data.qpos.copy()
-    shared.replay(TAPE, controls)
+    shared.replay(DOWN, controls)
     plain = mujoco.MjData(shared.model)
     plain.qpos[:] = start
     mujoco.mj_forward(shared.model, plain)
@@ -126,12 +127,12 @@ def test_visual_geoms_do_not_change_a_bit(shared: Loop) -> None:
     shared.reset()
     seen = loop(visual=True)
     assert seen.model.nmesh > shared.model.nmesh
-    np.testing.assert_array_equal(run(seen, TAPE), run(shared, TAPE))
+    np.testing.assert_array_equal(run(seen, DOWN), run(shared, DOWN))
 
 
-def test_poses_after_a_tick_belong_to_the_present_qpos(shared: Loop) -> None:
+def test_poses_after_a_step_belong_to_the_present_qpos(shared: Loop) -> None:
     shared.reset()
-    run(shared, TAPE[:50])
+    run(shared, DOWN[:50])
     now = mujoco.MjData(shared.model)
     now.qpos[:] = shared.data.qpos
     mujoco.mj_kinematics(shared.model, now)
@@ -140,12 +141,12 @@ def test_poses_after_a_tick_belong_to_the_present_qpos(shared: Loop) -> None:
 
 
 def test_latches_are_the_union_of_the_bindings_contacts_at_every_physics_step(shared: Loop) -> None:
-    controls = np.zeros((len(TAPE) * shared.substeps, shared.model.nu))
+    controls = np.zeros((len(DOWN) * shared.substeps, shared.model.nu))
     shared.reset()
     start = shared.data.qpos.copy()
-    shared.replay(TAPE, controls)
+    shared.replay(DOWN, controls)
     model, data = shared.model, mujoco.MjData(shared.model)
-    robot = {i for i in range(model.nbody) if model.body_rootid[i] == model.body("robot0_base").id}
+    robot = {i for i in range(model.nbody) if model.body_rootid[i] == model.body(NAMES.base).id}
     expected = np.zeros_like(shared.touched)
     data.qpos[:] = start
     for row in controls:
@@ -180,9 +181,9 @@ def test_a_tap_between_two_control_steps_is_latched(shared: Loop) -> None:
 def test_the_last_row_is_the_robot(shared: Loop) -> None:
     shared.reset()
     box, table, ball = (shared.model.body(name).id for name in ("box", "table", "ball"))
-    run(shared, TAPE[:20])
+    run(shared, DOWN[:20])
     assert not shared.touched[-1].any()
-    run(shared, TAPE[20:])
+    run(shared, DOWN[20:])
     assert shared.touched[-1, box] == shared.touched[box, -1] == 1
     assert shared.touched[-1, ball] == shared.touched[ball, -1] == 0
     assert shared.touched[box, table] == 1
@@ -215,7 +216,7 @@ def test_other_wrong_input_is_refused_with_a_remedy(shared: Loop) -> None:
     with pytest.raises(ValueError, match="shape"):
         shared.replay(np.zeros((3, 6)))
     with pytest.raises(ValueError, match="ctrl_out"):
-        shared.replay(TAPE, np.zeros((3, 3)))
+        shared.replay(DOWN, np.zeros((3, 3)))
     with pytest.raises(ValueError, match="state of this scene"):
         shared.restore(shared.state()[1:])
     with pytest.raises(ValueError, match="7 joint angles"):
@@ -239,14 +240,14 @@ def test_other_wrong_input_is_refused_with_a_remedy(shared: Loop) -> None:
 def test_instability_raises_the_count(shared: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log file beside the caller
     shared.reset()
-    assert shared.step(TAPE[0]) == 0
+    assert shared.step(DOWN[0]) == 0
     shared.data.qvel[0] = 1e12
-    assert shared.step(TAPE[0]) > 0
+    assert shared.step(DOWN[0]) > 0
     unsound = shared.state()
     shared.reset()
-    assert shared.step(TAPE[0]) == 0
+    assert shared.step(DOWN[0]) == 0
     shared.restore(unsound)
-    assert shared.step(TAPE[0]) > 0
+    assert shared.step(DOWN[0]) > 0
 
 
 def test_silence_keeps_warnings_counted_and_writes_nothing(tmp_path: Path) -> None:
@@ -254,8 +255,8 @@ def test_silence_keeps_warnings_counted_and_writes_nothing(tmp_path: Path) -> No
 import mujoco
 import numpy as np
 from scengen.robots import panda
-from scengen.sim import native
-from scengen.sim.loop import Loop
+from scengen.control import native
+from scengen.control.loop import Loop
 native.silence()
 scene = mujoco.MjSpec()
 panda.attach(scene)
@@ -283,21 +284,21 @@ def test_no_posture_reaches_beyond_the_bound_and_some_come_close(shared: Loop) -
     model, data = shared.model, mujoco.MjData(shared.model)
     np.testing.assert_allclose(panda.SHOULDER, _shoulder(model, data), atol=1e-12)
     rng = np.random.default_rng(0)
-    low, high = np.array([model.joint(f"robot0_joint{i + 1}").range for i in range(7)]).T
-    address = [model.joint(f"robot0_joint{i + 1}").qposadr[0] for i in range(7)]
+    low, high = np.array([model.joint(name).range for name in NAMES.joints]).T
+    address = [model.joint(name).qposadr[0] for name in NAMES.joints]
     straight = [0, 0, 0, -0.0698, 0, 1.0, 0]
     distances = []
     for angles in [straight, *rng.uniform(low, high, (2000, 7))]:
         data.qpos[address] = angles
         mujoco.mj_kinematics(model, data)
-        distances.append(np.linalg.norm(data.site("gripper0_right_grip_site").xpos - panda.SHOULDER))
+        distances.append(np.linalg.norm(data.site(NAMES.grip_site).xpos - panda.SHOULDER))
     assert max(distances) <= panda.REACH
     assert max(distances) > 0.9 * panda.REACH
 
 
 def _shoulder(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
     mujoco.mj_kinematics(model, data)
-    return data.body("robot0_link2").xpos
+    return data.body(f"{NAMES.arm}link2").xpos
 
 
 def test_stripping_refuses_to_change_inertia() -> None:

@@ -71,7 +71,7 @@ def start(env: Any, cleared: bool) -> tuple[mujoco.MjData, Loop]:
 def grip(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
     """Position of the grip site that belongs to the present qpos [m]."""
     mujoco.mj_kinematics(model, data)
-    return data.site("gripper0_right_grip_site").xpos.copy()
+    return data.site(panda.Names().grip_site).xpos.copy()
 
 
 def distance(env: Any, actions: NDArray[np.float32], cleared: bool) -> float:
@@ -155,7 +155,7 @@ def names(model: mujoco.MjModel, kind: str) -> set[str]:
     for index in range(count):
         name = mujoco.mj_id2name(model, KINDS[kind], index) or ""
         seen_only = kind == "geom" and not (model.geom_contype[index] or model.geom_conaffinity[index])
-        if name.startswith(("robot0_", "gripper0_", "fixed_mount0_")) and not seen_only:
+        if name.startswith(tuple(panda.FOLDERS)) and not seen_only:
             found.add(name)
     return found
 

@@ -9,11 +9,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from scengen import config
-from scengen.assets.prop import UP
+from scengen.geometry import UP, between
 from scengen.robots import ik, panda
-from scengen.skills.motion import facing_down, turn_between
+from scengen.skills.motion import facing_down
 from scengen.tasks.tool_retrieve import ARM, ToolRetrieve
 
+NAMES = panda.Names()
 LIMITS = [(-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698)]
 LIMITS += [(-2.8973, 2.8973), (-0.0175, 3.7525), (-2.8973, 2.8973)]
 """Franka Emika, limits of the Panda's joints [rad]."""
@@ -32,22 +33,22 @@ def robot():
 def posed(angles, opening=0.0):
     """The model and data of the robot in a posture, each finger `opening` [m] from the middle."""
     model, data = robot()
-    for i, angle in enumerate(angles):
-        data.joint(f"robot0_joint{i + 1}").qpos = angle
-    data.joint("gripper0_right_finger_joint1").qpos, data.joint("gripper0_right_finger_joint2").qpos = opening, -opening
+    for name, angle in zip(NAMES.joints, angles, strict=True):
+        data.joint(name).qpos = angle
+    data.qpos[panda.fingers(model, NAMES)] = opening, -opening
     mujoco.mj_kinematics(model, data)
     return model, data
 
 
 def grip_site(angles):
-    site = posed(angles)[1].site("gripper0_right_grip_site")
+    site = posed(angles)[1].site(NAMES.grip_site)
     return site.xpos.copy(), site.xmat.reshape(3, 3).copy()
 
 
 def farthest_of_gripper(angles):
     """Largest distance of a corner of link 7, hand or open fingers from the shoulder [m]."""
     model, data = posed(angles, 0.04)
-    farthest, links = 0.0, {"robot0_link7"}
+    farthest, links = 0.0, {f"{NAMES.arm}link7"}
     for body in range(model.nbody):
         if model.body(body).name not in links and model.body(model.body_parentid[body]).name not in links:
             continue
@@ -78,11 +79,11 @@ def test_every_place_to_which_a_posture_leads_is_found_again(angles):
 @given(angles=POSTURES, target=st.tuples(st.floats(-0.6, 0.6), st.floats(-0.8, 0.8), st.floats(0.5, 2.0)))
 @settings(max_examples=8, deadline=None)
 def test_residual_and_turn_are_those_of_the_posture_that_is_returned_and_it_keeps_the_limits(angles, target):
-    _, frame = grip_site(angles)
-    nearest = ik.reach(target, frame)
+    _, rot = grip_site(angles)
+    nearest = ik.reach(target, rot)
     place, here = grip_site(nearest.angles)
     assert np.linalg.norm(place - target) == pytest.approx(nearest.residual, abs=1e-9)
-    assert np.linalg.norm(turn_between(here, frame)) == pytest.approx(nearest.turn, abs=1e-6)
+    assert np.linalg.norm(between(here, rot)) == pytest.approx(nearest.turn, abs=1e-6)
     low, high = np.transpose(LIMITS)
     assert (low <= nearest.angles).all() and (nearest.angles <= high).all()
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from scengen.errors import UnknownName, Unstable
+from scengen.geometry import between
 from scengen.sim import scene_text
 from scengen.sim.world import IDLE, ROBOT, World
-from scengen.skills.motion import facing_down, go_to, turn_between
+from scengen.skills.motion import ALIGNED, FINE, facing_down, go_to
 from scengen.tasks.domino_single import DominoSingle
 
 SCENE = scene_text.emit(DominoSingle().build())[0]
@@ -58,11 +59,10 @@ def test_what_the_controller_gets_is_what_is_returned_and_replays(world):
 
 def test_the_hand_goes_where_it_is_sent_and_points_down(world):
     target = np.array([0.05, 0.15, 0.95])
-    for action in go_to(world, target, facing_down(0.7)):
-        world.step(action)
-    assert np.linalg.norm(world.hand - target) < 0.003
-    assert np.linalg.norm(turn_between(world.hand_rot, facing_down(0.7))) < 0.05
-    assert world.hand_rot[2, 2] < -0.99 and world.time < 4.0
+    play(world, go_to(world.arm, target, facing_down(0.7), FINE))
+    assert np.linalg.norm(world.arm.hand - target) < FINE.within
+    assert np.linalg.norm(between(world.arm.hand_rot, facing_down(0.7))) < ALIGNED
+    assert world.arm.hand_rot[2, 2] < -0.99 and world.time < 4.0
 
 
 def test_positions_masses_and_contacts_are_those_of_the_scene(world):
