@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
+from ..geometry import between
 from . import panda
 
 TOUCH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
@@ -60,16 +61,16 @@ class Nearest:
         return self.residual + LEVER * self.turn
 
 
-def reach(target: ArrayLike, frame: NDArray[np.float64] | None = None) -> Nearest:
+def reach(target: ArrayLike, rot: NDArray[np.float64] | None = None) -> Nearest:
     """The posture that brings the grip site closest to `target`, in the least-squares sense.
 
     Args:
         target: world position [m], shape (3,).
-        frame: orientation of the grip site, shape (3, 3); any orientation will do by default.
+        rot: orientation of the grip site, shape (3, 3); any orientation will do by default.
     """
     goal, best = np.asarray(target, float), None
     for start in STARTS:
-        found = _descend(goal, frame, start)
+        found = _descend(goal, rot, start)
         if best is None or found.left < best.left:
             best = found
         if best.left < EXACT:
@@ -89,7 +90,7 @@ def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
     return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - length
 
 
-def _descend(goal: NDArray[np.float64], frame: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
+def _descend(goal: NDArray[np.float64], rot: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
     arm = _arm()
     low, high = arm.limits
     angles = start.copy()
@@ -97,10 +98,10 @@ def _descend(goal: NDArray[np.float64], frame: NDArray[np.float64] | None, start
 
     def error(q: NDArray[np.float64]) -> NDArray[np.float64]:
         place, here = arm.pose(q)
-        return place - goal if frame is None else np.concatenate([place - goal, LEVER * _turn(here, frame)])
+        return place - goal if rot is None else np.concatenate([place - goal, LEVER * between(rot, here)])
 
     def slope(q: NDArray[np.float64]) -> NDArray[np.float64]:
-        return arm.slope(q, frame is not None)
+        return arm.slope(q, rot is not None)
 
     inside = np.clip(angles, low + 1e-6, high - 1e-6)
     end = least_squares(error, inside, slope, (low, high), xtol=1e-10).x  # type: ignore[arg-type]
@@ -141,11 +142,3 @@ class _Arm:
 @functools.cache
 def _arm() -> _Arm:
     return _Arm()
-
-
-def _turn(here: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rotation vector [rad] that turns `there` into `here`, in world axes."""
-    quat, turn = np.empty(4), np.empty(3)
-    mujoco.mju_mat2Quat(quat, (here @ there.T).ravel())
-    mujoco.mju_quat2Vel(turn, quat, 1.0)
-    return turn
