@@ -17,16 +17,18 @@ from rich.table import Table
 from . import config
 from .control import native
 from .control.loop import Loop
-from .envs.gym import ScenarioEnv
+from .envs.gym import PoolEnv
+from .episode import Actions
 from .pictures.render import NoPictures
-from .pool import Pool, Row
+from .pool import Pool, PoolRow
 from .robots import panda
 from .runs.generate import Settings, generate
 from .sim import scene_text
 from .sim.world import World
-from .validate.rollout import Actions, Episode, run
+from .validate.rollout import Rollout, run
+from .validate.settings import QUICK
 
-BARS = {
+LIMITS = {
     "rollout_to_raw": (1.25, "at most"),
     "robosuite_to_ours": (8.0, "at least"),
     "scenario_to_first_step_ms": (20.0, "at most"),
@@ -52,9 +54,9 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
         "rollout_to_raw": rollout_to_raw(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
-        **environment(repeats),
+        **gym_costs(repeats),
     }
-    table = Table("measure", "value", "bar", "what", title="bench", title_justify="left")
+    table = Table("measure", "value", "limit", "what", title="bench", title_justify="left")
     told = {
         "rollout_to_raw": "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
         "robosuite_to_ours": "robosuite's env.step / our control period, on the same compiled Lift model",
@@ -63,9 +65,9 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
         "env_reset_ms": "the Gymnasium environment's reset of a loaded scenario (ms)",
     }
     for name, value in result.items():
-        bar, side = BARS[name]
-        holds = value <= bar if side == "at most" else value >= bar
-        table.add_row(name, f"{value:.2f}", f"{side} {bar:g}: {'holds' if holds else 'MISSED'}", told[name])
+        limit, side = LIMITS[name]
+        holds = value <= limit if side == "at most" else value >= limit
+        table.add_row(name, f"{value:.2f}", f"{side} {limit:g}: {'holds' if holds else 'MISSED'}", told[name])
     periods = costs(repeats)
     beside = Table("control period of 10 ms", "cost (ms)", "times MuJoCo", title="environments", title_justify="left")
     for name, value in periods.items():
@@ -79,17 +81,17 @@ def rollout_to_raw(repeats: int) -> float:
     scenario = task.draw("id", 0, 0).scenario
     world = World.load(scene_text.emit(scenario.build())[0])
 
-    def rollout() -> Episode:
-        return run(scenario, world, scenario.oracle, task.horizon)  # type: ignore[attr-defined]
+    def rollout() -> Rollout:
+        return run(scenario, world, scenario.oracle, task.horizon)
 
     raw = _bare(world, rollout().actions)
     return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
 
 
-def environment(repeats: int) -> dict[str, float]:
+def gym_costs(repeats: int) -> dict[str, float]:
     """The Gymnasium environment without cameras: its step over the bare mj_step calls, and its reset [ms]."""
     with _pool() as pool:
-        env, actions = ScenarioEnv("domino_single", pool.folder), next(pool.rows())["witness"]
+        env, actions = PoolEnv("domino_single", pool.folder), next(pool.rows()).witness
     env.reset()
     raw = _bare(env.world, actions)
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
@@ -104,9 +106,9 @@ def costs(repeats: int) -> dict[str, float]:
     """
     with _pool() as pool:
         row = next(pool.rows())
-        actions = row["witness"]
-        bare = ScenarioEnv("domino_single", pool.folder)
-        seeing = ScenarioEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
+        actions = row.witness
+        bare = PoolEnv("domino_single", pool.folder)
+        seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     bare.reset()
     raw, brief = _bare(bare.world, actions), actions[:CAMERA_TICKS]
     found = {
@@ -126,17 +128,15 @@ def costs(repeats: int) -> dict[str, float]:
 def _pool() -> Iterator[Pool]:
     """A pool of one scenario, for as long as it is needed."""
     with tempfile.TemporaryDirectory() as folder:
-        composed = config.read("generate", ["task=domino_single", "n=1", f"pool={folder}/pool"])
-        assert composed.task is not None
-        settings = Settings(n=1, pool=f"{folder}/pool")
-        yield generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None).pool
+        task, settings = config.task("domino_single"), Settings(n=1, pool=f"{folder}/pool")
+        yield generate(task, QUICK, settings, lambda *_: None).pool
 
 
-def _robosuite(row: Row, camera: bool) -> Any:
+def _robosuite(row: PoolRow, camera: bool) -> Any:
     """The same scenario in robosuite."""
-    from .envs.robosuite import environment  # here, because robosuite takes seconds and nothing else needs it
+    from .envs.robosuite import env_class  # here, because robosuite takes seconds and nothing else needs it
 
-    return environment("domino_single")(
+    return env_class("domino_single")(
         robots="Panda",
         scenario=row,
         has_renderer=False,
@@ -161,7 +161,7 @@ def _stepping(env: Any, actions: Actions) -> float:
 
 
 def _bare(world: World, actions: Actions) -> Callable[[], None]:
-    """The bare mj_step calls through the states that a actions leads to, from the start."""
+    """The bare mj_step calls through the states that recorded actions lead to, from the start."""
     controls = np.zeros((len(actions) * world.loop.substeps, world.model.nu))
     world.reset()
     world.loop.replay(actions, controls)

@@ -1,5 +1,6 @@
 """Certificates as data: what was checked about a scenario, with numbers, so that others can disagree."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -24,7 +25,7 @@ CHECKS: dict[str, Verdict] = {
 """The checks in the order in which they run, and the verdict when one fails.
 
 A failed check refutes the scenario where it shows, by itself, that the scenario is invalid: it cannot be, it does not
-stand still, it solves itself, or it has an easy way. Where only the oracle failed the verdict is unknown."""
+stand still, it solves itself, or a shortcut solves it. Where only the oracle failed the verdict is unknown."""
 
 
 @dataclass(frozen=True)
@@ -65,3 +66,78 @@ class Certificate:
     def reason(self) -> str:
         """What stands against the scenario, or nothing."""
         return f"{self.failed.name}: {self.failed.reason}" if self.failed else ""
+
+
+@dataclass(frozen=True)
+class StoredCertificate:
+    """A certificate as a pool holds it: its checks, what they speak of, and what they were made with."""
+
+    verdict: str
+    reason: str
+    settings: str
+    """See `Certificate`."""
+    checks: tuple[Check, ...]
+    scene_sha256: str
+    witness_sha256: str
+    final_state: str
+    """Hash of the physics state at the end of the witness."""
+    fingerprint: str
+    """How the machine rounds that made it; see `scengen.validate.identity`."""
+    source_sha256: str
+    """Hash of the code that gives the family its meaning."""
+    versions: Mapping[str, str]
+    """Of every package that the physics depends on, and the platform."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether it says `certified` and every check passed."""
+        return self.verdict == "certified" and bool(self.checks) and all(check.passed for check in self.checks)
+
+    @property
+    def settle(self) -> float | None:
+        """How long the goal had to hold when the witness was certified [s]; None if the certificate does not say."""
+        found = next((check.settings.get("settle") for check in self.checks if check.name == "witness"), None)
+        return found if isinstance(found, (int, float)) else None
+
+    def plain(self) -> dict[str, Any]:
+        """Plain data, as a pool stores it: settings, numbers and versions as JSON text."""
+        checks = [
+            {**vars(check), "settings": as_json(check.settings), "numbers": as_json(check.numbers)}
+            for check in self.checks
+        ]
+        return {**vars(self), "checks": checks, "versions": as_json(self.versions)}
+
+    @classmethod
+    def of(cls, plain: Mapping[str, Any]) -> "StoredCertificate":
+        """The reverse of `plain`.
+
+        Raises:
+            ValueError: a part is missing or no canonical JSON.
+        """
+        if gaps := [name for name, value in plain.items() if value is None]:
+            raise ValueError(f"the certificate lacks {', '.join(gaps)}")
+        checks = tuple(
+            Check(**{**check, "settings": from_json(check["settings"]), "numbers": from_json(check["numbers"])})
+            for check in plain["checks"]
+        )
+        return cls(**{**plain, "checks": checks, "versions": from_json(plain["versions"])})
+
+
+def as_json(values: Mapping[str, Any]) -> str:
+    """The one way in which pools write a mapping: equal mappings are equal texts."""
+    return json.dumps(values, sort_keys=True)
+
+
+def from_json(text: str) -> dict[str, Any]:
+    """Read what `as_json` wrote.
+
+    Raises:
+        ValueError: the text is not what `as_json` writes for a mapping.
+    """
+    try:
+        values = json.loads(text)
+    except (TypeError, ValueError):
+        values = None
+    if not isinstance(values, dict) or as_json(values) != text:
+        raise ValueError(f"{str(text)[:60]!r} is no mapping in canonical JSON")
+    return values

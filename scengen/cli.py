@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from .commands import BAD_INPUT, INTERRUPTED, OK, err, out
+from .commands import BAD_INPUT, INTERRUPTED, OK, out, say, warn
 from .config import conf_dir
 from .control import native
 from .errors import BadConfig, ScengenError, nearest
@@ -42,13 +42,13 @@ def run(argv: Sequence[str]) -> int:
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     try:
         if not argv or argv[0] in ("-h", "--help", "help"):
-            out.print(_help(), highlight=False, markup=False)
+            say(_help())
             return OK
         verb, *arguments = argv
         if verb == "--version":
             from .validate.identity import versions
 
-            out.print(" ".join(f"{k} {v}" for k, v in versions().items()), highlight=False)
+            say(" ".join(f"{k} {v}" for k, v in versions().items()))
             return OK
         if verb not in VERBS:
             raise BadConfig(f"no command named {verb!r}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
@@ -59,10 +59,10 @@ def run(argv: Sequence[str]) -> int:
             raise BadConfig(f"{flags[0]!r} is no option; settings are key=value, see scengen {verb} --help")
         return import_module(f".commands.{verb}", __package__).command(arguments)
     except ScengenError as error:
-        err.print(f"scengen: {error}", style="red", highlight=False, markup=False)
+        warn(f"scengen: {error}")
         return BAD_INPUT
     except KeyboardInterrupt:
-        err.print("scengen: interrupted; what is finished is kept, the same command continues", highlight=False)
+        warn("scengen: interrupted; what is finished is kept, the same command continues")
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()

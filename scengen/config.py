@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,18 +22,6 @@ from .validate.settings import CertifySettings
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Composed:
-    """What a command line amounts to."""
-
-    settings: dict[str, Any]
-    """Everything but task and certify."""
-    task: Task | None
-    level: CertifySettings
-    resolved: dict[str, Any]
-    """The whole configuration as plain data, task file included."""
-
-
 @cache
 def conf_dir() -> Path:
     """The folder of configuration files: inside an installed package, beside it in a checkout."""
@@ -44,24 +32,38 @@ def conf_dir() -> Path:
     return found
 
 
-def read(verb: str, overrides: Sequence[str]) -> Composed:
-    """Compose conf/command/<verb>.yaml with the overrides of a command line, and check all of it.
+def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
+    """The settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
+
+    Args:
+        kind: dataclass that says which settings there are, and their types.
 
     Raises:
         ScengenError: one line that says what is wrong.
     """
-    node, choices = _compose(verb, overrides)
-    plain: dict[str, Any] = OmegaConf.to_container(node, resolve=True)  # type: ignore[assignment]
-    settings = {k: v for k, v in plain.items() if k not in ("task", "certify")}
-    for key, value in settings.items():
-        if value == "???":
-            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
-    task = load(choices["task"], plain["task"]) if "task" in plain else None
-    level = CertifySettings()
-    if "certify" in plain:
-        plain["certify"] = _settle(plain["certify"], task, choices["certify"])
-        level = typed("certify", CertifySettings, plain["certify"])
-    return Composed(settings, task, level, plain)
+    return typed("", kind, _settings(verb, _composed(verb, overrides)[0]))
+
+
+def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task, CertifySettings]:
+    """The settings of a command that takes a task, the task, and the settings of its certificates.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    plain, choices = _composed(verb, overrides)
+    settings = typed("", kind, _settings(verb, plain))
+    found = load(choices["task"], plain["task"])
+    certify = _settled(plain["certify"], found, choices["certify"])
+    return settings, found, typed("certify", CertifySettings, certify)
+
+
+def chosen(verb: str, overrides: Sequence[str]) -> str | None:
+    """Name of the task that a command line chooses, for a command that may go without; None if it does not.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    return _composed(verb, overrides)[1].get("task")
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
@@ -77,14 +79,17 @@ def tasks(search: Sequence[str] = ()) -> list[str]:
 
 
 def task(name: str, search: Sequence[str] = ()) -> Task:
-    """The task of that name, as its file says.
+    """The task of that name.
+
+    Args:
+        name: of its file.
+        search: further overrides, such as folders of other packages (`search_path`) or `task.horizon=20`.
 
     Raises:
         UnknownName: there is no such file.
     """
-    found = read("one_task", [f"task={name}", *search]).task
-    assert found is not None
-    return found
+    plain, choices = _composed("one_task", [f"task={name}", *search])
+    return load(choices["task"], plain["task"])
 
 
 def typed(where: str, cls: type[T], node: Mapping[str, Any]) -> T:
@@ -127,19 +132,29 @@ def _value(where: str, kind: Any, value: Any) -> Any:
     raise BadConfig(f"{where} = {value!r}; it must be {wanted}")
 
 
-def _compose(verb: str, overrides: Sequence[str]) -> tuple[DictConfig, dict[str, str]]:
+def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
+    """The whole configuration as plain data, and which file was chosen in each group."""
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         try:
             asked = [_listed(o) for o in overrides]
             node = compose(f"command/{verb}", overrides=asked, return_hydra_config=True)
+            choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
+            OmegaConf.set_struct(node, False)
+            del node["hydra"]
+            return OmegaConf.to_container(node, resolve=True), choices  # type: ignore[return-value]
         except (HydraException, OmegaConfBaseException) as error:
             raise _explain(verb, overrides, error) from None
         except yaml.YAMLError as error:
             raise BadConfig(f"a configuration file is no YAML: {' '.join(str(error).split())}") from None
-    choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
-    OmegaConf.set_struct(node, False)
-    del node["hydra"]
-    return node, choices
+
+
+def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything but task and certify."""
+    settings = {key: value for key, value in plain.items() if key not in ("task", "certify")}
+    for key, value in settings.items():
+        if value == "???":
+            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
+    return settings
 
 
 def _listed(override: str) -> str:
@@ -149,11 +164,11 @@ def _listed(override: str) -> str:
     return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 
-def _settle(node: dict[str, Any], task: Task | None, choice: str) -> dict[str, Any]:
-    """The level's file, then the task's own settings, then the command line: the later one wins."""
+def _settled(node: Mapping[str, Any], task: Task, choice: str) -> dict[str, Any]:
+    """The chosen file of conf/certify, then the task's own settings, then the command line: the later one wins."""
     base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{choice}.yaml"))  # type: ignore[assignment]
     asked = OmegaConf.create(_difference(node, base))
-    special = OmegaConf.create(dict(task.certify) if task else {})
+    special = OmegaConf.create(dict(task.certify))
     return OmegaConf.to_container(OmegaConf.merge(base, special, asked))  # type: ignore[return-value]
 
 
@@ -189,7 +204,7 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
 
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | None:
-    """Name the level at which the path of an override leaves the configuration."""
+    """Name the key at which the path of an override leaves the configuration."""
     groups = [o for o in overrides if re.match(r"(task|certify)=", o)]
     try:
         node: Any = compose(f"command/{verb}", overrides=groups)
@@ -200,10 +215,16 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
         if not isinstance(node, DictConfig):
             return None
         if part not in node:
-            return UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, map(str, node))
+            known = {*map(str, node), *([] if seen else _groups(verb))}
+            return UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
         seen.append(part)
         node = node[part]
     return None
+
+
+def _groups(verb: str) -> list[str]:
+    """Groups from which a command line may choose a file, such as `task`."""
+    return re.findall(r"^ +- /(\w+):", (conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
 
 
 def _first_lines(text: str) -> str:

@@ -8,7 +8,8 @@ In the tests of a package whose task files lie in `conf/task`, three lines do:
 """
 
 import json
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,17 +18,23 @@ from . import config
 from .errors import ScengenError
 from .ood import features
 from .params import canonical, with_values
-from .samplers.task import ID, Task
+from .samplers.split import ID
+from .samplers.task import Task
+from .sim import scene_text
 from .validate.certify import certify
-from .validate.settings import CertifySettings
+from .validate.settings import QUICK
 
 
 class Nonconformity(ScengenError):
     """A task breaks a rule."""
 
 
+SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+"""What names of shortcuts, ablations and features look like: they stand on command lines and in comma lists."""
+
+
 @dataclass(frozen=True)
-class Check:
+class Rule:
     """One rule for one split. Calling it raises `Nonconformity` where the rule is broken."""
 
     name: str
@@ -40,25 +47,36 @@ class Check:
         return self.name
 
 
-def checks(task: str, conf: str | Path | None = None, scenarios: int = 2, seed: int = 0) -> list[Check]:
-    """All checks of a task: for every split its draws, and certificates of the first scenarios.
+def checks(
+    task: str,
+    conf: str | Path | None = None,
+    scenarios: int = 2,
+    seed: int = 0,
+    certified: Collection[str] | None = None,
+) -> list[Rule]:
+    """All checks of a task: for every split its draws, its names, and certificates of the first scenarios.
 
     Args:
         task: name of the task's file.
         conf: folder of the package that holds `task/<task>.yaml`; None for scengen's own.
-        scenarios: how many of each split are certified, at some 3 CPU seconds each.
+        scenarios: how many of each split are looked at closely and certified, at some 3 CPU seconds each.
         seed: of the draws.
+        certified: splits whose scenarios are certified; None for all.
 
     Raises:
         ScengenError: the file cannot be loaded: names, types, bounds, or an axis that does not leave training.
     """
     found = config.task(task, search(conf))
-    rules = [_draws_are_keyed, _twins_differ_in_the_axis_alone, _scenarios_are_certified]
-    told = [Check("the file tells what policies may know", partial(_told_well, found))]
+    splits = (ID, *found.axes)
+    wanted = [
+        *((split, rule) for split in splits for rule in (_draws_are_keyed, _twins_differ_in_the_axis_alone)),
+        *((split, _scenes_have_controls) for split in splits),
+        *((split, _scenarios_are_certified) for split in splits if certified is None or split in certified),
+    ]
+    told = [Rule("the file tells what policies may know", partial(_told_well, found))]
     return told + [
-        Check(f"{split}: {rule.__name__.strip('_').replace('_', ' ')}", partial(rule, found, split, scenarios, seed))
-        for split in (ID, *found.axes)
-        for rule in rules
+        Rule(f"{split}: {rule.__name__.strip('_').replace('_', ' ')}", partial(rule, found, split, scenarios, seed))
+        for split, rule in wanted
     ]
 
 
@@ -68,11 +86,10 @@ def search(conf: str | Path | None) -> tuple[str, ...]:
 
 
 def _told_well(task: Task) -> None:
-    """The instruction names no axis, every axis says why, and the family has shortcuts."""
+    """The instruction names no axis, and every axis says why."""
     for name, axis in task.axes.items():
         _ask(name not in task.instruction, f"the instruction of {task.name} names the axis {name}")
         _ask(bool(axis.why), f"axis {name} of {task.name} does not say why a habit from training fails there")
-    _ask(bool(task.family().shortcuts()), f"{task.name} has no shortcuts: nothing shows that its bottleneck is real")
 
 
 def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:
@@ -96,11 +113,27 @@ def _twins_differ_in_the_axis_alone(task: Task, split: str, scenarios: int, seed
     )
 
 
+def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> None:
+    """Shortcuts show that the bottleneck is real, ablations that the means are needed; all have names in snake_case."""
+    for i in range(scenarios):
+        scenario, where = task.draw(split, seed, i).scenario, f"{task.name}/{split}/{i}"
+        shortcuts, ablations = scenario.shortcuts(), scenario.ablations()
+        _ask(bool(shortcuts), f"{where} has no shortcuts: nothing shows that its bottleneck is real")
+        _ask(bool(ablations), f"{where} has no ablations: nothing shows that the intended means are needed")
+        for kind, names in (("shortcut", shortcuts), ("ablation", ablations), ("feature", scenario.features())):
+            for name in names:
+                good = SNAKE_CASE.fullmatch(name) is not None
+                _ask(good, f"{where}: the {kind} {name!r} has no name in snake_case, such as push_the_slab")
+        whole = scene_text.emit(scenario.build())[0]
+        for name, scene in ablations.items():
+            _ask(scene_text.emit(scene)[0] != whole, f"{where}: the ablation {name!r} takes nothing away")
+
+
 def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) -> None:
     """The first scenarios pass every check, and their witnesses replay in a fresh world."""
     for i in range(scenarios):
         scenario = task.draw(split, seed, i).scenario
-        certificate = certify(scenario, task.horizon, CertifySettings(), task.embodiment).certificate
+        certificate = certify(scenario, task.horizon, QUICK, task.embodiment).certificate
         where = f"{task.name}/{split}/{i} (seed {seed}, {canonical(scenario)})"
         _ask(certificate.verdict == "certified", f"{where} is {certificate.verdict}: {certificate.reason}")
 

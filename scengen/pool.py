@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
+from .certificate import StoredCertificate, as_json, from_json
 from .errors import PoolError, UnknownName
+from .params import Value
 
 MANIFEST = "manifest.json"
-FORMAT = 1
+FORMAT = 2
 SHARD_ROWS = 100_000
 GROUP_ROWS = 1000
 
@@ -33,7 +36,7 @@ CERTIFICATE = pa.struct(
     [
         ("verdict", pa.string()),
         ("reason", pa.string()),
-        ("level", pa.string()),
+        ("settings", pa.string()),
         ("checks", pa.list_(CHECK)),
         ("scene_sha256", pa.string()),
         ("witness_sha256", pa.string()),
@@ -67,10 +70,68 @@ SCHEMA = pa.schema(
         ("certificate", CERTIFICATE),
     ]
 )
-"""Columns of a shard; `moved`, `params`, `settings`, `numbers` and `versions` hold JSON."""
+"""Columns of a shard; `shifted`, `params`, `versions` and a check's `settings` and `numbers` hold JSON."""
 
-Row = dict[str, Any]
-"""One scenario as plain data, with the columns of `SCHEMA`; the witness is an array of shape (n, 7)."""
+NO_WITNESS: NDArray[np.float32] = np.zeros((0, 7), np.float32)
+"""The witness of a row without one: it was not certified, or its witness was not asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoolRow:
+    """One scenario of a pool: a field for every column of `SCHEMA`."""
+
+    id: str
+    task: str
+    code: str
+    """Number of the task in the paper."""
+    category: str
+    split: str
+    axes: tuple[str, ...]
+    """The split's axes with their severities, such as `wide_gaps@3`; none in training."""
+    shifted: Mapping[str, Value]
+    """Values of the parameters that the axes name."""
+    seed: int
+    index: int
+    attempt: int
+    """Which try at the index was the first feasible one."""
+    id_twin: str
+    """Id of the training scenario of the same index."""
+    instruction: str
+    horizon: float
+    """Time limit [s]."""
+    params: Mapping[str, Value]
+    """Values of all parameters."""
+    embodiment: str
+    scene_xml: str = field(repr=False)
+    """The certified scene without the robot, MJCF."""
+    scene_sha256: str
+    witness: NDArray[np.float32] = field(repr=False, compare=False)
+    """Actions of a success as the controller received them, shape (n, 7)."""
+    witness_sha256: str
+    certificate: StoredCertificate = field(repr=False)
+
+    def plain(self) -> dict[str, Any]:
+        """All columns but the witness as plain data, as a shard stores them."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "witness"}
+        text = {"shifted": as_json(self.shifted), "params": as_json(self.params)}
+        return {**kept, **text, "axes": list(self.axes), "certificate": self.certificate.plain()}
+
+    @classmethod
+    def of(cls, plain: Mapping[str, Any], witness: NDArray[np.float32]) -> "PoolRow":
+        """The reverse of `plain`.
+
+        Raises:
+            ValueError: a mapping is not canonical JSON, or the certificate has gaps.
+        """
+        return cls(**{name: _PARSE.get(name, _same)(value) for name, value in plain.items()}, witness=witness)
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+_PARSE = {"axes": tuple, "shifted": from_json, "params": from_json, "certificate": StoredCertificate.of}
+"""How stored columns become values; the others are values already."""
 
 
 @dataclass(frozen=True)
@@ -99,13 +160,15 @@ class Pool:
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
             manifest = json.loads(path.read_text())
-            version, shards = manifest["format"], manifest["shards"]
-            assert isinstance(shards, list) and all(isinstance(s["file"], str) for s in shards)
-        except (ValueError, KeyError, TypeError, AssertionError, UnicodeDecodeError):
-            raise PoolError(f"{path} is damaged; restore it or generate the pool again") from None
+            version, known = manifest["format"], manifest["format"] != FORMAT or _whole(manifest)
+        except (ValueError, KeyError, TypeError, UnicodeDecodeError):
+            known = False
+        if not known:
+            raise PoolError(f"{path} is damaged; restore it or generate the pool again")
         if version != FORMAT:
             raise PoolError(
-                f"{folder} has pool format {version}; this scengen reads {FORMAT}: use the version that wrote it"
+                f"{folder} has pool format {version}, this scengen reads {FORMAT}; generate the pool again, or use the "
+                "scengen that wrote it"
             )
         return cls(folder, manifest)
 
@@ -116,6 +179,68 @@ class Pool:
 
     def __len__(self) -> int:
         return sum(shard["rows"] for shard in self.manifest["shards"])
+
+    # --- the manifest -----------------------------------------------------------------------
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        return self.manifest["config"]["task"]["name"]
+
+    @property
+    def task_node(self) -> dict[str, Any]:
+        """The file of the task as it was, with measured limits and what the command line changed."""
+        return {key: node for key, node in self.manifest["config"]["task"].items() if key != "name"}
+
+    @property
+    def split(self) -> str:
+        return self.manifest["config"]["split"]
+
+    @property
+    def sampler(self) -> str:
+        """Where the numbers came from, such as `iid`; see `scengen.samplers.designs`."""
+        return self.manifest["config"]["sampler"]
+
+    @property
+    def seed(self) -> int:
+        return self.manifest["config"]["seed"]
+
+    @property
+    def settings(self) -> str:
+        """Name of the settings of the certificates, `quick` or `full`."""
+        return self.manifest["config"]["certify"]["name"]
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions that the pool was certified with."""
+        return self.manifest["versions"]
+
+    @property
+    def indices(self) -> int:
+        """How many indices were tried."""
+        return self.manifest["indices"]
+
+    @property
+    def funnel(self) -> Mapping[str, int]:
+        """How many draws got through each step."""
+        return self.manifest["funnel"]
+
+    @property
+    def reasons(self) -> Mapping[str, int]:
+        """Rejections by "check: reason"."""
+        return self.manifest["reasons"]
+
+    @property
+    def chosen(self) -> bool:
+        """Whether its scenarios were chosen from another pool, and not drawn."""
+        return "subset" in self.manifest
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """The manifest without what `write` adds to it."""
+        return {k: v for k, v in self.manifest.items() if k not in ("format", "shards", "rejected")}
+
+    # --- the shards -------------------------------------------------------------------------
 
     def damaged(self) -> dict[str, str]:
         """What is wrong with the files, by shard; empty for a sound pool."""
@@ -138,51 +263,60 @@ class Pool:
             raise PoolError(f"{self.folder / name} {what}; restore it or generate the pool again")
         return self
 
-    def rows(self, columns: Sequence[str] | None = None) -> Iterator[Row]:
+    def rows(self, witness: bool = True) -> Iterator[PoolRow]:
         """All scenarios in index order.
+
+        Args:
+            witness: whether to read the witnesses, most of a pool's bytes; without them each is `NO_WITNESS`.
 
         Raises:
             PoolError: a shard cannot be read.
         """
         for shard in self.manifest["shards"]:
-            yield from read_shard(self.folder / shard["file"], columns)
+            yield from _read_rows(self.folder / shard["file"], witness)
 
-    def row(self, prefix: str) -> Row:
+    def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
+        """A few columns of all scenarios in index order, with the values of `PoolRow`'s fields; quicker than `rows`.
+
+        Raises:
+            UnknownName: there is no such column, or it is the witness.
+            PoolError: a shard cannot be read.
+        """
+        for name in names:
+            if name not in _LIGHT:
+                raise UnknownName("light column of a pool", name, _LIGHT)
+        for shard in self.manifest["shards"]:
+            for values in _read(self.folder / shard["file"], names):
+                yield tuple(values[name] for name in names)
+
+    def row(self, prefix: str) -> PoolRow:
         """The scenario whose id begins with `prefix`.
 
         Raises:
             UnknownName: none, or more than one.
         """
-        ids = [r["id"] for r in self.rows(["id"])]
-        found = [i for i in ids if i.startswith(prefix)]
+        ids = [id_ for (id_,) in self.columns("id")]
+        found = [id_ for id_ in ids if id_.startswith(prefix)]
         if len(found) != 1:
             what = "scenario" if not found else f"single scenario ({len(found)} begin so)"
             raise UnknownName(f"{what} in {self.folder}", prefix, ids[:20] + (["..."] if len(ids) > 20 else []))
-        return next(r for r in self.rows() if r["id"] == found[0])
+        return next(row for row in self.rows() if row.id == found[0])
 
     @cached_property
-    def rejected(self) -> list[Row]:
+    def rejected(self) -> list[PoolRow]:
         """Scenarios that were kept although they were not certified (`keep=`)."""
         path = self.folder / "rejected.parquet"
-        return list(read_shard(path)) if path.is_file() else []
+        return list(_read_rows(path, witness=True)) if path.is_file() else []
 
 
-def read_shard(path: Path, columns: Sequence[str] | None = None) -> Iterator[Row]:
-    """The rows of one Parquet file.
+def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept: Sequence[PoolRow] = ()) -> Pool:
+    """Write a pool: shards first, the manifest last, each under its final name only when complete.
 
-    Raises:
-        PoolError: the file cannot be read.
+    Args:
+        about: the manifest but for the files.
+        rows: the certified scenarios in index order.
+        kept: scenarios that were not certified.
     """
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            for group in range(file.num_row_groups):
-                yield from _rows(file.read_row_group(group, columns=columns))
-    except (OSError, pa.ArrowException) as error:
-        raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); restore it") from None
-
-
-def write(folder: Path, manifest: Mapping[str, Any], rows: Iterable[Row], kept: Sequence[Row] = ()) -> Pool:
-    """Write a pool: shards first, the manifest last, each under its final name only when complete."""
     folder.mkdir(parents=True, exist_ok=True)
     shards, batch = [], []
     for row in rows:
@@ -193,7 +327,7 @@ def write(folder: Path, manifest: Mapping[str, Any], rows: Iterable[Row], kept: 
     if batch or not shards:
         shards.append(_write_shard(folder, f"scenarios-{len(shards):05d}.parquet", batch))
     extra = {"rejected": _write_shard(folder, "rejected.parquet", kept)} if kept else {}
-    text = json.dumps({"format": FORMAT, **manifest, "shards": shards, **extra}, indent=1, sort_keys=True) + "\n"
+    text = json.dumps({"format": FORMAT, **about, "shards": shards, **extra}, indent=1, sort_keys=True) + "\n"
     _replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)
 
@@ -203,7 +337,7 @@ def sha256(content: str | bytes) -> str:
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
-def _write_shard(folder: Path, name: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _write_shard(folder: Path, name: str, rows: Sequence[PoolRow]) -> dict[str, Any]:
     table = _table(rows)
     sink = pa.BufferOutputStream()
     pq.write_table(
@@ -219,9 +353,9 @@ def _write_shard(folder: Path, name: str, rows: Sequence[Row]) -> dict[str, Any]
     return {"file": name, "rows": len(rows), "bytes": len(content), "sha256": sha256(content)}
 
 
-def _table(rows: Sequence[Row]) -> pa.Table:
-    plain = pa.Table.from_pylist([{**row, "witness": None} for row in rows], schema=SCHEMA)
-    recordings = [np.asarray(row["witness"], np.float32).reshape(-1, 7) for row in rows]
+def _table(rows: Sequence[PoolRow]) -> pa.Table:
+    plain = pa.Table.from_pylist([{**row.plain(), "witness": None} for row in rows], schema=SCHEMA)
+    recordings = [np.asarray(row.witness, np.float32).reshape(-1, 7) for row in rows]
     offsets = np.cumsum([0, *map(len, recordings)], dtype=np.int32)
     flat = np.concatenate(recordings).ravel() if recordings else np.zeros(0, np.float32)
     column = pa.ListArray.from_arrays(offsets, pa.FixedSizeListArray.from_arrays(pa.array(flat), 7))
@@ -229,15 +363,64 @@ def _table(rows: Sequence[Row]) -> pa.Table:
     return plain.set_column(where, SCHEMA.field(where), column.cast(SCHEMA.field(where).type))
 
 
-def _rows(table: pa.Table) -> Iterator[Row]:
-    """Plain data, but witnesses as arrays: as lists of numbers they would need fifty times the memory."""
-    if "witness" not in table.column_names:
-        yield from table.to_pylist()
-        return
-    recordings = table.column("witness")
-    for row, actions in zip(table.drop_columns("witness").to_pylist(), recordings, strict=True):
-        numbers = actions.values.flatten().to_numpy(zero_copy_only=False)
-        yield {**row, "witness": np.asarray(numbers, np.float32).reshape(-1, 7)}
+_LIGHT = tuple(name for name in SCHEMA.names if name != "witness")
+
+
+def _read_rows(path: Path, witness: bool) -> Iterator[PoolRow]:
+    for values in _read(path, SCHEMA.names if witness else _LIGHT):
+        yield PoolRow(**{"witness": NO_WITNESS, **values})
+
+
+def _read(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Some columns of one Parquet file, row by row, as the values of `PoolRow`'s fields.
+
+    Raises:
+        PoolError: the file cannot be read, or holds something else than a pool of this format.
+    """
+    count = 0
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            if not file.schema_arrow.equals(SCHEMA):
+                raise ValueError(f"its columns are not those of pool format {FORMAT}")
+            for group in range(file.num_row_groups):
+                for values in _values(file.read_row_group(group, columns=list(names))):
+                    yield values
+                    count += 1
+    except (OSError, pa.ArrowException, ValueError, TypeError) as error:
+        why = " ".join(str(error).split())[:120]
+        raise PoolError(f"{path} cannot be read from row {count} on ({why}); restore it") from None
+
+
+def _values(table: pa.Table) -> Iterator[dict[str, Any]]:
+    for name in table.column_names:
+        if table.column(name).null_count:
+            raise ValueError(f"column {name} has gaps")
+    columns = [_column(table.column(name), name) for name in table.column_names]
+    for values in zip(*columns, strict=True):
+        yield dict(zip(table.column_names, values, strict=True))
+
+
+def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
+    """Values one by one. A witness becomes an array at once: a list of numbers would need fifty times the memory."""
+    if name == "witness":
+        for actions in column:
+            numbers = actions.values.flatten().to_numpy(zero_copy_only=False)
+            yield np.asarray(numbers, np.float32).reshape(-1, 7)
+    else:
+        yield from map(_PARSE.get(name, _same), column.to_pylist())
+
+
+def _whole(manifest: Mapping[str, Any]) -> bool:
+    """Whether a manifest has what every pool of this format has."""
+    config, shards = manifest["config"], manifest["shards"]
+    named = (config["task"]["name"], config["certify"]["name"], config["split"], config["sampler"])
+    counted = (config["seed"], manifest["indices"], *(shard["rows"] for shard in shards))
+    counts, texts = {**manifest["funnel"], **manifest["reasons"]}, {**manifest["versions"]}
+    return (
+        isinstance(shards, list)
+        and all(isinstance(text, str) for text in (*named, *texts.values(), *(s["file"] for s in shards)))
+        and all(isinstance(count, int) for count in (*counted, *counts.values()))
+    )
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Success rates with honest intervals: repeated rollouts of one scenario are not independent."""
+"""Success rates with cluster-robust intervals: repeated rollouts of one scenario are not independent."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

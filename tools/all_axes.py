@@ -11,23 +11,24 @@ from typing import Any
 
 from scengen import cli, config
 from scengen.ood.behaviour import EXTRAPOLATION
+from scengen.ood.boundary import FAILS_AT_ONCE, HOLDS
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
 
-Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} twins, certificates of level quick.
+Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} twins, certificates with certify=quick.
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
-* **certified**: of how many indices. **true extrapolation**: twins in which the actions that solves the training
-  twin fails and the oracle succeeds, with Wilson's 95 % interval; **else**: the others. What is cosmetic to a actions asks
-  for no new motion; it may still be hard to *see*, and a actions never looks.
-* **actions dies**, **oracle dies**: place on the way where success falls to one half; 0 is the edge of training, 1 the far
-  end of the axis, in brackets the 95 % credible interval; `> x`: alive at the end of the way. `at the edge`: a actions
-  that fails as soon as its scene's own value is exchanged for the nearest end of training.
+* **certified**: of how many indices. **true extrapolation**: twins in which the witness of the training twin fails and
+  the oracle succeeds, with Wilson's 95 % interval; **else**: the others. On a cosmetic axis open-loop replay suffices:
+  it asks for no new motion, and perception is not tested.
+* **replay**, **oracle**: where on the path success falls to 50 %; 0 is the edge of training, 1 the far end of the axis,
+  in brackets the 95 % credible interval; `> x`: it holds to the end of the path. `at the edge`: the replay fails as
+  soon as its scene's own value is exchanged for the nearest end of training.
 * **energy**: energy distance between the features of the twins [training ranges], p value of its permutation test.
 
-| task | axis | outside | physics | certified | true extrapolation | else | actions dies | oracle dies | energy |
+| task | axis | outside | physics | certified | true extrapolation | else | replay | oracle | energy |
 |---|---|---|---|---|---|---|---|---|---|
 """
 
@@ -77,12 +78,12 @@ def _line(card: dict[str, Any]) -> str:
 
 
 def _boundary(card: dict[str, Any], who: str) -> str:
-    if card["no_way"]:
+    if card["why_no_path"]:
         return "separate values"
     found = card["boundaries"][who]
-    if found["verdict"].startswith("alive"):
+    if found["verdict"] == HOLDS:
         return f"> {found['end']:.2f}"
-    if found["verdict"].startswith("dead"):
+    if found["verdict"] == FAILS_AT_ONCE:
         return "at the edge"
     at = "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
     return f"{found['middle']:.2f} [{max(found['low'], 0):.2f}, {found['high']:.2f}]{at}"

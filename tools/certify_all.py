@@ -1,4 +1,4 @@
-"""Certify N scenarios of every split of every task at level full. `python tools/certify_all.py 20 [split ...]`"""
+"""Certify N scenarios of every split of every task with certify=full. `python tools/certify_all.py 20 [split ...]`"""
 
 import sys
 

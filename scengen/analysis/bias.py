@@ -55,8 +55,8 @@ class Marginal:
     def effective(self) -> float:
         """Effective sample size (Kish): so many unbiased draws tell as much about this marginal as the accepted ones,
         reweighted to the proposed distribution. Cells without any accepted draw cannot be reweighted."""
-        alive = [c for c in self.cells if c.accepted]
-        return sum(c.proposed for c in alive) ** 2 / sum(c.proposed**2 / c.accepted for c in alive)
+        used = [c for c in self.cells if c.accepted]
+        return sum(c.proposed for c in used) ** 2 / sum(c.proposed**2 / c.accepted for c in used)
 
     @property
     def lost(self) -> float:

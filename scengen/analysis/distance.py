@@ -18,7 +18,7 @@ from .space import Points, measured, of_parameters, scale
 
 CLOSE = 0.01
 """Scenarios that differ by less than this in every parameter are near duplicates [training widths]. The jitter of the
-robustness check moves more: a actions that solves one of them solves the other."""
+robustness check moves more: actions that solve one of them solve the other."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def near_duplicates(
     others: Mapping[str, Scenario] | None = None,
     within: float = CLOSE,
 ) -> list[Pair]:
-    """Pairs of scenarios that are the same but for trifles, nearest first.
+    """Pairs of scenarios that differ by less than `within` in every parameter, nearest first.
 
     Between two pools this is leakage; within one pool (`others` left out) these are repetitions. Every symmetric image
     of a scenario is compared, so that two identical cubes that have changed places do not hide a pair.

@@ -1,4 +1,4 @@
-"""The report of whole pools: what was lost, how far out they are, whether certification bent them, what leaks."""
+"""The report of whole pools: what was lost, how far out they are, selection bias of certification, what leaks."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -6,13 +6,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
 from ..pictures import render
 from ..pictures.plots import svg
-from ..pictures.report import thumbnail
+from ..pictures.report import template, thumbnail
 from ..pool import Pool
 from ..runs.generate import STAGES
 from ..samplers.task import Task
@@ -20,7 +19,7 @@ from ..scenario import Scenario
 from .bias import Bias, Marginal, bias
 from .coverage import Evenness, evenness
 from .distance import CLOSE, Energy, Pair, energy, near_duplicates, per_parameter
-from .redraw import proposed, scenarios_of, task_of
+from .redraw import redrawn, scenarios_of, task_of
 from .space import measured, of_features
 
 SHOWN = 4
@@ -73,12 +72,12 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
     remark, pictures = "", {}
     try:
         for pool in pools:
-            pictures[str(pool.folder)] = [thumbnail(row) for row in itertools.islice(pool.rows(), SHOWN)]
+            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), SHOWN)
+            pictures[str(pool.folder)] = [thumbnail(*scene) for scene in scenes]
     except render.NoPictures as error:
         remark = str(error)
     marginals = {o.folder: svg(_marginals(o.bias.marginals[:SHOWN])) for o in overviews if o.bias and o.bias.marginals}
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "templates"), autoescape=True)
-    text = environment.get_template("report.html").render(
+    text = template("report.html").render(
         overviews=overviews,
         contrasts=contrasts,
         pictures=pictures,
@@ -98,24 +97,24 @@ def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[
 
 
 def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario]) -> Overview:
-    even = bent = None
-    if "subset" not in pool.manifest and scenarios:
-        drawn = [p for p in proposed(pool) if p.feasible]
+    even = biased = None
+    if scenarios and not pool.chosen:
+        drawn = [p for p in redrawn(pool) if p.feasible]
         numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
         even = evenness(numbers) if numbers.size else None
         rows = [measured(p.scenario) for p in drawn]
         table = {name: np.array([row[name] for row in rows], float) for name in rows[0]}
-        bent = bias(table, np.array([p.certified for p in drawn]))
+        biased = bias(table, np.array([p.certified for p in drawn]))
     return Overview(
         str(pool.folder),
         task.name,
-        pool.manifest["config"]["split"],
+        pool.split,
         len(scenarios),
-        pool.manifest["funnel"],
-        pool.manifest["reasons"],
+        pool.funnel,
+        pool.reasons,
         per_parameter(task, list(scenarios.values())),
         even,
-        bent,
+        biased,
     )
 
 

@@ -1,20 +1,17 @@
 """What a pool was chosen from: its manifest and seed are enough to draw every proposal again."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from ..errors import BadConfig, Infeasible, PoolError
-from ..params import with_values
 from ..pool import Pool
 from ..samplers.task import Task, load
 from ..scenario import Scenario
 
 
 @dataclass(frozen=True)
-class Proposed:
-    """One draw that a run made."""
+class Redrawn:
+    """One draw that a run made, drawn again."""
 
     index: int
     scenario: Scenario
@@ -31,11 +28,10 @@ def task_of(pool: Pool) -> Task:
     Raises:
         ScengenError: the family has changed so that the task does not fit it any more.
     """
-    node = dict(pool.manifest["config"]["task"])
-    return load(node.pop("name"), node)
+    return load(pool.task, pool.task_node)
 
 
-def proposed(pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None) -> list[Proposed]:
+def redrawn(pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None) -> list[Redrawn]:
     """Draw everything again that the pool's run has drawn, infeasible tries included.
 
     Args:
@@ -45,33 +41,28 @@ def proposed(pool: Pool, progress: Callable[[int, int], None] = lambda done, tot
         BadConfig: the pool is a chosen subset, for which there are no proposals.
         PoolError: other scenarios come out than the pool holds.
     """
-    if "subset" in pool.manifest:
+    if pool.chosen:
         raise BadConfig(f"{pool.folder} is a subset of another pool, chosen and not drawn; give the pool it came from")
-    task, config, total = task_of(pool), pool.manifest["config"], pool.manifest["indices"]
-    design = task.design(_sampler(config))
-    ids = {row["index"]: row["id"] for row in pool.rows(["index", "id"])}
-    found: list[Proposed] = []
-    for index in range(total):
+    task = task_of(pool)
+    design = task.design(pool.sampler)
+    ids = dict(pool.columns("index", "id"))
+    found: list[Redrawn] = []
+    for index in range(pool.indices):
         try:
-            for p in task.proposals(config["split"], config["seed"], index, design):
+            for p in task.proposals(pool.split, pool.seed, index, design):
                 certified = index in ids and p.refutation is None
                 if certified and ids[index] != p.scenario.id:
                     raise PoolError(
                         f"{pool.folder}: index {index} comes out as {p.scenario.id}, but the pool holds {ids[index]}; "
                         "the family has changed since, generate the pool again"
                     )
-                found.append(Proposed(index, p.scenario, p.quantiles, p.refutation is None, certified))
+                found.append(Redrawn(index, p.scenario, p.quantiles, p.refutation is None, certified))
         except Infeasible:
             pass  # without a training scenario of this index there was nothing for the axis to move
-        progress(index + 1, total)
+        progress(index + 1, pool.indices)
     return found
 
 
 def scenarios_of(task: Task, pool: Pool) -> dict[str, Scenario]:
     """The scenarios of a pool by id."""
-    start = task.family()
-    return {row["id"]: with_values(start, json.loads(row["params"])) for row in pool.rows(["id", "params"])}
-
-
-def _sampler(config: Mapping[str, Any]) -> str:
-    return config.get("sampler", "iid")  # pools made before there was a choice
+    return {id_: task.scenario(params) for id_, params in pool.columns("id", "params")}

@@ -8,7 +8,7 @@ from ..params import Value
 from ..samplers.dists import Dist
 
 STEPS = 5
-"""Halvings of the way to the centre: the values found are within 1/32 of it."""
+"""Halvings of the distance to the centre: the values found are within 1/32 of it."""
 
 Fails = Callable[[Mapping[str, Value]], bool]
 """Whether a scenario with these parameter values fails in the way that is to be explained."""
@@ -50,12 +50,12 @@ def shrink(
     """Move a failing scenario towards a centre while it still fails.
 
     First delta debugging (Zeller and Hildebrandt 2002): put as many parameters as possible to their centre, groups at a
-    time, until none can be. Then the ways of those that remain are halved, one after the other. No scenario is judged
-    twice.
+    time, until none can be. Then the distances of those that remain are halved, one after the other. No scenario is
+    judged twice.
 
     Args:
         begin, middle: values of all parameters of a failing scenario and of the centre.
-        scales: what to measure the departure of each parameter in, as `scengen.ood.space.scale` has it.
+        scales: what to measure the departure of each parameter in, as `scengen.analysis.space.scale` has it.
         fails: judged often; the cheaper the better.
 
     Raises:
@@ -106,7 +106,7 @@ def _split(items: Sequence[str], parts: int) -> Iterator[list[str]]:
 
 
 def _nearer(values: Mapping[str, Value], name: str, middle: Value, failing: Fails) -> dict[str, Value]:
-    """Halve the way of one parameter between a value that fails and one that does not."""
+    """Halve the distance of one parameter between a value that fails and one that does not."""
     good, bad = middle, values[name]
     for _ in range(STEPS):
         between = (good + bad) / 2

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 from rich.table import Table
 
-from ..evaluate.power import Plan
+from ..evaluate.power import PowerAnalysis
 from .bias import AcceptanceMap, Bias
 from .distance import Pair
 from .shrink import Shrunk
 
 CORRELATIONS = (0.0, 0.2, 0.5, 1.0)
-"""For which intra-cluster correlations the planner's table says what can be found, besides the one asked for."""
+"""Intra-cluster correlations in the table of a power analysis, besides the one asked for."""
 BASELINES = (0.9, 0.7, 0.5, 0.3)
-"""For which ID success rates."""
+"""ID success rates in it."""
 
 
 def bias_table(found: Bias, title: str) -> Table:
@@ -54,15 +54,14 @@ def pairs_table(pairs: list[Pair], one: str, other: str) -> Table:
     return table
 
 
-def plan_table(plan: Plan) -> Table:
+def power_table(analysis: PowerAnalysis) -> Table:
     """The smallest drop that can be told apart, by ID success rate and intra-cluster correlation."""
-    title = (
-        f"smallest drop found with probability {plan.power:g}: {plan.seeds} seeds x {plan.rollouts} rollouts a split"
-    )
-    correlations = sorted({*CORRELATIONS, plan.correlation})
+    size = f"{analysis.seeds} seeds x {analysis.rollouts} rollouts a split"
+    title = f"smallest drop found with probability {analysis.power:g}: {size}"
+    correlations = sorted({*CORRELATIONS, analysis.correlation})
     table = Table("ID success", *(f"correlation {c:g}" for c in correlations), title=title, title_justify="left")
     for before in BASELINES:
-        drops = (replace(plan, correlation=c).smallest_drop(before) for c in correlations)
+        drops = (replace(analysis, correlation=c).smallest_drop(before) for c in correlations)
         table.add_row(f"{before:g}", *("none" if d is None else f"{d:.2f}" for d in drops))
     return table
 

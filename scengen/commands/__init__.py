@@ -17,6 +17,21 @@ err = Console(stderr=True, soft_wrap=True)
 Arguments = Sequence[str]
 
 
+def say(text: str) -> None:
+    """Print a line as it is: no markup, no colours."""
+    out.print(text, highlight=False, markup=False)
+
+
+def warn(text: str, style: str = "red") -> None:
+    """Print a line on standard error as it is."""
+    err.print(text, style=style, highlight=False, markup=False)
+
+
+def remark(text: str) -> None:
+    """Say on standard error what is missing though all went well."""
+    warn(f"scengen: {text}", "yellow")
+
+
 def one(pool: str | list[str]) -> str:
     """The only pool named, for a command that takes one."""
     if isinstance(pool, list):

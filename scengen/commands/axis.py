@@ -4,28 +4,26 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ..config import read, typed
+from ..config import read_task
 from ..ood.card import Card, Settings, make
-from ..runs.progress import Bar
-from . import OK, Arguments, err, out
+from ..runs.progress import ProgressBar
+from . import OK, Arguments, err, out, remark, say
 
 
 def command(arguments: Arguments) -> int:
-    composed = read("axis", arguments)
-    settings, task = typed("", Settings, composed.settings), composed.task
-    assert task is not None
+    settings, task, certify = read_task("axis", arguments, Settings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
-    with Bar(err, f"axis {task.name}/{settings.axis}", settings.n) as bar:
+    with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:
-            bar.of(min(done, total), total, what)
+            progress_bar.of(min(done, total), total, what)
 
-        card, remark = make(task, composed.resolved, composed.level, settings, folder, progress)
+        card, missing = make(task, certify, settings, folder, progress)
     out.print(_table(card))
-    if remark:
-        err.print(f"scengen: the card has no pictures: {remark}", highlight=False, markup=False)
-    out.print(f"wrote {folder / 'card.html'} and card.json", highlight=False)
+    if missing:
+        remark(f"the card has no pictures: {missing}")
+    say(f"wrote {folder / 'card.html'} and card.json")
     return OK
 
 
@@ -46,9 +44,9 @@ def _table(card: Card) -> Table:
             table.add_row("behaviour", f"{share.kind}: {share.count} ({told})")
     for who, edge in card.boundaries.items():
         at = ", ".join(f"{name} = {value:.4g}" for name, value in edge.values.items())
-        way = f"{edge.middle:.2f} from {edge.low:.2f} to {edge.high:.2f}, way ends at {edge.end:.2f}"
-        table.add_row(f"boundary of {who}", f"{edge.verdict}: {way}" + (f" ({at})" if at else ""))
-    if card.no_way:
-        table.add_row("boundary", card.no_way)
+        where = f"{edge.middle:.2f} from {edge.low:.2f} to {edge.high:.2f}, the path ends at {edge.end:.2f}"
+        table.add_row(f"boundary of {who}", f"{edge.verdict}: {where}" + (f" ({at})" if at else ""))
+    if card.why_no_path:
+        table.add_row("boundary", card.why_no_path)
     table.add_row("energy distance", f"{card.energy.distance:.3g} training ranges, p = {card.energy.pvalue:.3g}")
     return table

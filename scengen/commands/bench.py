@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..bench import bench
-from ..config import read, typed
+from ..config import read
 from ..errors import at_least
 from . import OK, Arguments, out, write_json
 
@@ -12,12 +12,12 @@ from . import OK, Arguments, out, write_json
 class Settings:
     """Settings of `scengen bench`; meanings stand in conf/command/bench.yaml."""
 
-    json: str | None = None
-    repeats: int = 5
+    json: str | None
+    repeats: int
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("bench", arguments).settings)
+    settings = read("bench", arguments, Settings)
     at_least(settings, repeats=1)
     tables, result = bench(settings.repeats)
     for table in tables:

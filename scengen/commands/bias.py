@@ -1,4 +1,4 @@
-"""whether certification has bent a pool's distribution: what was accepted against what was proposed"""
+"""whether certification has changed a pool's distribution: what was accepted against what was proposed"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,28 +6,28 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ..analysis.bias import Bias, acceptance_map, bias
-from ..analysis.redraw import Proposed, proposed
+from ..analysis.redraw import Redrawn, redrawn
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
-from ..config import read, typed
+from ..config import read
 from ..pool import Pool
-from ..runs.progress import Bar
-from . import OK, Arguments, err, one, out, write_json
+from ..runs.progress import ProgressBar
+from . import OK, Arguments, err, one, out, say, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen bias`; meanings stand in conf/command/bias.yaml."""
 
-    pool: str | list[str] = ""
-    json: str | None = None
+    pool: str | list[str]
+    json: str | None
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("bias", arguments).settings)
+    settings = read("bias", arguments, Settings)
     pool = Pool.open(one(settings.pool)).check()
-    with Bar(err, f"draw {pool.folder} again", pool.manifest["indices"]) as bar:
-        drawn = proposed(pool, lambda done, total: bar.show(done))
+    with ProgressBar(err, f"draw {pool.folder} again", pool.indices) as progress_bar:
+        drawn = redrawn(pool, lambda done, total: progress_bar.show(done))
     feasible = [p for p in drawn if p.feasible]
     stages = {
         "feasible": ("feasible draws against all draws: what the family's constraints leave out", drawn),
@@ -39,25 +39,26 @@ def command(arguments: Arguments) -> int:
         found = bias(table, accepted)
         if not accepted.all():
             out.print(bias_table(found, f"{title} ({found.accepted} of {found.proposed})"))
-            moved = [m.name for m in found.marginals if m.name in among[0].quantiles]  # features follow from these
-            if len(moved) > 1:
-                out.print(map_table(acceptance_map((moved[0], moved[1]), table, accepted)))
+            drawn_ones = [m.name for m in found.marginals if m.name in among[0].quantiles]  # features follow from these
+            if len(drawn_ones) > 1:
+                out.print(map_table(acceptance_map((drawn_ones[0], drawn_ones[1]), table, accepted)))
         result[name] = {**asdict(found), "flagged": found.flagged, "effective": found.effective}
-        out.print(_verdict(name, found), highlight=False)
+        say(_verdict(name, found))
     if settings.json:
         write_json(settings.json, result)
     return OK
 
 
-def _table(among: Sequence[Proposed]) -> dict[str, np.ndarray]:
+def _table(among: Sequence[Redrawn]) -> dict[str, np.ndarray]:
     rows = [measured(p.scenario) for p in among]
     return {name: np.array([row[name] for row in rows], float) for name in rows[0]}
 
 
 def _verdict(stage: str, found: Bias) -> str:
     if found.accepted == found.proposed:
-        return f"{stage}: all of them, so that nothing was bent"
-    bent = f"BENT in {', '.join(found.flagged)}" if found.flagged else "no sign of selection"
+        return f"{stage}: all of them, so that there is no selection bias"
+    found_in = f"selection bias in {', '.join(found.flagged)}" if found.flagged else "no sign of selection bias"
     return (
-        f"{stage}: {bent}; along the worst marginal the {found.accepted} are worth {found.effective:.1f} unbiased ones"
+        f"{stage}: {found_in}; along the worst marginal the {found.accepted} are worth {found.effective:.1f} "
+        "unbiased ones"
     )

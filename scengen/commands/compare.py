@@ -7,30 +7,30 @@ from typing import Any
 import numpy as np
 
 from ..analysis.coverage import evenness
-from ..analysis.distance import CLOSE, energy, near_duplicates, per_parameter
-from ..analysis.redraw import proposed, scenarios_of, task_of
+from ..analysis.distance import energy, near_duplicates, per_parameter
+from ..analysis.redraw import redrawn, scenarios_of, task_of
 from ..analysis.space import of_features
 from ..analysis.tables import pairs_table
-from ..config import read, typed
+from ..config import read
 from ..errors import BadConfig
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
-from . import FAILED, OK, Arguments, out, several, write_json
+from . import FAILED, OK, Arguments, out, say, several, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen compare`; meanings stand in conf/command/compare.yaml."""
 
-    pool: str | list[str] = ""
-    within: float = CLOSE
-    permutations: int = 999
-    json: str | None = None
+    pool: str | list[str]
+    within: float
+    permutations: int
+    json: str | None
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("compare", arguments).settings)
+    settings = read("compare", arguments, Settings)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     task, names = task_of(pools[0]), {task_of(pool).name for pool in pools}
     if len(names) > 1:
@@ -50,18 +50,14 @@ def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: 
     """How far one pool is from training, how even it is, and whether it repeats itself."""
     away = per_parameter(task, list(scenarios.values()))
     told = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
-    out.print(f"{pool.folder}: {len(scenarios)} scenarios", highlight=False, markup=False)
-    out.print(f"  outside training by [training widths]: {told or 'nothing'}", highlight=False, markup=False)
+    say(f"{pool.folder}: {len(scenarios)} scenarios")
+    say(f"  outside training by [training widths]: {told or 'nothing'}")
     even = None
-    if "subset" not in pool.manifest and scenarios:
-        certified = [list(p.quantiles.values()) for p in proposed(pool) if p.certified]
+    if scenarios and not pool.chosen:
+        certified = [list(p.quantiles.values()) for p in redrawn(pool) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
-            out.print(
-                f"  discrepancy: {even.relative:.2f} times that of as many independent draws",
-                highlight=False,
-                markup=False,
-            )
+            say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws")
     pairs = near_duplicates(task, scenarios, within=settings.within)
     if pairs:
         out.print(pairs_table(pairs, "in the pool", "again"))
@@ -81,18 +77,14 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
     (pool, here), (beside, there) = one, other
     space = of_features(task, list(here.values()), list(there.values()))
     apart = energy(space.points(here.values()), space.points(there.values()), settings.permutations)
-    out.print(
+    say(
         f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
-        f"[training ranges], p = {apart.pvalue:.3f}",
-        highlight=False,
-        markup=False,
+        f"[training ranges], p = {apart.pvalue:.3f}"
     )
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
         out.print(pairs_table(pairs, str(pool.folder), str(beside.folder)))
-    out.print(
-        f"  shared but for {settings.within:g} training widths: {len(pairs)} pairs", highlight=False, markup=False
-    )
+    say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs")
     return {
         "pools": [str(pool.folder), str(beside.folder)],
         "over": space.names,

@@ -2,16 +2,16 @@
 
 from rich.table import Table
 
-from ..config import read, typed
+from ..config import read
 from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
-from ..runs.progress import Bar
-from . import OK, Arguments, err, out, write, write_json
+from ..runs.progress import ProgressBar
+from . import OK, Arguments, err, out, say, write, write_json
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("evaluate", arguments).settings)
-    with Bar(err, f"evaluate {settings.policy}", 1) as bar:
-        episodes = evaluate(settings, bar.of)
+    settings = read("evaluate", arguments, Settings)
+    with ProgressBar(err, f"evaluate {settings.policy}", 1) as progress_bar:
+        episodes = evaluate(settings, progress_bar.of)
     lines = table(episodes)
     shown = Table("", "split", "ID", "OOD", "difference", title=f"{settings.policy}: success [%]", title_justify="left")
     for line in lines:
@@ -19,5 +19,5 @@ def command(arguments: Arguments) -> int:
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
-    out.print(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl", highlight=False)
+    say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl")
     return OK

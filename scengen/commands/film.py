@@ -1,31 +1,31 @@
-"""a film strip or a video of a witness, or of a tempting plan that fails"""
+"""a film strip or a video of a witness, or of a shortcut that fails"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from .. import config
-from ..config import read, search_path, typed
+from ..config import read, search_path
 from ..envs.observations import CAMERAS
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
-from . import OK, Arguments, one, out, write
+from . import OK, Arguments, one, say, write
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen film`; meanings stand in conf/command/film.yaml."""
 
-    pool: str | list[str] = ""
-    id: str = ""
-    to: str = ""
-    plan: str = WITNESS
-    camera: str | None = None
-    frames: int = 8
-    fps: int = 25
-    width: int = 480
-    height: int = 360
+    pool: str | list[str]
+    id: str
+    to: str
+    of: str
+    camera: str | None
+    frames: int
+    fps: int
+    width: int
+    height: int
 
     @property
     def eye(self) -> str | None:
@@ -40,19 +40,19 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("film", arguments).settings)
+    settings = read("film", arguments, Settings)
     settings.check()
     row = Pool.open(one(settings.pool)).check().row(settings.id)
-    scenario = config.task(row["task"], search_path(arguments)).scenario(row["params"])
+    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     take = Take.witness(row, scenario)
-    if settings.plan != WITNESS:
-        take, episode = shortcut(row, scenario, settings.plan)
-        told = f"{episode.outcome} after {episode.seconds:g} s{': ' if episode.reason else ''}{episode.reason}"
-        out.print(f"{settings.plan}: {told}", highlight=False, markup=False)
+    if settings.of != WITNESS:
+        take, rollout = shortcut(row, scenario, settings.of)
+        told = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
+        say(f"{settings.of}: {told}")
     target, size = Path(settings.to), (settings.width, settings.height)
     if target.suffix == ".png":
         write(target, encode(strip(take, settings.frames, *size, settings.eye), "png"))
     else:
         movie(take, target, settings.fps, *size, settings.eye)
-    out.print(f"wrote {target}: {take.seconds:g} s", highlight=False)
+    say(f"wrote {target}: {take.seconds:g} s")
     return OK

@@ -3,25 +3,24 @@
 from functools import partial
 
 from .. import config
-from ..config import read, search_path, typed
+from ..config import read, search_path
 from ..export.recording import Settings, record
-from ..runs.progress import Bar
-from . import FAILED, INTERRUPTED, OK, Arguments, err, out
+from ..runs.progress import ProgressBar
+from . import FAILED, INTERRUPTED, OK, Arguments, err, say, warn
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("record", arguments).settings)
-    with Bar(err, f"record to {settings.to}", 0) as bar:
+    settings = read("record", arguments, Settings)
+    with ProgressBar(err, f"record to {settings.to}", 0) as progress_bar:
         try:
-            summary = record(settings, partial(config.task, search=search_path(arguments)), bar.of)
+            summary = record(settings, partial(config.task, search=search_path(arguments)), progress_bar.of)
         except KeyboardInterrupt:
-            err.print("scengen: interrupted; nothing was written", highlight=False)
+            warn("scengen: interrupted; nothing was written")
             return INTERRUPTED
-    out.print(
+    say(
         f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.fps} a second, "
-        f"{len(settings.eyes)} cameras to {settings.to}",
-        highlight=False,
+        f"{len(settings.eyes)} cameras to {settings.to}"
     )
     for scenario in summary.failed:
-        err.print(f"FAILED {scenario}: the witness does not reach the goal here; its episode has success = false")
+        warn(f"FAILED {scenario}: the witness does not reach the goal here; its episode has success = false")
     return FAILED if summary.failed else OK

@@ -5,32 +5,32 @@ from dataclasses import asdict, dataclass
 
 from rich.table import Table
 
-from ..config import read, search_path, typed
+from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..pool import Pool
-from ..runs.progress import Bar
-from . import FAILED, OK, Arguments, err, out, several, write_json
+from ..runs.progress import ProgressBar
+from . import FAILED, OK, Arguments, err, out, say, several, warn, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen robosuite`; meanings stand in conf/command/robosuite.yaml."""
 
-    pool: str | list[str] = ""
-    first: int | None = None
-    bar: float = 0.98
-    json: str | None = None
-    workers: int = 1
+    pool: str | list[str]
+    first: int | None
+    limit: float
+    json: str | None
+    workers: int
 
     def check(self) -> None:
         """Raise `BadConfig` for a value that means nothing."""
-        if not 0.0 <= self.bar <= 1.0:
-            raise BadConfig(f"bar = {self.bar:g}; it is a share, between 0 and 1")
+        if not 0.0 <= self.limit <= 1.0:
+            raise BadConfig(f"limit = {self.limit:g}; it is a share, between 0 and 1")
         at_least(self, first=1, workers=1)
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("robosuite", arguments).settings)
+    settings = read("robosuite", arguments, Settings)
     settings.check()
     pools = [Pool.open(folder) for folder in several(settings.pool)]
     total = sum(min(len(pool), settings.first or len(pool)) for pool in pools)
@@ -39,28 +39,25 @@ def command(arguments: Arguments) -> int:
 
     from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
 
-    with Bar(err, "robosuite", total) as bar:
-        found = compare_all(pools, settings.workers, bar.show, settings.first, search_path(arguments))
+    with ProgressBar(err, "robosuite", total) as progress_bar:
+        found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments))
     tasks = defaultdict(list)
     for comparison in found:
         tasks[comparison.task].append(comparison)
         if not comparison.agrees:
             told = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
-            err.print(f"DIFFERS {comparison.id} of {comparison.task}: {told}", style="red", highlight=False)
+            warn(f"DIFFERS {comparison.id} of {comparison.task}: {told}")
     table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdicts apart at most (s)")
     for task, those in tasks.items():
         apart, later = max(c.apart for c in those), max(abs(c.later) for c in those)
         table.add_row(task, str(len(those)), str(sum(c.agrees for c in those)), f"{1000 * apart:.4f}", f"{later:.2f}")
     out.print(table)
     same = sum(comparison.agrees for comparison in found)
-    holds = same >= settings.bar * total
+    holds = same >= settings.limit * total
     if settings.json:
         hashes = {str(pool.folder): pool.sha256 for pool in pools}
         plain = [asdict(comparison) for comparison in found]
-        write_json(settings.json, {"pools": hashes, "bar": settings.bar, "same": same, "scenarios": plain})
-    verdict = "reached" if holds else "MISSED"
-    out.print(
-        f"{same} of {total} scenarios have the same verdict in robosuite; the bar of {settings.bar:.0%} is {verdict}",
-        highlight=False,
-    )
+        write_json(settings.json, {"pools": hashes, "limit": settings.limit, "same": same, "scenarios": plain})
+    limit = f"the limit of {settings.limit:.0%} is {'reached' if holds else 'MISSED'}"
+    say(f"{same} of {total} scenarios have the same verdict in robosuite; {limit}")
     return OK if holds else FAILED

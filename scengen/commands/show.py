@@ -4,25 +4,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import config
-from ..config import read, search_path, typed
+from ..config import read, search_path
 from ..errors import BadConfig
 from ..pictures import film, render, report
 from ..pool import Pool
-from . import OK, Arguments, err, out, several, write
+from . import OK, Arguments, out, remark, say, several, write
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen show`; meanings stand in conf/command/show.yaml."""
 
-    pool: str | list[str] = ""
-    id: str | None = None
-    to: str | None = None
-    images: int = 60
+    pool: str | list[str]
+    id: str | None
+    to: str | None
+    images: int
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("show", arguments).settings)
+    settings = read("show", arguments, Settings)
     folders = several(settings.pool)
     pools = [Pool.open(folder).check() for folder in folders]
     target = Path(settings.to) if settings.to else None
@@ -31,10 +31,10 @@ def command(arguments: Arguments) -> int:
             raise BadConfig(f"to = {target}; a contact sheet is an .html file (a single scenario, id=, gives a .png)")
         for pool in pools:
             out.print(report.pool_table(pool))
-            out.print(report.funnel_table(pool.manifest["funnel"], pool.manifest["reasons"]))
-            out.print(f"pool sha256: {pool.sha256}", highlight=False)
-        if target and (remark := report.contact_sheet(pools, target, settings.images)):
-            err.print(f"scengen: {target} has no pictures: {remark}", highlight=False, markup=False)
+            out.print(report.funnel_table(pool.funnel, pool.reasons))
+            say(f"pool sha256: {pool.sha256}")
+        if target and (missing := report.contact_sheet(pools, target, settings.images)):
+            remark(f"{target} has no pictures: {missing}")
     else:
         row = pools[0].row(settings.id)
         for table in report.scenario_tables(row):
@@ -42,8 +42,8 @@ def command(arguments: Arguments) -> int:
         if target:
             if target.suffix != ".png":
                 raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
-            scenario = config.task(row["task"], search_path(arguments)).scenario(row["params"])
+            scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
             write(target, render.encode(film.strip(film.Take.witness(row, scenario)), "png"))
     if target:
-        out.print(f"wrote {target}", highlight=False)
+        say(f"wrote {target}")
     return OK

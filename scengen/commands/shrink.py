@@ -6,45 +6,44 @@ from dataclasses import asdict, dataclass
 from ..analysis.shrink import centre, shrink
 from ..analysis.space import scale
 from ..analysis.tables import shrunk_table
-from ..config import read, typed
+from ..certificate import Check
+from ..config import read_task
 from ..errors import BadConfig, at_least
 from ..params import Value, values, with_values
-from ..runs.progress import Bar
-from ..samplers.task import ID, Task
+from ..runs.progress import ProgressBar
+from ..samplers.task import Task
 from ..scenario import Scenario
-from ..validate.certify import Check, certify
+from ..validate.certify import certify
 from ..validate.settings import CertifySettings
-from . import OK, Arguments, err, out, write_json
+from . import OK, Arguments, err, out, say, write_json
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen shrink`; meanings stand in conf/command/shrink.yaml."""
 
-    split: str = ID
-    sampler: str = "iid"
-    seed: int = 0
-    index: int = 0
-    json: str | None = None
+    split: str
+    sampler: str
+    seed: int
+    index: int
+    json: str | None
 
 
 def command(arguments: Arguments) -> int:
-    composed = read("shrink", arguments)
-    settings, task, level = typed("", Settings, composed.settings), composed.task, composed.level
-    assert task is not None
+    settings, task, wanted = read_task("shrink", arguments, Settings)
     at_least(settings, seed=0, index=0)
     scenario = _proposed(task, settings)
-    failed = certify(scenario, task.horizon, level, task.embodiment).certificate.failed
+    failed = certify(scenario, task.horizon, wanted, task.embodiment).certificate.failed
     where = f"{task.name}/{settings.split}/{settings.index}"
     if failed is None:
-        raise BadConfig(f"{where} passes every check at level {level.level}; there is nothing to shrink")
-    out.print(f"{where} fails {failed.name}: {failed.reason}", highlight=False)
+        raise BadConfig(f"{where} passes every check of certify={wanted.name}; there is nothing to shrink")
+    say(f"{where} fails {failed.name}: {failed.reason}")
     scales = {name: scale(task, name) for name in task.known}
-    with Bar(err, f"shrink {where}", 0) as bar:
-        found = shrink(values(scenario), centre(task.training), scales, _fails(task, level, failed, bar.of))
+    with ProgressBar(err, f"shrink {where}", 0) as progress_bar:
+        found = shrink(values(scenario), centre(task.training), scales, _fails(task, wanted, failed, progress_bar.of))
     out.print(shrunk_table(found, {name: p.unit for name, p in task.known.items()}))
     nearest = with_values(scenario, found.values)
-    out.print(f"{len(found.causes)} of {len(task.known)} parameters matter; {found.tries} scenarios were judged")
+    say(f"{len(found.causes)} of {len(task.known)} parameters matter; {found.tries} scenarios were judged")
     if settings.json:
         write_json(
             settings.json,
@@ -61,7 +60,7 @@ def _proposed(task: Task, settings: Settings) -> Scenario:
 
 
 def _fails(
-    task: Task, level: CertifySettings, failed: Check, progress: Callable[[int, int], None]
+    task: Task, wanted: CertifySettings, failed: Check, progress: Callable[[int, int], None]
 ) -> Callable[[Mapping[str, Value]], bool]:
     """Whether a scenario fails the same check, and no cheaper one before it."""
     start, judged = task.family(), 0
@@ -70,9 +69,8 @@ def _fails(
         nonlocal judged
         judged += 1
         progress(judged, judged + 1)
-        certificate = certify(
-            with_values(start, candidate), task.horizon, level, task.embodiment, last=failed.name
-        ).certificate
+        scenario = with_values(start, candidate)
+        certificate = certify(scenario, task.horizon, wanted, task.embodiment, last=failed.name).certificate
         checks = [c for c in certificate.checks if c.passed is False]
         return bool(checks) and checks[0].name == failed.name
 

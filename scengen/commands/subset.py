@@ -6,23 +6,23 @@ from pathlib import Path
 from ..analysis.coverage import farthest_points
 from ..analysis.redraw import scenarios_of, task_of
 from ..analysis.space import of_parameters
-from ..config import read, typed
+from ..config import read
 from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
-from . import OK, Arguments, one, out
+from . import OK, Arguments, one, say
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen subset`; meanings stand in conf/command/subset.yaml."""
 
-    pool: str | list[str] = ""
-    n: int = 20
-    to: str = ""
+    pool: str | list[str]
+    n: int
+    to: str
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("subset", arguments).settings)
+    settings = read("subset", arguments, Settings)
     pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
     if not 1 <= settings.n <= len(pool):
         raise BadConfig(f"n = {settings.n}; it must lie in [1, {len(pool)}], the size of {pool.folder}")
@@ -32,9 +32,8 @@ def command(arguments: Arguments) -> int:
     scenarios = scenarios_of(task, pool)
     space = of_parameters(task, list(scenarios.values()))
     chosen = {list(scenarios)[i] for i in farthest_points(space.points(scenarios.values()), settings.n)}
-    kept = {k: v for k, v in pool.manifest.items() if k not in ("format", "shards", "rejected")}
-    manifest = {**kept, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
-    subset = write(target, manifest, (row for row in pool.rows() if row["id"] in chosen))
-    out.print(f"wrote {settings.n} of {len(pool)} scenarios to {target}", highlight=False)
-    out.print(f"pool sha256: {subset.sha256}", highlight=False)
+    about = {**pool.about, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
+    subset = write(target, about, (row for row in pool.rows() if row.id in chosen))
+    say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")
+    say(f"pool sha256: {subset.sha256}")
     return OK

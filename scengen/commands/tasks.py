@@ -1,25 +1,15 @@
 """what can be generated: tasks, parameters, splits and their proofs"""
 
-from dataclasses import dataclass
-
 from .. import config
-from ..config import read, search_path, tasks, typed
 from ..pictures.report import task_tables, tasks_table
 from . import OK, Arguments, out
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen tasks`; meanings stand in conf/command/tasks.yaml."""
-
-    name: str | None = None
-
-
 def command(arguments: Arguments) -> int:
-    settings, search = typed("", Settings, read("tasks", arguments).settings), search_path(arguments)
-    if settings.name is None:
-        out.print(tasks_table([config.task(name, search) for name in tasks(search)]))
+    name, others = config.chosen("tasks", arguments), [a for a in arguments if not a.startswith("task=")]
+    if name is None:
+        out.print(tasks_table([config.task(each, others) for each in config.tasks(others)]))
         return OK
-    for table in task_tables(config.task(settings.name, search)):
+    for table in task_tables(config.task(name, others)):
         out.print(table)
     return OK

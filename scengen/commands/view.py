@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from .. import config
-from ..config import read, search_path, typed
+from ..config import read, search_path
 from ..pictures.view import check_display, view
 from ..pool import Pool
 from . import OK, Arguments, one
@@ -13,15 +13,15 @@ from . import OK, Arguments, one
 class Settings:
     """Settings of `scengen view`; meanings stand in conf/command/view.yaml."""
 
-    pool: str | list[str] = ""
-    id: str = ""
-    replay: bool = False
+    pool: str | list[str]
+    id: str
+    replay: bool
 
 
 def command(arguments: Arguments) -> int:
-    settings = typed("", Settings, read("view", arguments).settings)
+    settings = read("view", arguments, Settings)
     row = Pool.open(one(settings.pool)).check().row(settings.id)
-    scenario = config.task(row["task"], search_path(arguments)).scenario(row["params"])
+    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     check_display()
     view(row, scenario, settings.replay)
     return OK

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from ..control.loop import Loop
 from ..episode import Actions, Outcome
 from ..parallel import each
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..sim.world import Vec3, World
 from ..validate.rollout import replay
-from ..validate.verify import settling_time
-from .robosuite import ScenarioEnv, environment
+from .robosuite import RobosuiteEnv, env_class
 
 
 @dataclass(frozen=True)
@@ -62,10 +61,10 @@ def compare_all(
     return sorted(found, key=lambda comparison: (comparison.task, comparison.id))
 
 
-def compare(row: Row, search: tuple[str, ...] = ()) -> Comparison:
+def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
     """Play one witness here and in robosuite."""
     logging.getLogger("robosuite_logs").setLevel(logging.ERROR)  # it tells of every controller that it loads
-    env = environment(row["task"], search)(
+    env = env_class(row.task, search)(
         scenario=row,
         use_object_obs=False,
         use_camera_obs=False,
@@ -73,15 +72,15 @@ def compare(row: Row, search: tuple[str, ...] = ()) -> Comparison:
         hard_reset=False,
         ignore_done=True,
     )
-    settle = settling_time(row) or 0.0
-    world = _Traced.load(row["scene_xml"], row["embodiment"])
-    ours = replay(env.scenario, world, row["witness"], row["horizon"], settle)
-    theirs, reason, seconds, path = _played(env, row["witness"], settle)
+    settle = row.certificate.settle or 0.0
+    world = _Traced.load(row.scene_xml, row.embodiment)
+    ours = replay(env.scenario, world, row.witness, row.horizon, settle)
+    theirs, reason, seconds, path = _played(env, row.witness, settle)
     env.close()
     together = min(len(path), len(world.path))
     apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=1)
     later = round(seconds - ours.seconds, 6) + 0.0  # never -0.0
-    return Comparison(row["task"], row["id"], ours.outcome, theirs, reason, float(apart.max()), later)
+    return Comparison(row.task, row.id, ours.outcome, theirs, reason, float(apart.max()), later)
 
 
 @dataclass
@@ -95,7 +94,7 @@ class _Traced(World):
         self.path.append(self.arm.hand)
 
 
-def _played(env: ScenarioEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
+def _played(env: RobosuiteEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
     """Outcome of recorded actions in robosuite, its reason, when it was decided [s], and the path of the hand.
 
     As in `rollout.replay`: the robot is idle when the actions have ended, and the goal must hold for `settle` seconds.
@@ -117,6 +116,6 @@ def _played(env: ScenarioEnv, actions: Actions, settle: float) -> tuple[Outcome,
     return *env.episode.settled(), reached, path
 
 
-def _rows(pools: Sequence[Pool], first: int | None) -> Iterator[Row]:
+def _rows(pools: Sequence[Pool], first: int | None) -> Iterator[PoolRow]:
     for pool in pools:
         yield from islice(pool.check().rows(), first)

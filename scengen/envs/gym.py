@@ -5,8 +5,7 @@ An environment plays the certified scenarios of a pool, the same scene text, phy
 speaks of. Nothing is sampled at reset: the seed chooses among the stored scenarios, and the id comes back in `info`.
 """
 
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,9 @@ from .. import config
 from ..control.loop import ACTION, Loop
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
-from ..params import Value, with_values
+from ..params import Value
 from ..pictures.render import Camera
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
@@ -31,12 +30,12 @@ from .observations import CAMERAS, STREAMS, Reading, check_names, proprioception
 Observation = dict[str, Reading]
 
 
-class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
     closed), at 100 Hz. They go to the controller as they are; oracles and people pass theirs through
-    `scengen.robots.teleop.Filter` first. Values outside [-1, 1] are clipped.
+    `scengen.control.teleop.Filter` first. Values outside [-1, 1] are clipped.
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
 
@@ -79,15 +78,15 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
         self.streams = {name: STREAMS[name] for name in observations if name in STREAMS}
         self.cameras = [name for name in observations if name in CAMERAS]
-        self._rows = {row["id"]: row for folder in _folders(pool) for row in _scenarios(folder, task)}
+        self._rows = {row.id: row for folder in _folders(pool) for row in _scenarios(folder, task)}
         if not self._rows:
             raise PoolError("no pool was given")
         self._order = list(self._rows)
         self._next = 0
         self._world: World | None = None
         self._eye: Camera | None = None
-        self._row: Row = self._rows[self._order[0]]
-        self.task_description = self._row["instruction"]
+        self._row: PoolRow = self._rows[self._order[0]]
+        self.task_description = self._row.instruction
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION,), np.float32)
         boxes: dict[str, spaces.Space[Any]] = {
             name: spaces.Box(-s.bound, s.bound, s.shape, np.float32) for name, s in self.streams.items()
@@ -115,9 +114,9 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._scenario
 
     @property
-    def values(self) -> dict[str, Value]:
+    def values(self) -> Mapping[str, Value]:
         """Parameter values of the running scenario, by name. Privileged like `scenario`."""
-        return self._row["values"]
+        return self._row.params
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -165,14 +164,14 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._eye.close()
             self._eye = None
 
-    def _load(self, row: Row) -> None:
-        if self._world is None or row["id"] != self._row["id"]:
+    def _load(self, row: PoolRow) -> None:
+        if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = World.load(row["scene_xml"], row["embodiment"], visual=self._sees)
-            self._scenario = with_values(self.task.family(), row["values"])
+            self._world = World.load(row.scene_xml, row.embodiment, visual=self._sees)
+            self._scenario = self.task.scenario(row.params)
         self._row = row
         self._world.reset()
-        self._episode = Episode(self._scenario, self._world, row["horizon"])
+        self._episode = Episode(self._scenario, self._world, row.horizon)
 
     @property
     def _sees(self) -> bool:
@@ -191,37 +190,25 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._eye.take(camera).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
-        names = ("split", "axes", "scene_sha256")
-        info = {"scenario": self._row["id"], **{name: self._row[name] for name in names}}
-        return {**info, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
+        row = self._row
+        about = {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
+        return {**about, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
 
 
 def _folders(pool: str | Path | Sequence[str | Path]) -> list[str | Path]:
     return [pool] if isinstance(pool, (str, Path)) else list(pool)
 
 
-def _scenarios(folder: str | Path, task: str) -> list[Row]:
-    """The rows of a pool without witnesses, their parameters parsed."""
+def _scenarios(folder: str | Path, task: str) -> list[PoolRow]:
+    """The rows of a pool without witnesses."""
     pool = Pool.open(folder).check()
-    check_versions(pool.manifest["versions"], str(folder))
-    columns = [
-        "id",
-        "task",
-        "split",
-        "axes",
-        "instruction",
-        "horizon",
-        "params",
-        "embodiment",
-        "scene_xml",
-        "scene_sha256",
-    ]
-    rows = list(pool.rows(columns))
+    check_versions(pool.versions, str(folder))
+    rows = list(pool.rows(witness=False))
     if not rows:
         raise PoolError(f"{folder} holds no scenario; see scengen generate")
-    if others := {row["task"] for row in rows} - {task}:
+    if others := {row.task for row in rows} - {task}:
         raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
-    return [{**row, "values": json.loads(row["params"])} for row in rows]
+    return rows
 
 
 def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
@@ -229,4 +216,4 @@ def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
 
 
 for _name in config.tasks():
-    gymnasium.register(f"scengen/{_name}-v0", "scengen.envs.gym:ScenarioEnv", kwargs={"task": _name})
+    gymnasium.register(f"scengen/{_name}-v0", "scengen.envs.gym:PoolEnv", kwargs={"task": _name})

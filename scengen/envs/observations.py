@@ -76,8 +76,8 @@ def _tactile(pad: str) -> Callable[[World], NDArray[np.float64]]:
             contact = world.data.contact[i]
             if geom in contact.geom:
                 mujoco.mj_contactForce(world.model, world.data, i, force)
-                place = frame.T @ (contact.pos - centre) / half
-                column, row = np.clip((TAXELS * (place[[0, 2]] + 1) / 2).astype(int), 0, TAXELS - 1)
+                spot = frame.T @ (contact.pos - centre) / half
+                column, row = np.clip((TAXELS * (spot[[0, 2]] + 1) / 2).astype(int), 0, TAXELS - 1)
                 grid[row, column] += abs(force[0])
         return grid
 

@@ -7,7 +7,6 @@ robosuite composes the model, its controller moves the robot, its clock steps th
 the scene, the suction cup, the events of the scene, and the verdict, which is the one of certification.
 """
 
-import json
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,8 +21,7 @@ from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
 from ..episode import Episode
 from ..errors import BadConfig, PoolError
-from ..params import with_values
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..robots.panda import Names
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World
@@ -42,12 +40,10 @@ ROBOT = "Panda"
 """robosuite's name of the robot that certificates speak of."""
 GRIPPERS = {JAW: "PandaGripper", SUCTION: "SuctionGripper"}
 """robosuite's names of the hands of our embodiments."""
-COLUMNS = ("id", "task", "split", "axes", "instruction", "horizon", "params", "embodiment", "scene_xml")
-"""What an environment needs to know of a scenario."""
 
 
-class ScenarioEnv(ManipulationEnv):
-    """The scenarios of one task as a robosuite environment; `environment` makes a class for each task.
+class RobosuiteEnv(ManipulationEnv):
+    """The scenarios of one task as a robosuite environment; `env_class` makes a class for each task.
 
     `reward` is 1 once the goal has been reached, else 0; `done` comes at the horizon alone, as everywhere in
     robosuite. `info` holds `scenario`, `success` and `reason`, why there is none and never will be.
@@ -62,7 +58,7 @@ class ScenarioEnv(ManipulationEnv):
 
     sim: Any
     """robosuite's simulation."""
-    row: Row
+    row: PoolRow
     """The scenario as its pool tells it."""
     scenario: Scenario
     """The scenario itself. Privileged: a policy that reads it knows what it should find out."""
@@ -74,7 +70,7 @@ class ScenarioEnv(ManipulationEnv):
     def __init__(
         self,
         robots: str | Sequence[str] = ROBOT,
-        scenario: Row | str | None = None,
+        scenario: PoolRow | str | None = None,
         pool: str | Path | None = None,
         use_object_obs: bool = True,
         gripper_types: str = "default",
@@ -135,10 +131,10 @@ class ScenarioEnv(ManipulationEnv):
     def _load_model(self) -> None:
         super()._load_model()
         self.row = self._choice[int(self.rng.integers(len(self._choice)))]
-        self.scenario = with_values(self.task.family(), json.loads(self.row["params"]))
+        self.scenario = self.task.scenario(self.row.params)
         robot = self.robots[0].robot_model
         robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF))
-        self.model = SceneTask(SceneModel(self.row["scene_xml"]), robot)
+        self.model = SceneTask(SceneModel(self.row.scene_xml), robot)
 
     def _initialize_sim(self, xml_string: str | None = None) -> None:
         super()._initialize_sim(xml_string)
@@ -174,7 +170,7 @@ class ScenarioEnv(ManipulationEnv):
         for controller in self.robots[0].part_controllers.values():
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
-        self.episode, self._substep = Episode(self.scenario, self.world, self.row["horizon"]), 0
+        self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon), 0
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Between mj_step1 and mj_step2, in every physics step."""
@@ -193,7 +189,7 @@ class ScenarioEnv(ManipulationEnv):
     def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
         reward, done, info = super()._post_action(action)
         success = self._check_success()
-        return reward, done, {**info, "scenario": self.row["id"], "success": success, "reason": self.episode.reason}
+        return reward, done, {**info, "scenario": self.row.id, "success": success, "reason": self.episode.reason}
 
     # --- the certificate's clock ----------------------------------------------------------
 
@@ -227,10 +223,10 @@ class ScenarioEnv(ManipulationEnv):
         return {f"{name}_pos": pos, f"{name}_quat": quat}
 
 
-del REGISTERED_ENVS[ScenarioEnv.__name__]  # only its subclasses have a task
+del REGISTERED_ENVS[RobosuiteEnv.__name__]  # only its subclasses have a task
 
 
-def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
+def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
     """The environment of a task, which robosuite then knows under the task's name in CamelCase.
 
     Args:
@@ -241,32 +237,31 @@ def environment(task: str, search: tuple[str, ...] = ()) -> type[ScenarioEnv]:
         BadConfig: robosuite has another environment of that name.
     """
     name = "".join(part.capitalize() for part in task.split("_"))
-    known = REGISTERED_ENVS.get(name, ScenarioEnv)
-    if not issubclass(known, ScenarioEnv):
+    known = REGISTERED_ENVS.get(name, RobosuiteEnv)
+    if not issubclass(known, RobosuiteEnv):
         raise BadConfig(f"task {task}: robosuite has an environment {name} of its own; rename the task")
     if (known.NAME, known.SEARCH) == (task, search):
         return known
-    about = f"Scenarios of the task {task}; see {ScenarioEnv.__name__}."
-    return type(name, (ScenarioEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
+    about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
+    return type(name, (RobosuiteEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
 
 
-def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> list[Row]:
+def _choice(task: str, scenario: PoolRow | str | None, pool: str | Path | None) -> list[PoolRow]:
     """The scenarios to draw from: one row, the one of a pool whose id begins with a text, or the whole pool.
 
     Raises:
         ScengenError: there is none, or one of another task or made with other versions.
     """
-    if isinstance(scenario, dict) and pool is None:
-        rows, where = [scenario], f"scenario {scenario['id']}"
-        made = json.loads(scenario["certificate"]["versions"])
-    elif pool is not None and not isinstance(scenario, dict):
+    if isinstance(scenario, PoolRow) and pool is None:
+        rows, where, made = [scenario], f"scenario {scenario.id}", scenario.certificate.versions
+    elif pool is not None and not isinstance(scenario, PoolRow):
         found = Pool.open(pool).check()
-        rows = list(found.rows(COLUMNS)) if scenario is None else [found.row(scenario)]
-        where, made = str(found.folder), found.manifest["versions"]
+        rows = list(found.rows(witness=False)) if scenario is None else [found.row(scenario)]
+        where, made = str(found.folder), found.versions
     else:
         raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
     check_versions(made, where)
-    if others := {row["task"] for row in rows} - {task}:
+    if others := {row.task for row in rows} - {task}:
         raise PoolError(f"{where} belongs to {', '.join(sorted(others))}, not to {task}")
     if not rows:
         raise PoolError(f"{where} holds no scenario; see scengen generate")
@@ -274,4 +269,4 @@ def _choice(task: str, scenario: Row | str | None, pool: str | Path | None) -> l
 
 
 for _name in config.tasks():
-    environment(_name)
+    env_class(_name)

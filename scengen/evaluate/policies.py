@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..control.teleop import Filter
-from ..envs.gym import Observation, ScenarioEnv
+from ..envs.gym import Observation, PoolEnv
+from ..episode import Actions
 from ..errors import BadConfig, GaveUp, UnknownName
-from ..pool import Row
+from ..params import Value
+from ..pool import PoolRow
 from ..samplers.task import Task
 from ..sim.world import IDLE
-from ..skills.motion import idle
-from ..validate.rollout import Actions
 
 
 class Policy(Protocol):
@@ -35,13 +35,13 @@ class Policy(Protocol):
         ...
 
 
-Factory = Callable[[ScenarioEnv], Policy]
+Factory = Callable[[PoolEnv], Policy]
 
 
 class Idle:
     """Does nothing: whatever it solves was no problem."""
 
-    def __init__(self, env: ScenarioEnv):
+    def __init__(self, env: PoolEnv):
         pass
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
@@ -55,7 +55,7 @@ class Idle:
 class Random:
     """Uniformly random actions."""
 
-    def __init__(self, env: ScenarioEnv):
+    def __init__(self, env: PoolEnv):
         self._random = np.random.default_rng()
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
@@ -70,12 +70,12 @@ class Random:
 class Oracle:
     """The task's own scripted solution. It reads the full state: an upper bound, no competitor."""
 
-    def __init__(self, env: ScenarioEnv):
+    def __init__(self, env: PoolEnv):
         self.env, self.filter = env, Filter()
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Begin the plan anew."""
-        self.plan = self.env.scenario.oracle(self.env.world)  # type: ignore[attr-defined]
+        self.plan = self.env.scenario.oracle(self.env.world)
         self.filter.reset()
 
     def act(self, observation: Observation) -> ArrayLike:
@@ -84,57 +84,57 @@ class Oracle:
             return self.filter(next(self.plan))
         except (StopIteration, GaveUp):
             self.plan = iter(())
-            return self.filter(idle(self.env.world))
+            return self.filter(self.env.world.idle)
 
 
 class Replay:
     """Plays the witness of the nearest training scenario other than the one at hand: what pure memory achieves."""
 
-    def __init__(self, env: ScenarioEnv, memory: Sequence[Row]):
+    def __init__(self, env: PoolEnv, memory: Sequence[PoolRow]):
         """
         Args:
-            memory: rows of training pools, with `values` and witnesses.
+            memory: rows of training pools with their witnesses.
 
         Raises:
             BadConfig: there are none for this task.
         """
         self.env = env
-        self.memory = [row for row in memory if row["task"] == env.task.name]
+        self.memory = [row for row in memory if row.task == env.task.name]
         if len(self.memory) < 2:
             raise BadConfig(f"policy replay needs a pool of {env.task.name} with split id and at least 2 scenarios")
-        self.places = np.array([place(env.task, row["values"]) for row in self.memory])
+        self.points = np.array([coordinates(env.task, row.params) for row in self.memory])
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Look up the nearest actions."""
-        here = place(self.env.task, self.env.values)
-        far = np.linalg.norm(self.places - here, axis=1)
-        far[[row["id"] == info["scenario"] for row in self.memory]] = np.inf
-        self.rows: Actions = self.memory[int(far.argmin())]["witness"]
+        """Look up the nearest witness."""
+        here = coordinates(self.env.task, self.env.values)
+        far = np.linalg.norm(self.points - here, axis=1)
+        far[[row.id == info["scenario"] for row in self.memory]] = np.inf
+        self.actions: Actions = self.memory[int(far.argmin())].witness
         self.next = 0
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The actions's next row; idle when it is over."""
-        if self.next == len(self.rows):
-            return idle(self.env.world)
+        """The witness's next action; idle when it is over."""
+        if self.next == len(self.actions):
+            return self.env.world.idle
         self.next += 1
-        return self.rows[self.next - 1]
+        return self.actions[self.next - 1]
 
 
 BUILT_IN: dict[str, Factory] = {"idle": Idle, "random": Random, "oracle": Oracle}
 REPLAY = "replay"
 
 
-def place(task: Task, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Where a scenario lies among the parameters that training varies, each in units of its training range."""
-    coordinates = []
+def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:
+    """The parameters of a scenario that training varies, each in units of its training range."""
+    found = []
     for name, dist in task.training.items():
         low, high = min(i.low for i in dist.support), max(i.high for i in dist.support)
         if high > low:
-            coordinates.append((values[name] - low) / (high - low))
-    return np.array(coordinates)
+            found.append((values[name] - low) / (high - low))
+    return np.array(found)
 
 
-def find(name: str, memory: Sequence[Row] = ()) -> Factory:
+def find(name: str, memory: Sequence[PoolRow] = ()) -> Factory:
     """The factory of a policy: a built-in name, or `module:factory` from the path or the working directory.
 
     Raises:

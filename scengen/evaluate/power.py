@@ -12,7 +12,7 @@ _NORMAL = NormalDist()
 
 
 @dataclass(frozen=True)
-class Plan:
+class PowerAnalysis:
     """A comparison of two success rates, each over `seeds` scenarios with `rollouts` rollouts.
 
     Two-sided z test of two proportions (Fleiss, Levin and Paik 2003, ch. 4) with Kish's design effect: rollouts of one
@@ -74,11 +74,11 @@ class Plan:
         return math.sqrt(max(0.0, (a + b) / self.effective - together))
 
 
-def seeds_for(plan: Plan, before: float, drop: float, most: int = 100_000) -> int | None:
+def seeds_for(analysis: PowerAnalysis, before: float, drop: float, most: int = 100_000) -> int | None:
     """Fewest scenarios per split for which a drop is found with the wanted power; None if `most` are too few."""
 
     def enough(seeds: int) -> bool:
-        return replace(plan, seeds=seeds).chance(before, before - drop) >= plan.power
+        return replace(analysis, seeds=seeds).chance(before, before - drop) >= analysis.power
 
     if not enough(most):
         return None

@@ -4,22 +4,21 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..envs.gym import ScenarioEnv
+from ..envs.gym import PoolEnv
 from ..envs.observations import check_names
 from ..errors import BadConfig, ScengenError, at_least
 from ..parallel import each
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..runs.log import Log
 from ..samplers.keyed import unit
-from ..samplers.task import ID
+from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, rate
 from .policies import REPLAY, Policy, find
 
@@ -58,9 +57,9 @@ class Settings:
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
 
 
-@dataclass(frozen=True)
-class Job:
-    """One rollout to do."""
+@dataclass(frozen=True, order=True)
+class RolloutId:
+    """Which rollout: number `rollout` of a scenario."""
 
     task: str
     pool: str
@@ -92,21 +91,18 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
     """
     settings.check()
     pools = [Pool.open(folder).check() for folder in settings.folders]
-    rows = [row for pool in pools for row in _chosen(pool, settings.seeds)]
-    jobs = [Job(r["task"], r["pool"], r["id"], k) for r in rows for k in range(settings.rollouts)]
-    about = {(r["pool"], r["id"]): {k: r[k] for k in ("task", "category", "split")} for r in rows}
+    about: dict[tuple[str, str], dict[str, Any]] = {}
+    for pool in pools:
+        about |= _chosen(pool, settings.seeds)
+    wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     with Log(settings.folder / "episodes.jsonl", _identity(settings, pools)) as log:
-        done = {(e["pool"], e["scenario"], e["rollout"]) for e in log.records}
-        todo = [job for job in jobs if (job.pool, job.scenario, job.rollout) not in done]
-        todo.sort(key=lambda job: job.task)  # a worker then changes its environment seldom
-        progress(len(jobs) - len(todo), len(jobs))
-        results = each(_play, todo, settings.workers, _begin, (settings,))
-        for count, episode in enumerate(results, len(jobs) - len(todo) + 1):
+        todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `Stage`
+        progress(len(wanted) - len(todo), len(wanted))
+        for count, episode in enumerate(each(Stage(settings), todo, settings.workers), len(wanted) - len(todo) + 1):
             log.add({**about[episode["pool"], episode["scenario"]], **episode})
-            progress(count, len(jobs))
-        wanted = {(j.pool, j.scenario, j.rollout) for j in jobs}
+            progress(count, len(wanted))
         return sorted(
-            (e for e in log.records if (e["pool"], e["scenario"], e["rollout"]) in wanted),
+            (e for e in log.records if _id(e) in wanted),
             key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
         )
 
@@ -173,11 +169,19 @@ def _spelled(rate: Rate | Difference | None, sign: str = "") -> str:
     return f"{100 * rate.value:{sign}.1f} [{100 * rate.low:{sign}.1f}, {100 * rate.high:{sign}.1f}]"
 
 
-def _chosen(pool: Pool, seeds: int) -> list[Row]:
+def _id(episode: Mapping[str, Any]) -> RolloutId:
+    return RolloutId(**{f.name: episode[f.name] for f in fields(RolloutId)})
+
+
+def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
+    """Task, category and split of the first scenarios of a pool, by the pool's folder and their ids."""
     if len(pool) < seeds:
         raise BadConfig(f"seeds = {seeds}, but {pool.folder} holds {len(pool)} scenarios; say seeds={len(pool)}")
-    rows = pool.rows(["id", "task", "category", "split"])
-    return [{**row, "pool": str(pool.folder)} for row in itertools.islice(rows, seeds)]
+    rows = itertools.islice(pool.columns("id", "task", "category", "split"), seeds)
+    return {
+        (str(pool.folder), id_): {"task": task, "category": category, "split": split}
+        for id_, task, category, split in rows
+    }
 
 
 def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
@@ -186,56 +190,52 @@ def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
-# --- in a worker process ----------------------------------------------------------------------
+class Stage:
+    """Plays rollouts: one environment and one policy at a time, kept as long as the task stays the same."""
+
+    def __init__(self, settings: Settings):
+        self.settings = settings
+        self._running: tuple[PoolEnv, Policy] | None = None
+
+    def __call__(self, which: RolloutId) -> dict[str, Any]:
+        """One rollout, from reset to its end.
+
+        Raises:
+            BadPolicy: the policy gave something that is no action.
+        """
+        env, policy = self._prepared(which.task)
+        observation, info = env.reset(options={"scenario": which.scenario})
+        policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
+        over = False
+        while not over:
+            action = np.asarray(policy.act(observation))
+            try:
+                observation, _, terminated, truncated, info = env.step(action)
+            except ValueError as error:
+                raise BadPolicy(f"policy {self.settings.policy} on scenario {which.scenario}: {error}") from None
+            over = terminated or truncated
+        return {
+            "pool": which.pool,
+            "scenario": which.scenario,
+            "rollout": which.rollout,
+            "success": bool(info["success"]),
+            "reason": info["reason"],
+            "seconds": round(info["time"], 3),
+        }
+
+    def _prepared(self, task: str) -> tuple[PoolEnv, Policy]:
+        if self._running and self._running[0].task.name != task:
+            self._running[0].close()
+            self._running = None
+        if not self._running:
+            settings = self.settings
+            folders = [f for f in settings.folders if (task,) in Pool.open(f).columns("task")]
+            env = PoolEnv(task, folders, settings.observations, width=settings.width, height=settings.height)
+            memory = list(_training(folders)) if settings.policy == REPLAY else []
+            self._running = env, find(settings.policy, memory)(env)
+        return self._running
 
 
-_settings: Settings
-_running: dict[str, tuple[ScenarioEnv, Policy]] = {}
-
-
-def _begin(settings: Settings) -> None:
-    global _settings
-    _settings = settings
-    _running.clear()
-
-
-def _play(job: Job) -> dict[str, Any]:
-    """One rollout, from reset to its end."""
-    if job.task not in _running:
-        for env, _ in _running.values():
-            env.close()
-        _running.clear()
-        _running[job.task] = _prepare(job.task)
-    env, policy = _running[job.task]
-    observation, info = env.reset(options={"scenario": job.scenario})
-    policy.reset(observation, info, int(2**31 * unit("rollout", job.scenario, job.rollout)))
-    over, total = False, 0.0
-    while not over:
-        action = np.asarray(policy.act(observation))
-        try:
-            observation, reward, terminated, truncated, info = env.step(action)
-        except ValueError as error:
-            raise BadPolicy(f"policy {_settings.policy} on scenario {job.scenario}: {error}") from None
-        over, total = terminated or truncated, total + reward
-    return {
-        "pool": job.pool,
-        "scenario": job.scenario,
-        "rollout": job.rollout,
-        "success": bool(info["success"]),
-        "reason": info["reason"],
-        "seconds": round(info["time"], 3),
-    }
-
-
-def _prepare(task: str) -> tuple[ScenarioEnv, Policy]:
-    folders = [f for f in _settings.folders if any(r["task"] == task for r in Pool.open(f).rows(["task"]))]
-    env = ScenarioEnv(task, folders, _settings.observations, width=_settings.width, height=_settings.height)
-    memory = list(_training(folders)) if _settings.policy == REPLAY else []
-    return env, find(_settings.policy, memory)(env)
-
-
-def _training(folders: Sequence[str]) -> Iterator[Row]:
+def _training(folders: Sequence[str]) -> Iterator[PoolRow]:
     for folder in folders:
-        for row in Pool.open(folder).rows(["id", "task", "split", "params", "witness"]):
-            if row["split"] == ID:
-                yield {**row, "values": json.loads(row["params"])}
+        yield from (row for row in Pool.open(folder).rows() if row.split == ID)

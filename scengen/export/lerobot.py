@@ -34,8 +34,8 @@ FILES = 1000
 """Files in a folder "chunk-..."."""
 DATA_SIZE, VIDEO_SIZE = 100, 200
 """A file is full at this size [MiB]."""
-PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-DATA, VIDEO, EPISODES = f"data/{PLACE}.parquet", f"videos/{{video_key}}/{PLACE}.mp4", f"meta/episodes/{PLACE}.parquet"
+FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+DATA, VIDEO, EPISODES = f"data/{FILE}.parquet", f"videos/{{video_key}}/{FILE}.mp4", f"meta/episodes/{FILE}.parquet"
 KEY_EVERY = 2
 """Every second frame is stored whole, as LeRobot does, so that training reaches single frames quickly."""
 IMAGES = "observation.images."
@@ -141,10 +141,10 @@ class DataSet:
             "episode_index": len(self.episodes),
             "tasks": [instruction],
             "length": length,
-            **_place("data", self._file),
+            **_whereabouts("data", self._file),
             "dataset_from_index": self.rows,
             "dataset_to_index": self.rows + length,
-            **_place("meta/episodes", 0),
+            **_whereabouts("meta/episodes", 0),
             **about,
         }
         self._write(columns)
@@ -158,8 +158,8 @@ class DataSet:
     def finish(self) -> None:
         """Write everything under meta."""
         self._close()
-        place = EPISODES.format(chunk_index=0, file_index=0)
-        _write_table(self.folder / place, pa.Table.from_pylist(self.episodes))
+        path = EPISODES.format(chunk_index=0, file_index=0)
+        _write_table(self.folder / path, pa.Table.from_pylist(self.episodes))
         _write_table(self.folder / "meta" / "tasks.parquet", _task_table(self.tasks))
         for name, calibration in self._cameras.items():
             _write_json(self.folder / "meta" / "cameras" / f"{name}.json", calibration)
@@ -253,7 +253,7 @@ class _Video:
         self.all += self.shades
         self.shades = Shades()
         where = {
-            **_place(f"videos/{self.key}", self._file),
+            **_whereabouts(f"videos/{self.key}", self._file),
             f"videos/{self.key}/from_timestamp": self._first / self.fps,
             f"videos/{self.key}/to_timestamp": self._movie.frames / self.fps,
         }
@@ -274,7 +274,7 @@ def _numbers(file: int) -> dict[str, int]:
     return {"chunk_index": chunk, "file_index": number}
 
 
-def _place(what: str, file: int) -> dict[str, int]:
+def _whereabouts(what: str, file: int) -> dict[str, int]:
     return {f"{what}/{name}": number for name, number in _numbers(file).items()}
 
 

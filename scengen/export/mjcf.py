@@ -7,12 +7,12 @@ from pathlib import Path
 import mujoco
 
 from ..errors import BadConfig
-from ..pool import Row
+from ..pool import PoolRow
 from ..robots import panda
 from ..sim.world import compose
 
 
-def export(row: Row, folder: Path, robot: bool) -> None:
+def export(row: PoolRow, folder: Path, robot: bool) -> None:
     """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
 
     The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In
@@ -21,18 +21,18 @@ def export(row: Row, folder: Path, robot: bool) -> None:
     Raises:
         BadConfig: the folder cannot be written.
     """
-    target = folder / row["id"]
+    target = folder / row.id
     try:
         target.mkdir(parents=True, exist_ok=True)
-        (target / "scene.xml").write_text(row["scene_xml"])
+        (target / "scene.xml").write_text(row.scene_xml)
         if robot:
             (target / "scene_with_robot.xml").write_text(_with_robot(row, target))
     except OSError as error:
         raise BadConfig(f"{target} cannot be written: {error.strerror}") from None
 
 
-def _with_robot(row: Row, target: Path) -> str:
-    spec = compose(row["scene_xml"], row["embodiment"], visual=True)
+def _with_robot(row: PoolRow, target: Path) -> str:
+    spec = compose(row.scene_xml, row.embodiment, visual=True)
     _add_home(spec)
     root = ET.fromstring(spec.to_xml())
     meshes = target.parent / "meshes"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..envs.observations import Stream
 from ..episode import Actions, Episode
 from ..pictures.render import Picture
-from ..pool import Row
+from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 
@@ -54,7 +54,7 @@ class Moment:
 def play(
     world: World,
     scenario: Scenario,
-    row: Row,
+    row: PoolRow,
     every: int,
     streams: Mapping[str, Stream],
     pictures: Callable[[], dict[str, Picture]],
@@ -69,7 +69,7 @@ def play(
         pictures: takes the pictures of that moment.
     """
     world.reset()
-    episode, over, recorded = Episode(scenario, world, row["horizon"]), None, iter(row["witness"])
+    episode, over, recorded = Episode(scenario, world, row.horizon), None, iter(row.witness)
     while over is None:
         seen = {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
         taken, done = pictures(), []

@@ -1,8 +1,8 @@
 """Recordings: witnesses played again and written as a LeRobot data set, with the paper's streams.
 
 LeRobot gives a data set one rate, `fps`. A row is what was seen at one moment and what was done from then to the next
-row: with 25 rows a second, in four control periods. Nothing of the witness gets lost: `actions` holds the actions of all
-control periods of the row, exactly as the controller received them. They have passed the teleoperation filter; an
+row: with 25 rows a second, in four control periods. Nothing of the witness gets lost: `actions` holds what the
+controller received in all control periods of the row. These actions have passed the teleoperation filter; an
 environment takes them as they are.
 """
 
@@ -20,7 +20,7 @@ from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
@@ -112,9 +112,9 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
         failed = []
         with DataSet(settings.unfinished, settings.fps, robot, features, settings.eyes, size) as data:
             for row in islice(chain.from_iterable(pool.rows() for pool in pools), count):
-                scenario = find_task(row["task"]).scenario(row["params"])
+                scenario = find_task(row.task).scenario(row.params)
                 if not _episode(data, row, scenario, settings, streams):
-                    failed.append(row["id"])
+                    failed.append(row.id)
                 progress(len(data.episodes), count)
         source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
         (settings.unfinished / "meta" / "scengen.json").write_text(json.dumps(source, indent=1) + "\n")
@@ -125,18 +125,19 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
     return Summary(len(data.episodes), data.rows, tuple(failed))
 
 
-def _episode(data: DataSet, row: Row, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:
+def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:
     """Add one scenario's episode, and say whether it reached the goal."""
-    world, success = World.load(row["scene_xml"], row["embodiment"], visual=bool(settings.eyes)), False
+    world, success = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes)), False
     with ExitStack() as stack:
         pictures = _camera(stack, world, settings)
         for name in settings.eyes:
-            data.calibrate(name, calibration(world, CAMERAS[name], settings.width, settings.height), row["id"])
+            data.calibrate(name, calibration(world, CAMERAS[name], settings.width, settings.height), row.id)
         for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
-            data.add(moment.values(proprioception(row["embodiment"])), moment.pictures)
+            data.add(moment.values(proprioception(row.embodiment)), moment.pictures)
             success = moment.success
-    about = {f"scengen/{name}": row[name] for name in ABOUT}
-    data.end_episode(row["instruction"], {**about, "scengen/success": success})
+    columns = row.plain()
+    about = {f"scengen/{name}": columns[name] for name in ABOUT}
+    data.end_episode(row.instruction, {**about, "scengen/success": success})
     return success
 
 
@@ -169,8 +170,8 @@ def _robot(pools: list[Pool]) -> str:
     """The one embodiment of all scenarios."""
     robots = set()
     for pool in pools:
-        check_versions(pool.manifest["versions"], str(pool.folder))
-        robots |= {row["embodiment"] for row in pool.rows(["embodiment"])}
+        check_versions(pool.versions, str(pool.folder))
+        robots |= {embodiment for (embodiment,) in pool.columns("embodiment")}
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
     if len(robots) > 1:

@@ -1,4 +1,4 @@
-"""What a shift does to behaviour: replays that solve training scenarios are played in their OOD twins."""
+"""What a shift does to behaviour: witnesses of training scenarios are replayed in their OOD twins."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -6,16 +6,18 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from ..episode import Actions
 from ..errors import Infeasible
 from ..parallel import each
 from ..runs.log import Log
-from ..samplers.task import ID, Task
+from ..samplers.split import ID
+from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
 from ..statistics import wilson
 from ..validate.identity import source_sha256
-from ..validate.rollout import Actions, Episode, replay, run
+from ..validate.rollout import Rollout, replay, run
 
 EXTRAPOLATION = "true extrapolation"
 COSMETIC = "cosmetic"
@@ -36,11 +38,11 @@ class Trial:
 
     index: int
     replay: bool
-    """Whether the actions that solve its ID twin solve it."""
+    """Whether the actions that solve its ID twin solve it too."""
     oracle: bool
     """Whether its oracle solves it; False too if the scenario is infeasible."""
     reason: str
-    """Why the actions failed; or why there is no scenario."""
+    """Why the replay failed; or why there is no scenario."""
 
     @property
     def kind(self) -> str:
@@ -68,15 +70,15 @@ def try_twins(
     workers: int = 1,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Trial]:
-    """Play ID witnesses in the first n scenarios of a split, continuing what stands in `folder`.
+    """Replay ID witnesses in the first n scenarios of a split, continuing what stands in `folder`.
 
     Twins that their own oracle cannot solve have no actions and are left out.
 
     Args:
         progress: told how many twins are done.
     """
-    moves = {name: str(dist) for name, dist in task.shifts(split).items()}
-    identity = {"task": task.name, "split": split, "moves": moves, "seed": seed, "source": source_sha256(task.family)}
+    shifts = {name: str(dist) for name, dist in task.shifts(split).items()}
+    identity = {"task": task.name, "split": split, "shifts": shifts, "seed": seed, "source": source_sha256(task.family)}
     with Log(folder / "behaviour.jsonl", identity) as log:
         todo = sorted(set(range(n)) - {r["index"] for r in log.records})
         for trial in each(partial(_try_twin, task, split, seed), todo, workers):
@@ -94,11 +96,11 @@ def shares(trials: Iterable[Trial]) -> list[Share]:
     return [Share(kind, k, k / n, *wilson(k / n, n)) for kind, k in counts.items()] if n else []
 
 
-def attempt(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool, str]:
-    """Whether a actions and whether the oracle solve a scenario, and why the actions does not."""
+def try_both(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool, str]:
+    """Whether recorded actions and whether the oracle solve a scenario, and why the replay does not."""
     world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
-    played = replay(scenario, world, actions, task.horizon, until_settled=True)
-    return played.solved, _solution(scenario, world, task.horizon).solved, played.reason
+    replayed = replay(scenario, world, actions, task.horizon, until_settled=True)
+    return replayed.solved, _solution(scenario, world, task.horizon).solved, replayed.reason
 
 
 def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
@@ -109,21 +111,21 @@ def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
 @cache
 def _actions(scenario: Scenario, horizon: float, embodiment: str) -> Actions | None:
     world = World.load(scene_text.emit(scenario.build())[0], embodiment)
-    episode = _solution(scenario, world, horizon)
-    return episode.actions if episode.solved else None
+    rollout = _solution(scenario, world, horizon)
+    return rollout.actions if rollout.solved else None
 
 
-def _solution(scenario: Scenario, world: World, horizon: float) -> Episode:
-    return run(scenario, world, scenario.oracle, horizon, until_settled=True)  # type: ignore[attr-defined]
+def _solution(scenario: Scenario, world: World, horizon: float) -> Rollout:
+    return run(scenario, world, scenario.oracle, horizon, until_settled=True)
 
 
 def _try_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """One trial as plain data; `actions` is None where there is no actions to try."""
+    """One trial as plain data; `replay` is None where the twin's oracle gave no actions."""
     found: tuple[bool | None, bool, str]
     actions = twin_actions(task, seed, index)
     try:
         scenario = task.draw(split, seed, index).scenario
-        found = attempt(task, actions, scenario) if actions is not None else (None, False, "")
+        found = try_both(task, actions, scenario) if actions is not None else (None, False, "")
     except Infeasible as error:
         found = False, False, str(error)
     return {"index": index, **dict(zip(("replay", "oracle", "reason"), found, strict=True))}

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from matplotlib.figure import Figure
 
 from ..analysis import distance
@@ -15,12 +14,13 @@ from ..analysis.space import of_features
 from ..errors import UnknownName, at_least
 from ..pictures import film, render
 from ..pictures.plots import svg
-from ..pictures.report import thumbnail
-from ..pool import Pool, Row
+from ..pictures.report import template, thumbnail
+from ..pool import Pool, PoolRow
 from ..runs import generate
 from ..samplers.axis import Proof, spell
+from ..samplers.split import ID
 from ..samplers.support import Support
-from ..samplers.task import ID, Task
+from ..samplers.task import Task
 from ..sim import scene_text
 from ..validate.settings import CertifySettings
 from . import behaviour, boundary, features
@@ -67,7 +67,7 @@ class Card:
     """How many of them were certified as first drawn."""
     behaviour: list[behaviour.Share]
     boundaries: dict[str, boundary.Boundary]
-    no_way: str
+    why_no_path: str
     """Why there are no boundaries; empty if there are."""
     energy: distance.Energy
     """Between the features of the first n twins in and out of distribution, in ranges of training."""
@@ -81,8 +81,7 @@ class Card:
 
 def make(
     task: Task,
-    node: Mapping[str, Any],
-    level: CertifySettings,
+    certify: CertifySettings,
     settings: Settings,
     folder: Path,
     progress: Callable[[str, int, int], None],
@@ -90,7 +89,7 @@ def make(
     """Gather all evidence and write `card.html` and `card.json`, continuing what stands in `folder`.
 
     Args:
-        node: the resolved configuration, as for `generate`.
+        certify: settings of the certificates.
         progress: told what is being done, how far it is, and how much there is.
 
     Returns:
@@ -98,12 +97,15 @@ def make(
     """
     name, n, seed = settings.axis, settings.n, settings.seed
     wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
-    made = generate.generate(task, node, level, wanted, lambda done, *_: progress("certify twins", done, n))
+    made = generate.generate(task, certify, wanted, lambda done, *_: progress("certify twins", done, n))
     trials = behaviour.try_twins(
-        task, name, folder, n, seed, settings.workers, lambda done: progress("play ID witnesses", done, n)
+        task, name, folder, n, seed, settings.workers, lambda done: progress("replay ID witnesses", done, n)
     )
-    boundaries, no_way = _boundaries(task, name, folder, seed, settings.rounds, progress)
-    twins = [(task.draw(ID, seed, row["index"]).scenario, task.scenario(row["params"])) for row in made.pool.rows()]
+    boundaries, why_no_path = _boundaries(task, name, folder, seed, settings.rounds, progress)
+    twins = [
+        (task.draw(ID, seed, index).scenario, task.scenario(params))
+        for index, params in made.pool.columns("index", "params")
+    ]
     training, here = [t for t, _ in twins], [s for _, s in twins]
     space = of_features(task, training, here)
     evidence = features.sampled(task, name)
@@ -122,7 +124,7 @@ def make(
         made.first_draws,
         behaviour.shares(trials),
         boundaries,
-        no_way,
+        why_no_path,
         distance.energy(space.points(training), space.points(here)),
     )
     (folder / "card.json").write_text(json.dumps(card.plain(), indent=1) + "\n")
@@ -133,7 +135,7 @@ def _boundaries(
     task: Task, name: str, folder: Path, seed: int, rounds: int, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, boundary.Boundary], str]:
     """Both boundaries, or why there are none."""
-    if reason := boundary.no_way(task, task.axes[name]):
+    if reason := boundary.why_no_path(task, task.axes[name]):
         return {}, reason
     found = boundary.search(
         task, name, folder, seed, rounds, lambda done, total: progress("search boundaries", done, total)
@@ -149,19 +151,18 @@ def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
     remark, pairs, strips = "", [], []
     try:
         rows = [row for row, _ in zip(pool.rows(), range(SHOWN), strict=False)]
-        pairs = [(row["index"], _picture(task, seed, row["index"]), thumbnail(row)) for row in rows]
+        pairs = [(row.index, _picture(task, seed, row.index), thumbnail(row.scene_xml, row.embodiment)) for row in rows]
         strips = [*_strips(task, rows[0])] if rows else []
     except render.NoPictures as error:
         remark = str(error)
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "pictures/templates"), autoescape=True)
-    page = environment.get_template("axis_card.html").render(
+    page = template("axis_card.html").render(
         card=card,
         task=task,
         axis=task.axes[card.axis],
         spell=spell,
         steps=("proposed", *generate.STAGES),
-        bars=svg(_bars(task, card)),
-        way=svg(_way(card)) if card.boundaries else "",
+        supports=svg(_supports(task, card)),
+        path=svg(_path(card)) if card.boundaries else "",
         pairs=pairs,
         strips=strips,
         remark=remark,
@@ -172,29 +173,28 @@ def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
 
 def _picture(task: Task, seed: int, index: int) -> str:
     """The training twin, as a data address for HTML."""
-    scene = scene_text.emit(task.draw(ID, seed, index).scenario.build())[0]
-    return thumbnail({"scene_xml": scene, "embodiment": task.embodiment})
+    return thumbnail(scene_text.emit(task.draw(ID, seed, index).scenario.build())[0], task.embodiment)
 
 
-def _strips(task: Task, row: Row) -> list[tuple[str, str]]:
-    """Film strips of a witness, and of the shortcut that comes closest: the one whose episode lasts longest."""
-    scenario = task.scenario(row["params"])
+def _strips(task: Task, row: PoolRow) -> list[tuple[str, str]]:
+    """Film strips of a witness, and of the shortcut that lasts longest."""
+    scenario = task.scenario(row.params)
     tried = {name: film.shortcut(row, scenario, name) for name in scenario.shortcuts()}
     takes = [("the witness", film.Take.witness(row, scenario))]
     if tried:
-        name, (take, episode) = max(tried.items(), key=lambda item: item[1][1].seconds)
-        takes.append((f"the shortcut “{name}”: {episode.reason}", take))
+        name, (take, rollout) = max(tried.items(), key=lambda item: item[1][1].seconds)
+        takes.append((f"the shortcut {name}: {rollout.reason}", take))
     return [(title, render.address(render.encode(film.strip(take)), "webp")) for title, take in takes]
 
 
-def _bars(task: Task, card: Card) -> Figure:
+def _supports(task: Task, card: Card) -> Figure:
     """Both supports of every parameter that moves, each in its own range."""
-    moved = task.axes[card.axis].replace
-    figure = Figure(figsize=(7.5, 0.5 + 0.55 * len(moved)))
-    axes = figure.subplots(len(moved), 1, squeeze=False)[:, 0]
-    for plot, (name, dist) in zip(axes, moved.items(), strict=True):
-        _support(plot, task.training[name].support, 0.62, "#4a7fb5")
-        _support(plot, dist.support, 0.38, "#b5524a")
+    shifts = task.axes[card.axis].replace
+    figure = Figure(figsize=(7.5, 0.5 + 0.55 * len(shifts)))
+    axes = figure.subplots(len(shifts), 1, squeeze=False)[:, 0]
+    for plot, (name, dist) in zip(axes, shifts.items(), strict=True):
+        _draw(plot, task.training[name].support, 0.62, "#4a7fb5")
+        _draw(plot, dist.support, 0.38, "#b5524a")
         plot.set(yticks=[], ylim=(0.1, 0.9))
         unit = f" [{task.known[name].unit}]" if task.known[name].unit else ""
         plot.set_ylabel(name + unit, rotation=0, ha="right", va="center")
@@ -203,7 +203,7 @@ def _bars(task: Task, card: Card) -> Figure:
     return figure
 
 
-def _support(plot: Any, support: Support, y: float, colour: str) -> None:
+def _draw(plot: Any, support: Support, y: float, colour: str) -> None:
     for part in support:
         if part.low == part.high:
             plot.plot(part.low, y, "o", color=colour, markersize=7)
@@ -211,8 +211,8 @@ def _support(plot: Any, support: Support, y: float, colour: str) -> None:
             plot.plot([part.low, part.high], [y, y], color=colour, linewidth=7, solid_capstyle="butt")
 
 
-def _way(card: Card) -> Figure:
-    """Where actions and oracle die on the way of the axis."""
+def _path(card: Card) -> Figure:
+    """Where replay and oracle fail on the path of the axis."""
     figure = Figure(figsize=(7.5, 1.5))
     plot = figure.subplots()
     end = max(b.end for b in card.boundaries.values())
@@ -223,7 +223,7 @@ def _way(card: Card) -> Figure:
         plot.plot([low, high], [y, y], color="#555", linewidth=7, alpha=0.35, solid_capstyle="butt")
         plot.plot(middle, y, "x" if middle < end else ">", color="#222", markersize=8)
     plot.set(yticks=range(len(card.boundaries)), yticklabels=list(card.boundaries), ylim=(-0.6, 1.6), xlim=(0, end))
-    plot.set_xlabel("way: 0 the edge of training, 1 the far end of the axis, on to the bounds of the parameters")
+    plot.set_xlabel("path: 0 the edge of training, 1 the far end of the axis, on to the bounds of the parameters")
     plot.spines[["right", "top"]].set_visible(False)
     if not math.isclose(end, 1.0):
         plot.axvline(1.0, color="#b5524a", lw=1)

@@ -6,7 +6,8 @@ from scipy.stats import beta
 
 from ..errors import BadConfig, Infeasible
 from ..params import values
-from ..samplers.task import ID, Task
+from ..samplers.split import ID
+from ..samplers.task import Task
 from ..scenario import Scenario
 
 CONFIDENCE = 0.95
@@ -78,15 +79,15 @@ def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Eviden
     twins = _twins(task, split, draws, seed)
     if not twins:
         raise BadConfig(f"{task.name}/{split}: none of {draws} indices is feasible; widen the distributions")
-    moved = task.shifts(split)
+    shifts = task.shifts(split)
     before, after = [values(t) for t, _ in twins], [values(s) for _, s in twins]
     differ = [{n for n in a if a[n] != b[n]} for a, b in zip(before, after, strict=True)]
     here = [dict(s.features()) for _, s in twins]
     there = [dict(t.features()) for t, _ in twins]
     return Evidence(
         tuple(departure(name, [f[name] for f in there], [f[name] for f in here]) for name in here[0]),
-        tuple(sorted(set[str]().union(*differ) - moved.keys())),
-        tuple(sorted(n for n in moved if any(n not in d for d in differ))),
+        tuple(sorted(set[str]().union(*differ) - shifts.keys())),
+        tuple(sorted(n for n in shifts if any(n not in d for d in differ))),
     )
 
 

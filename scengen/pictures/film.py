@@ -10,10 +10,10 @@ import numpy as np
 from ..control.loop import Loop
 from ..episode import Actions, Episode
 from ..errors import UnknownName
-from ..pool import Row
+from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.rollout import Rollout, run
+from ..validate.rollout import Rollout, try_shortcut
 from .render import Camera, Picture
 from .video import Movie
 
@@ -32,9 +32,9 @@ class Take:
     actions: Actions
 
     @classmethod
-    def witness(cls, row: Row, scenario: Scenario) -> "Take":
+    def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
         """The witness of a scenario in a pool."""
-        return cls(scenario, row["scene_xml"], row["embodiment"], row["witness"])
+        return cls(scenario, row.scene_xml, row.embodiment, row.witness)
 
     @property
     def seconds(self) -> float:
@@ -56,18 +56,18 @@ class Take:
             yield period
 
 
-def shortcut(row: Row, scenario: Scenario, name: str) -> tuple[Take, Rollout]:
-    """One of the tempting plans of a scenario, and what comes of it.
+def shortcut(row: PoolRow, scenario: Scenario, name: str) -> tuple[Take, Rollout]:
+    """One of the tempting plans of a scenario, and what comes of it: what its certificate saw.
 
     Raises:
         UnknownName: the scenario has no shortcut of that name.
     """
-    planners = scenario.shortcuts()
-    if name not in planners:
-        raise UnknownName("plan", name, [WITNESS, *planners])
-    world = World.load(row["scene_xml"], row["embodiment"])
-    rollout = run(scenario, world, planners[name], row["horizon"], until_settled=True)
-    return Take(scenario, row["scene_xml"], row["embodiment"], rollout.actions), rollout
+    shortcuts = scenario.shortcuts()
+    if name not in shortcuts:
+        raise UnknownName("shortcut", name, [WITNESS, *shortcuts])
+    world = World.load(row.scene_xml, row.embodiment)
+    rollout = try_shortcut(scenario, world, shortcuts[name], row.horizon, row.certificate.settle or 0.0)
+    return Take(scenario, row.scene_xml, row.embodiment, rollout.actions), rollout
 
 
 def strip(take: Take, frames: int = 8, width: int = 320, height: int = 240, camera: str | None = None) -> Picture:

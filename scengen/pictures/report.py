@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 from rich.table import Table
 
-from ..pool import Pool, Row
+from ..pool import Pool, PoolRow
 from ..runs.generate import STAGES, Summary
 from ..samplers.axis import spell
 from ..samplers.dists import Fixed
@@ -48,34 +48,31 @@ def summary_lines(summary: Summary) -> list[str]:
 
 def pool_table(pool: Pool) -> Table:
     """One line per scenario, with the parameters that differ from one to another."""
-    rows = [(row, json.loads(row["params"])) for row in pool.rows(["id", "index", "shifted", "params"])]
-    first = rows[0][1] if rows else {}
-    drawn = [name for name in first if any(params[name] != first[name] for _, params in rows)]
-    split = pool.manifest["config"]["split"]
-    table = Table("id", "index", "parameters", title=f"{pool.folder}: {split}", title_justify="left")
-    for row, params in rows:
-        shown = [name for name in params if name in drawn or name in json.loads(row["shifted"])]
-        table.add_row(row["id"], str(row["index"]), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
+    rows = list(pool.columns("id", "index", "shifted", "params"))
+    every = [params for *_, params in rows]
+    drawn = [name for name in (every[0] if every else ()) if any(params[name] != every[0][name] for params in every)]
+    table = Table("id", "index", "parameters", title=f"{pool.folder}: {pool.split}", title_justify="left")
+    for id_, index, shifted, params in rows:
+        shown = [name for name in params if name in drawn or name in shifted]
+        table.add_row(id_, str(index), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
     return table
 
 
-def scenario_tables(row: Row) -> list[Table]:
+def scenario_tables(row: PoolRow) -> list[Table]:
     """One scenario: what it is, its parameters, and its certificate."""
-    about = Table(title=f"{row['task']} {row['id']}", title_justify="left", show_header=False)
-    for key in ("instruction", "split", "shifted", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
-        about.add_row(key, str(row[key]))
-    about.add_row("witness", f"{len(row['witness'])} control periods of 10 ms, sha256 {row['witness_sha256'][:16]}...")
+    about = Table(title=f"{row.task} {row.id}", title_justify="left", show_header=False)
+    for name in ("instruction", "split", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
+        about.add_row(name, str(getattr(row, name)))
+    about.add_row("shifted", _numbers(row.shifted))
+    about.add_row("witness", f"{len(row.witness)} control periods of 10 ms, sha256 {row.witness_sha256[:16]}...")
     params = Table("parameter", "value", title="parameters", title_justify="left")
-    for name, value in json.loads(row["params"]).items():
+    for name, value in row.params.items():
         params.add_row(name, f"{value:g}")
-    certificate = row["certificate"]
-    checks = Table(
-        "check", "passed", "numbers", title=f"certificate: {certificate['verdict']} ({certificate['level']})"
-    )
-    checks.title_justify = "left"
-    for check in certificate["checks"]:
-        mark = {True: "yes", False: "NO", None: "skipped"}[check["passed"]]
-        checks.add_row(check["name"], mark, check["reason"] or _numbers(json.loads(check["numbers"])))
+    title = f"certificate: {row.certificate.verdict} ({row.certificate.settings})"
+    checks = Table("check", "passed", "numbers", title=title, title_justify="left")
+    for check in row.certificate.checks:
+        mark = {True: "yes", False: "NO", None: "skipped"}[check.passed]
+        checks.add_row(check.name, mark, check.reason or _numbers(check.numbers))
     return [about, params, checks]
 
 
@@ -115,34 +112,32 @@ def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
     """
     remark, sections = "", []
     for pool in pools:
-        cards: list[dict[str, Any]] = []
-        for row in islice(pool.rows(), images):
+        cards: list[tuple[PoolRow, str]] = []
+        for row in islice(pool.rows(witness=False), images):
             picture = ""
             if not remark:
                 try:
-                    picture = thumbnail(row)
+                    picture = thumbnail(row.scene_xml, row.embodiment)
                 except render.NoPictures as error:
                     remark = str(error)
-            cards.append({"row": row, "picture": picture, "params": json.loads(row["params"])})
-        sections.append(
-            {
-                "pool": pool,
-                "manifest": pool.manifest,
-                "steps": ("proposed", *STAGES),
-                "cards": cards,
-                "rest": max(0, len(pool) - images),
-            }
-        )
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("scengen", "pictures/templates"), autoescape=True)
-    page = environment.get_template("contact_sheet.html").render(sections=sections, remark=remark)
+            cards.append((row, picture))
+        sections.append((pool, cards))
+    steps = ("proposed", *STAGES)
+    page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(page)
     return remark
 
 
-def thumbnail(row: Row, width: int = 320, height: int = 240) -> str:
+def template(name: str) -> jinja2.Template:
+    """One of the pages in scengen/pictures/templates; what is put into it is escaped."""
+    loader = jinja2.PackageLoader("scengen", "pictures/templates")
+    return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
+
+
+def thumbnail(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> str:
     """A picture of the start of a scenario, as a data address for HTML."""
-    with render.camera(row["scene_xml"], row["embodiment"], width, height) as view:
+    with render.camera(scene_xml, embodiment, width, height) as view:
         return render.address(render.encode(view.take()), "webp")
 
 

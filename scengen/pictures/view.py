@@ -11,7 +11,7 @@ import numpy as np
 from ..control.loop import Loop
 from ..episode import Episode
 from ..errors import ScengenError
-from ..pool import Row
+from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 from .film import Take
@@ -28,11 +28,11 @@ def check_display() -> None:
         raise NoDisplay("no display to open a window on; scengen film draws the same into a file")
 
 
-def view(row: Row, scenario: Scenario, replay: bool) -> None:
+def view(row: PoolRow, scenario: Scenario, replay: bool) -> None:
     """Show a scenario in real time until the window is closed. After its witness, or without, the robot is idle."""
     world = Take.witness(row, scenario).world()
     hide_hulls(world.model)
-    episode, actions = Episode(scenario, world), row["witness"] if replay else []
+    episode, actions = Episode(scenario, world), row.witness if replay else []
     with mujoco.viewer.launch_passive(world.model, world.data, show_left_ui=False, show_right_ui=False) as window:
         _look(window, world)
         due = time.monotonic()

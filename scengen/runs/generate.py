@@ -1,7 +1,6 @@
 """A generation run: draw, certify in parallel, remember everything, write the pool."""
 
 import itertools
-import json
 import math
 import re
 import time
@@ -12,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import pool
+from ..certificate import CHECKS, StoredCertificate
 from ..errors import BadConfig, Infeasible, at_least
 from ..parallel import each
-from ..params import canonical
-from ..samplers.designs import Design
-from ..samplers.task import ID, Draw, Task, load
-from ..validate.certify import CHECKS, Certified, certify
+from ..params import values
+from ..samplers.split import ID, Split
+from ..samplers.task import Draw, Task
+from ..validate.certify import Certified, certify
 from ..validate.identity import fingerprint, source_sha256, versions
 from ..validate.settings import CertifySettings
 from .journal import Journal, Record
@@ -28,7 +28,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "rested": ("rest",),
     "not trivial": ("unsolved", "idle", "shortcuts"),
     "solved": ("solved",),
-    "robust": ("robust", "numerics", "necessity"),
+    "robust": ("robust", "numerics", "ablations"),
     "certified": ("witness",),
 }
 """Steps of the funnel, and the checks that a scenario must pass to get through each."""
@@ -70,114 +70,108 @@ class Summary:
     first_draws: int
     """Indices whose very first draw was certified."""
     cpu: float
-    """Processor time of all indices that count, this run or earlier ones [s]."""
+    """Processor time of all indices that count, in this run or earlier ones [s]."""
 
 
 Progress = Callable[[int, int, Mapping[str, int]], None]
 """Called with the certified count, the number of finished indices, and the verdicts so far."""
 
 
-def generate(task: Task, node: Mapping[str, Any], level: CertifySettings, settings: Settings, progress: Progress) -> Summary:
+@dataclass(frozen=True)
+class Job:
+    """What the indices of a run have in common; called with one, it draws and certifies that scenario."""
+
+    task: Task
+    split: Split
+    sampler: str
+    seed: int
+    certify: CertifySettings
+    keep: tuple[str, ...]
+    """Verdicts besides `certified` whose scenarios are kept."""
+
+    def __call__(self, index: int) -> Record:
+        start = time.process_time()
+        try:
+            draw = self.task.draw(self.split, self.seed, index, self.task.design(self.sampler))
+        except Infeasible as error:
+            why = max(error.reasons, key=error.reasons.__getitem__)
+            cpu = time.process_time() - start
+            return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, cpu)
+        certified = certify(draw.scenario, self.task.horizon, self.certify, self.task.embodiment)
+        certificate = certified.certificate
+        failed = certificate.failed
+        return Record(
+            index,
+            certificate.verdict,
+            failed.name if failed else "",
+            failed.reason if failed else "",
+            draw.attempt + 1,
+            dict(draw.rejected),
+            row_of(self.task, draw, certified) if certificate.verdict in ("certified", *self.keep) else None,
+            time.process_time() - start,
+        )
+
+
+def generate(task: Task, certify: CertifySettings, settings: Settings, progress: Progress) -> Summary:
     """Make the pool that the settings describe, continuing an earlier run of the same settings.
 
     Args:
         task: what to generate.
-        node: the resolved configuration; the part that determines the scenarios goes into the manifest.
-        level: settings of the certificate.
+        certify: settings of the certificates.
         progress: told about every finished index.
 
     Raises:
         ScengenError: the pool cannot be written, or belongs to another run.
     """
     settings.check(task)
-    folder = Path(settings.pool or Path("generated", f"{task.name}-{settings.split}"))
-    drawn = {k: v for k, v in asdict(settings).items() if k in ("split", "sampler", "seed", "keep")}
-    config = {"task": {"name": task.name, **node["task"]}, "certify": node["certify"], **drawn}
-    identity = {"config": config, **_made_with(task)}
+    split = Split.parse(settings.split)
+    folder = Path(settings.pool or Path("generated", f"{task.name}-{split}"))
+    job = Job(task, split, settings.sampler, settings.seed, certify, tuple(settings.keep))
+    identity = {"config": _config(job), **_made_with(task)}
     journal = Journal(folder, identity)
     try:
         records = journal.records()
-        _extend(task, node["task"], level, settings, records, journal, progress)
+        _extend(job, settings, records, journal, progress)
         return _finish(folder, identity, settings, records, journal)
     finally:
         journal.close()
 
 
-def attempt(
-    task: Task, split: str, design: Design, seed: int, index: int, level: CertifySettings, keep: tuple[str, ...]
-) -> Record:
-    """Draw and certify one index."""
-    start = time.process_time()
-    try:
-        draw = task.draw(split, seed, index, design)
-    except Infeasible as error:
-        why = max(error.reasons, key=error.reasons.__getitem__)
-        return Record(
-            index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, time.process_time() - start
-        )
-    certified = certify(draw.scenario, task.horizon, level, task.embodiment)
-    certificate = certified.certificate
-    failed = certificate.failed
-    row = row_of(task, draw, certified) if certificate.verdict in ("certified", *keep) else None
-    return Record(
-        index,
-        certificate.verdict,
-        failed.name if failed else "",
-        failed.reason if failed else "",
-        draw.attempt + 1,
-        dict(draw.rejected),
-        row,
-        time.process_time() - start,
-    )
-
-
-def row_of(task: Task, draw: Draw, certified: Certified) -> pool.Row:
+def row_of(task: Task, draw: Draw, certified: Certified) -> pool.PoolRow:
     """One scenario as a row of a pool."""
     certificate = certified.certificate
-    scene, actions = pool.sha256(certified.scene_xml), pool.sha256(certified.witness.tobytes())
-    made_with = _made_with(task)
-    return {
-        "id": draw.scenario.id,
-        "task": task.name,
-        "code": task.code,
-        "category": task.category,
-        "split": draw.split,
-        "axes": [] if draw.split == ID else draw.split.split("+"),
-        "shifted": json.dumps(draw.shifted, sort_keys=True),
-        "seed": draw.seed,
-        "index": draw.index,
-        "attempt": draw.attempt,
-        "id_twin": draw.id_twin,
-        "instruction": task.instruction,
-        "horizon": task.horizon,
-        "params": canonical(draw.scenario),
-        "embodiment": task.embodiment,
-        "scene_xml": certified.scene_xml,
-        "scene_sha256": scene,
-        "witness": certified.witness,
-        "witness_sha256": actions,
-        "certificate": {
-            "verdict": certificate.verdict,
-            "reason": certificate.reason,
-            "level": certificate.level,
-            "checks": [
-                {
-                    "name": c.name,
-                    "passed": c.passed,
-                    "reason": c.reason,
-                    "settings": json.dumps(c.settings, sort_keys=True),
-                    "numbers": json.dumps(c.numbers, sort_keys=True),
-                }
-                for c in certificate.checks
-            ],
-            "scene_sha256": scene,
-            "witness_sha256": actions,
-            "final_state": certified.digest,
-            "fingerprint": made_with["fingerprint"],
-            "source_sha256": made_with["source_sha256"],
-            "versions": json.dumps(made_with["versions"], sort_keys=True),
-        },
-    }
+    scene, witness = pool.sha256(certified.scene_xml), pool.sha256(certified.witness.tobytes())
+    return pool.PoolRow(
+        id=draw.scenario.id,
+        task=task.name,
+        code=task.code,
+        category=task.category,
+        split=str(draw.split),
+        axes=draw.split.axes,
+        shifted=draw.shifted,
+        seed=draw.seed,
+        index=draw.index,
+        attempt=draw.attempt,
+        id_twin=draw.id_twin,
+        instruction=task.instruction,
+        horizon=task.horizon,
+        params=values(draw.scenario),
+        embodiment=task.embodiment,
+        scene_xml=certified.scene_xml,
+        scene_sha256=scene,
+        witness=certified.witness,
+        witness_sha256=witness,
+        certificate=StoredCertificate(
+            verdict=certificate.verdict,
+            reason=certificate.reason,
+            settings=certificate.settings,
+            checks=certificate.checks,
+            scene_sha256=scene,
+            witness_sha256=witness,
+            final_state=certified.digest,
+            **_made_with(task),
+        ),
+    )
 
 
 def funnel(records: list[Record]) -> dict[str, int]:
@@ -194,22 +188,24 @@ def _made_with(task: Task) -> dict[str, Any]:
     return {"versions": versions(), "fingerprint": fingerprint(), "source_sha256": source_sha256(task.family)}
 
 
-def _extend(
-    task: Task,
-    node: Mapping[str, Any],
-    level: CertifySettings,
-    settings: Settings,
-    records: dict[int, Record],
-    journal: Journal,
-    progress: Progress,
-) -> None:
+def _config(job: Job) -> dict[str, Any]:
+    """Everything that decides which scenarios a run makes and keeps, as plain data."""
+    return {
+        "task": {"name": job.task.name, **job.task.node},
+        "certify": asdict(job.certify),
+        "split": str(job.split),
+        "sampler": job.sampler,
+        "seed": job.seed,
+        "keep": list(job.keep),
+    }
+
+
+def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: Journal, progress: Progress) -> None:
     """Add records in the order of indices until n are certified or the limit is reached."""
     limit = settings.limit or max(100, 20 * settings.n)
-    if size := task.design(settings.sampler).size:
+    if size := job.task.design(job.sampler).size:
         limit = min(limit, size)
     missing = (i for i in range(limit) if i not in records)
-    job = (task.name, dict(node), level, settings.split, settings.sampler, settings.seed, tuple(settings.keep))
-
     verdicts = Counter(r.verdict for r in records.values())
 
     def needed(index: int) -> bool:
@@ -218,29 +214,11 @@ def _extend(
             return True
         return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
 
-    def done(record: Record) -> None:
+    for record in each(job, itertools.takewhile(needed, missing), settings.workers):
         journal.add(record)
         records[record.index] = replace(record, row=None)
         verdicts[record.verdict] += 1
         progress(verdicts["certified"], len(records), verdicts)
-
-    for record in each(_work, itertools.takewhile(needed, missing), settings.workers, _begin, job):
-        done(record)
-
-
-_JOB: dict[str, Any] = {}
-"""What this process works on, set by `_begin`: sent once per worker instead of once per index."""
-
-
-def _begin(
-    name: str, node: dict[str, Any], level: CertifySettings, split: str, sampler: str, seed: int, keep: tuple[str, ...]
-) -> None:
-    task = load(name, node)
-    _JOB.update(task=task, level=level, split=split, design=task.design(sampler), seed=seed, keep=keep)
-
-
-def _work(index: int) -> Record:
-    return attempt(_JOB["task"], _JOB["split"], _JOB["design"], _JOB["seed"], index, _JOB["level"], _JOB["keep"])
 
 
 def _finish(

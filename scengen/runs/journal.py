@@ -11,7 +11,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..errors import PoolError
-from ..pool import Row
+from ..pool import PoolRow
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Record:
     """Draws made for this index, infeasible ones included."""
     infeasible: dict[str, int]
     """Infeasible draws by reason."""
-    row: Row | None
+    row: PoolRow | None
     """The scenario, if it goes into the pool or is kept on request; None in what `Journal.records` gives."""
     cpu: float
     """Processor time spent [s]; differs from run to run and stays out of the pool."""
@@ -90,19 +90,19 @@ class Journal:
         found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
         return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu) for body, cpu in found)}
 
-    def rows(self, indices: Iterable[int]) -> Iterator[Row]:
+    def rows(self, indices: Iterable[int]) -> Iterator[PoolRow]:
         """The stored scenarios of these indices, one after the other."""
         for index in indices:
             scene, actions = self._db.execute("SELECT scene, actions FROM record WHERE idx = ?", (index,)).fetchone()
-            yield {**json.loads(scene), "witness": np.frombuffer(actions, np.float32).reshape(-1, 7)}
+            yield PoolRow.of(json.loads(scene), np.frombuffer(actions, np.float32).reshape(-1, 7))
 
     def add(self, record: Record) -> None:
         """Store one record; once this returns it survives a kill."""
         body = {f.name: getattr(record, f.name) for f in fields(record) if f.name not in ("row", "cpu")}
         scene, actions = None, None
         if record.row is not None:
-            scene = json.dumps({k: v for k, v in record.row.items() if k != "witness"})
-            actions = np.asarray(record.row["witness"], np.float32).tobytes()
+            scene = json.dumps(record.row.plain())
+            actions = np.asarray(record.row.witness, np.float32).tobytes()
         with self._db:
             self._db.execute(
                 "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",

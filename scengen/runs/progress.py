@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line now and then elsewhere."""
+"""Progress of long work: a progress bar on a terminal, a line now and then elsewhere."""
 
 import time
 from types import TracebackType
@@ -10,7 +10,7 @@ EVERY = 15.0
 """Seconds between two lines where there is no terminal."""
 
 
-class Bar:
+class ProgressBar:
     """Shows how far some work has come."""
 
     def __init__(self, console: Console, title: str, total: int):
@@ -25,7 +25,7 @@ class Bar:
         self._progress = Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True)
         self._task = self._progress.add_task(title, total=total, note="")
 
-    def __enter__(self) -> "Bar":
+    def __enter__(self) -> "ProgressBar":
         if self.console.is_terminal:
             self._progress.start()
         return self

@@ -1,1 +1,1 @@
-"""Distributions, keyed random streams, and the way from a task file to scenario number i."""
+"""Distributions, keyed random streams, and what leads from a task file to scenario number i."""

@@ -33,10 +33,10 @@ class Axis:
     source: str
     replace: Mapping[str, Dist]
     """New distribution of every parameter that moves; all others keep theirs."""
-    levels: int = 0
-    """How many levels of severity there are, `name@1` to `name@levels`; 0 for none."""
+    severities: int = 0
+    """How many severities there are, `name@1` to `name@severities`; 0 for none."""
     limits: Mapping[str, float] = field(default_factory=dict)
-    """Measured ends of the way by parameter, from conf/limits: where the oracle dies."""
+    """Measured ends of the path by parameter, from conf/limits: where the oracle fails."""
 
     def prove(
         self,
@@ -60,30 +60,31 @@ class Axis:
         self._not_training_again(training, known, symmetries)
         return proofs
 
-    def at(self, level: int, training: Mapping[str, Dist], known: Mapping[str, Parameter]) -> "Axis":
-        """The axis at one level: every value is `level / levels` of the way from training to the far end.
+    def at(self, severity: int, training: Mapping[str, Dist], known: Mapping[str, Parameter]) -> "Axis":
+        """The axis at one severity: every value is `severity / severities` of the path from training to the far end.
 
-        The way of a value begins at the nearest training value. It ends at the far end of its range, or at the
+        The path of a value begins at the nearest training value. It ends at the far end of its range, or at the
         measured limit if there is one. A range thus becomes one value, several separate values remain several.
 
         Raises:
-            BadConfig: there is no such level, or a whole number would have to be a fraction.
+            BadConfig: there is no such severity, or a whole number would have to be a fraction.
         """
-        if not 1 <= level <= self.levels:
-            has = f"has levels 1 to {self.levels}" if self.levels else "has none: give it `levels: N` in the task file"
-            raise BadConfig(f"level {self.name}@{level}: the axis {has}")
-        dists = self.along(level / self.levels, training, known)
-        return replace(self, name=f"{self.name}@{level}", replace=dists, levels=0)
+        if not 1 <= severity <= self.severities:
+            has = f"has severities 1 to {self.severities}"
+            none = "has none: give it `severities: N` in the task file"
+            raise BadConfig(f"split {self.name}@{severity}: the axis {has if self.severities else none}")
+        dists = self.along(severity / self.severities, training, known)
+        return replace(self, name=f"{self.name}@{severity}", replace=dists, severities=0)
 
     def along(
         self, fraction: float, training: Mapping[str, Dist], known: Mapping[str, Parameter]
     ) -> dict[str, Fixed | Choice]:
-        """Where the axis' parameters are at a fraction of the way: 0 the edge of training, 1 the far end.
+        """Where the axis' parameters are at a fraction of the path: 0 the edge of training, 1 the far end.
 
         Raises:
             BadConfig: a whole number would have to be a fraction.
         """
-        return {n: self._on_the_way(fraction, known[n], d, training[n].support) for n, d in self.replace.items()}
+        return {n: self._on_path(fraction, known[n], d, training[n].support) for n, d in self.replace.items()}
 
     def _prove(self, parameter: Parameter, there: Dist, here: Dist) -> Proof:
         gap = distance(here.support, there.support, parameter.period)
@@ -119,16 +120,16 @@ class Axis:
                     f"they do not take back, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
                 )
 
-    def _on_the_way(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:
-        whole = isinstance(dist, Integer)  # its values are separate, but lie on one way
-        ways = (Interval(dist.low, dist.high),) if whole else dist.support
-        listed = [Interval(v, v) for v in dist.options] if isinstance(dist, Choice) else ways
-        values = [self._value(fraction, parameter, way, training) for way in listed]
+    def _on_path(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:
+        whole = isinstance(dist, Integer)  # its values are separate, but lie on one path
+        ranges = (Interval(dist.low, dist.high),) if whole else dist.support
+        listed = [Interval(v, v) for v in dist.options] if isinstance(dist, Choice) else ranges
+        values = [self._value(fraction, parameter, target, training) for target in listed]
         return Fixed(values[0]) if len(set(values)) == 1 else Choice(tuple(values))
 
-    def _value(self, fraction: float, parameter: Parameter, way: Interval, training: Support) -> Value:
+    def _value(self, fraction: float, parameter: Parameter, target: Interval, training: Support) -> Value:
         period = parameter.period
-        far = max(way.low, way.high, key=lambda v: abs(nearest(training, v, period) - v))
+        far = max(target.low, target.high, key=lambda v: abs(nearest(training, v, period) - v))
         edge = nearest(training, far, period)
         far = self.limits.get(parameter.name, far)
         value = edge + fraction * (far - edge)
@@ -141,7 +142,7 @@ class Axis:
             return value
         if abs(value - round(value)) > 1e-9:
             raise BadConfig(
-                f"axis {self.name}: {fraction:.0%} of its way puts {parameter.name} at {value:g}, which must be a "
+                f"axis {self.name}: {fraction:.0%} of its path puts {parameter.name} at {value:g}, which must be a "
                 f"whole number; from {edge:g} to {far:g} there are {abs(far - edge):g} steps"
             )
         return round(value)

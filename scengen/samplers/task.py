@@ -1,9 +1,8 @@
 """Task: a scenario family plus the distributions that we test it on. One file each in conf/task/."""
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -17,9 +16,8 @@ from . import designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
+from .split import ID, Part, Split
 
-ID = "id"
-"""Name of the split that policies train on."""
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
 OPTIONAL = ("axes", "certify", "embodiment", "limits")
 
@@ -42,7 +40,7 @@ class Draw:
     """A scenario and where it came from."""
 
     task: str
-    split: str
+    split: Split
     seed: int
     index: int
     attempt: int
@@ -77,15 +75,17 @@ class Task:
     axes: Mapping[str, Axis]
     certify: Mapping[str, Any]
     """Settings of the certificate that differ from conf/certify for this task."""
+    node: Mapping[str, Any] = field(repr=False)
+    """The file that all this was read from, with measured limits and what a command line changed."""
 
     @cached_property
     def known(self) -> dict[str, Parameter]:
         """The family's parameters by name."""
         return {p.name: p for p in parameters(self.family())}
 
-    def scenario(self, params: str) -> Scenario:
-        """The scenario of a row: the family with these parameter values, given as JSON."""
-        return with_values(self.family(), json.loads(params))
+    def scenario(self, params: Mapping[str, Value]) -> Scenario:
+        """The scenario with these parameter values, such as those of a pool's row."""
+        return with_values(self.family(), params)
 
     @cached_property
     def proofs(self) -> dict[str, list[Proof]]:
@@ -104,33 +104,32 @@ class Task:
         """
         return axis.prove(self.training, self.known, self.family.SYMMETRIES)
 
-    def axis(self, part: str) -> Axis:
-        """The axis of that name, or `name@3` for its third level.
+    def axis(self, part: Part | str) -> Axis:
+        """The axis of that name, or with `name@3` its third severity.
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such level, or the level does not leave training.
+            BadConfig: it has no such severity, or that one does not leave training.
         """
-        name, at, level = part.partition("@")
-        if name not in self.axes:
-            raise UnknownName(f"split of {self.name}", name, [ID, *self.axes])
-        if not at:
-            return self.axes[name]
-        if not level.isdecimal():
-            raise BadConfig(f"level {part}: after the @ stands a whole number, as in {name}@1")
-        severe = self.axes[name].at(int(level), self.training, self.known)
+        part = Part.parse(part) if isinstance(part, str) else part
+        if part.axis not in self.axes:
+            raise UnknownName(f"split of {self.name}", part.axis, [ID, *self.axes])
+        axis = self.axes[part.axis]
+        if part.severity is None:
+            return axis
+        severe = axis.at(part.severity, self.training, self.known)
         self.prove(severe)
         return severe
 
-    def shifts(self, split: str) -> dict[str, Dist]:
-        """The distributions that a split replaces: none for `id`, those of all axes for `a+b`, levels as in `a@2+b`.
+    def shifts(self, split: Split | str) -> dict[str, Dist]:
+        """The distributions that a split replaces: none for `id`, those of all its axes else.
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such level, or two axes move the same parameter.
+            BadConfig: it has no such severity, or two axes move the same parameter.
         """
         shifted: dict[str, Dist] = {}
-        for axis in [] if split == ID else map(self.axis, split.split("+")):
+        for axis in map(self.axis, Split.parse(split).parts):
             if both := shifted.keys() & axis.replace.keys():
                 raise BadConfig(
                     f"split {split}: two of its axes move {', '.join(sorted(both))}; compose axes that differ"
@@ -146,7 +145,7 @@ class Task:
         """
         return designs.parse(spelled, self.name, self.training)
 
-    def draw(self, split: str, seed: int, index: int, design: Design | None = None) -> Draw:
+    def draw(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Draw:
         """Scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
 
         Every parameter has its own random stream. A split starts from the training scenario of the same index and
@@ -158,6 +157,7 @@ class Task:
         Raises:
             Infeasible: no try gave a feasible scenario.
         """
+        split = Split.parse(split)
         *failed, last = self.proposals(split, seed, index, design)
         rejected = Counter(p.refutation.reason for p in failed if p.refutation)
         if last.refutation:
@@ -168,14 +168,14 @@ class Task:
         twin = (last.trained or scenario).id
         return Draw(self.name, split, seed, index, last.attempt, scenario, last.quantiles, twin, shifted, rejected)
 
-    def proposals(self, split: str, seed: int, index: int, design: Design | None = None) -> Iterator[Proposal]:
+    def proposals(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Iterator[Proposal]:
         """Every try at an index; the last one is feasible, if any is.
 
         Raises:
             Infeasible: there is no training scenario of this index that an axis could start from.
         """
-        design = design or Independent(self.name)
-        if split == ID:
+        split, design = Split.parse(split), design or Independent(self.name)
+        if split.is_training:
             yield from self._tries(self.training, None, {}, seed, index, design)
         else:
             shifts, trained = self.shifts(split), self.draw(ID, seed, index, design)
@@ -221,7 +221,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
             raise BadConfig(f"{where}: {axis!r} cannot name an axis; use letters, digits and _, and not {ID!r}")
         if not isinstance(inner, Mapping):
             raise BadConfig(f"{where} = {inner!r}; expected why, source and replace")
-        _check_keys(where, inner, ("replace",), ("why", "source", "levels"))
+        _check_keys(where, inner, ("replace",), ("why", "source", "severities"))
         if not isinstance(inner["replace"], Mapping):
             raise BadConfig(f"{where}.replace = {inner['replace']!r}; expected parameters and their distributions")
         axes[axis] = Axis(
@@ -229,7 +229,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
             inner.get("why", ""),
             inner.get("source", ""),
             _space(f"{where}.replace", inner["replace"], known),
-            _levels(where, inner.get("levels", 0)),
+            _severities(where, inner.get("severities", 0)),
             _limits(name, axis, inner["replace"], limits.get(axis, {}), known),
         )
     task = Task(
@@ -243,12 +243,13 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         training,
         axes,
         node.get("certify") or {},
+        node,
     )
     _ = task.proofs
     for axis in task.axes.values():
         if not axis.limits:  # those were measured with other distributions perhaps, and are looked at when asked for
-            for level in range(1, axis.levels + 1):
-                task.axis(f"{axis.name}@{level}")
+            for severity in range(1, axis.severities + 1):
+                task.axis(Part(axis.name, severity))
     return task
 
 
@@ -291,10 +292,10 @@ def _space(where: str, nodes: Mapping[str, Any], known: Mapping[str, Parameter])
     return space
 
 
-def _levels(where: str, levels: Any) -> int:
-    if isinstance(levels, bool) or not isinstance(levels, int) or levels < 0:
-        raise BadConfig(f"{where}.levels = {levels!r}; it must be a whole number, 0 for none")
-    return levels
+def _severities(where: str, count: Any) -> int:
+    if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+        raise BadConfig(f"{where}.severities = {count!r}; it must be a whole number, 0 for none")
+    return count
 
 
 def _limits(
@@ -306,7 +307,7 @@ def _limits(
     """
     where, names = f"{task}.limits.{axis}", dict(leaves(replaced))
     if not isinstance(nodes, Mapping):
-        raise BadConfig(f"{where} = {nodes!r}; expected parameters and where the oracle dies")
+        raise BadConfig(f"{where} = {nodes!r}; expected parameters and where the oracle fails")
     limits = {name: value for name, value in leaves(nodes) if name in names}
     for name, value in limits.items():
         known[name].check(f"{where}.{name}", value)
