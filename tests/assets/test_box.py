@@ -1,0 +1,79 @@
+"""Boxes tip, slide and stop where a textbook says."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen.assets.box import Block, Cube, Domino
+from scengen.assets.prop import TABLE_TOP, place, table
+
+GRAVITY = 9.81
+
+
+def alone(box, slope=0.0):
+    """A box on the table, and a gravity that leans towards +x by `slope` [rad]."""
+    scene = table()
+    place(scene, box, "box", [0, 0, TABLE_TOP])
+    scene.option.gravity = [GRAVITY * math.sin(slope), 0, -GRAVITY * math.cos(slope)]
+    model = scene.compile()
+    return model, mujoco.MjData(model)
+
+
+def lean(data, about_x, angle):
+    """Turn the free body about the line x = `about_x` on the table, parallel to y."""
+    c, s = math.cos(angle), math.sin(angle)
+    data.qpos[:3] = about_x - c * about_x, 0, TABLE_TOP + s * about_x
+    data.qpos[3:7] = math.cos(angle / 2), 0, math.sin(angle / 2), 0
+
+
+@pytest.mark.parametrize("box", [Domino(), Block(), Cube()], ids=lambda box: type(box).__name__)
+def test_a_box_weighs_what_it_should_and_stands_on_the_middle_of_its_foot(box):
+    model, data = alone(box)
+    mujoco.mj_forward(model, data)
+    assert model.body("box").mass == pytest.approx(box.mass)
+    assert 2 * model.geom("box/box").size == pytest.approx(box.size)
+    assert data.body("box").xipos == pytest.approx([0, 0, TABLE_TOP + box.size[2] / 2])
+
+
+@pytest.mark.parametrize(("factor", "falls"), [(0.9, False), (1.1, True)])
+@given(tile=anywhere(Domino).filter(lambda d: d.height > 1.5 * d.thickness and d.friction > 0.3))
+@settings(max_examples=25, deadline=None)
+def test_a_tile_falls_when_its_centre_passes_the_edge(tile, factor, falls):
+    model, data = alone(tile)
+    lean(data, tile.thickness / 2, factor * tile.tipping_angle)
+    mujoco.mj_step(model, data, round(2.0 / model.opt.timestep))
+    tilt = math.acos(np.clip(data.body("box").xmat[8], -1, 1))
+    assert (tilt > math.radians(60)) == falls
+
+
+@pytest.mark.parametrize(("factor", "slides"), [(0.93, False), (1.07, True)])
+@pytest.mark.parametrize("friction", [0.1, 0.3, 0.6])
+def test_a_lying_tile_slides_on_a_slope_steeper_than_its_friction(friction, factor, slides):
+    """Slope angle = atan mu, with the tile's own friction although the table has mu = 1."""
+    slope = math.atan(factor * friction)
+    model, data = alone(Domino(height=0.03, thickness=0.03, friction=friction), slope)
+    mujoco.mj_step(model, data, 500)
+    expected = 0.5 * GRAVITY * (math.sin(slope) - friction * math.cos(slope))  # after 1 s, if it slides
+    assert (data.body("box").xpos[0] > 0.7 * max(expected, 0.002)) == slides
+
+
+@pytest.mark.parametrize("mass", [0.06, 0.5])
+@pytest.mark.parametrize("friction", [0.1, 0.4])
+def test_a_sliding_cube_stops_after_v_squared_by_2_mu_g_whatever_it_weighs(friction, mass):
+    """0.25 m/s, as fast as the hand draws: 32 mm on a slippery cube's sides, 8 mm on a common one's."""
+    model, data = alone(Cube(friction=friction, mass=mass))
+    data.qvel[0] = 0.25
+    mujoco.mj_step(model, data, 500)
+    assert data.qpos[0] == pytest.approx(0.25**2 / (2 * friction * GRAVITY), rel=0.06)
+    assert abs(data.qvel[0]) < 1e-3
+
+
+@pytest.mark.parametrize(("slope", "tips"), [(43.0, False), (47.0, True)])
+def test_a_cube_that_cannot_slide_tips_at_45_degrees(slope, tips):
+    model, data = alone(Cube(friction=1.5), math.radians(slope))
+    mujoco.mj_step(model, data, 500)
+    assert (data.body("box").xmat[8] < math.cos(math.radians(30))) == tips
