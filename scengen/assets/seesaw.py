@@ -11,19 +11,22 @@ balancing loads has no width. With the axle at height `drop` above the deck ever
 restores. With s_i the place of mass m_i along the deck and u_i its height over the axle, the moments about the axle
 vanish where
 
-    tan(tilt) = sum(m_i s_i) / -sum(m_i u_i),
+    tan(tilt) = sum(m_i s_i) / -sum(m_i u_i) = moment / stiffness,
 
-positive where +s goes down. The denominator times g is the stiffness of the seesaw against small turns.
+positive where +s goes down. Times g the two are a torque on the level deck and a torque per small angle.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, STIFF, show
+from ..geometry import UP, Vec3, about_y, quat
+from ..params import param
+from .box import Box
+from .prop import STIFF, Prop, Rgba, show, shown, solid
 
 CHEEK = 0.004
 """Thickness of the plates that join deck and axle [m]; they count as weightless beside the deck."""
@@ -33,10 +36,19 @@ SLACK = 0.003
 """Air between cheek and post [m]."""
 AXLE = 0.004
 """Radius of the axle [m]."""
+GREY, STEEL = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
+
+Load = tuple[float, float, float]
+"""Mass [kg], place along the deck from the axle [m] and height over the deck [m] of a centre of mass."""
+
+
+def standing(box: Box, along: float) -> Load:
+    """The load of a box that stands on the deck at `along` [m]."""
+    return box.mass, along, box.size[2] / 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seesaw:
+class Seesaw(Prop):
     """x runs along the level deck, y along the axle; the origin is on the ground below the axle.
 
     Pivot offset and beam mass: paper, App. C ("pivot offset +-0.10 m; beam mass 0.20-0.80 kg"); it gives nothing else.
@@ -61,10 +73,59 @@ class Seesaw:
     """Tilt at which the deck comes to rest on its stops, to either side."""
     tilt: float = 0.0
     """Where it starts [rad], positive where +x is down; no parameter: the loads decide."""
-    rgba: tuple[float, float, float, float] = (0.80, 0.66, 0.44, 1.0)
+    rgba: Rgba = (0.80, 0.66, 0.44, 1.0)
 
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    # --- parts ----------------------------------------------------------------------------
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        side = self.width / 2 + CHEEK + SLACK + POST / 2
+        solid(body, "foot", [0.04, side + POST / 2, 0.004], [0, 0, 0.004], condim=3, rgba=GREY)
+        for y in (-side, side):
+            solid(body, "", [POST / 2, POST / 2, self.axle / 2], [0, y, self.axle / 2], condim=3, rgba=GREY)
+        self._hang(body.add_body(name="beam", pos=[0, 0, self.axle], quat=quat("y", self.tilt)), side)
+
+    def _hang(self, beam: mujoco.MjsBody, side: float) -> None:
+        """Fill the body of the beam, whose origin is on the axle. Its joint reads 0 where the deck is level."""
+        beam.add_joint(
+            name="axle",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 1, 0],
+            ref=self.tilt,
+            range=[-self.steepest, self.steepest],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            solref_limit=STIFF,
+            damping=self.damping,
+            frictionloss=self.rubbing,
+        )
+        deck, at = np.array([self.length, self.width, self.thickness]) / 2, -self.drop - self.thickness / 2
+        middle = [-self.pivot_offset, 0, at]
+        solid(beam, "deck", deck, middle, mass=self.mass, friction=self.friction, rgba=self.rgba)
+        tall = self.drop + self.thickness
+        for y in (-(self.width + CHEEK) / 2, (self.width + CHEEK) / 2):
+            solid(beam, "", [0.010, CHEEK / 2, tall / 2], [0, y, -tall / 2], mass=0.0, condim=3, rgba=self.rgba)
+        size, cylinder = [AXLE, side + POST / 2, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
+        shown(beam, "", STEEL, type=cylinder, size=size, quat=quat("x", math.pi / 2))
+
+    # --- statics --------------------------------------------------------------------------
+
+    def moment(self, loads: Sequence[Load]) -> float:
+        """First moment of deck and loads about the axle [kg m], positive where +x is heavier."""
+        return sum(mass * along for mass, along, _ in [self._deck, *loads])
+
+    def stiffness(self, loads: Sequence[Load]) -> float:
+        """Mass of deck and loads by its depth below the axle [kg m]."""
+        return sum(mass * (self.drop - height) for mass, _, height in [self._deck, *loads])
+
+    def rest(self, loads: Sequence[Load]) -> float:
+        """Tilt at which it comes to rest with these loads [rad]: in equilibrium, or on a stop."""
+        tilt = math.atan(self.moment(loads) / self.stiffness(loads))
+        return min(max(tilt, -self.steepest), self.steepest)
+
+    @property
+    def _deck(self) -> Load:
+        return self.mass, -self.pivot_offset, -self.thickness / 2
+
+    # --- geometry -------------------------------------------------------------------------
 
     @property
     def axle(self) -> float:
@@ -72,85 +133,36 @@ class Seesaw:
         return self.height + self.drop
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """Where the deck ends, along itself and from the axle: the negative and the positive one [m]."""
-        return -self.length / 2 - self.pivot_offset, self.length / 2 - self.pivot_offset
+    def steepest(self) -> float:
+        """Tilt on a stop [rad]."""
+        return math.radians(self.stop)
 
-    def slope(self, loads: Iterable[tuple[float, float, float]]) -> float:
-        """tan(tilt) at which the seesaw is in equilibrium, were there no stops.
+    @property
+    def dip(self) -> float:
+        """How far the end of the longer arm goes down from level to its stop [m]."""
+        return max(self.arm(-1), self.arm(1)) * math.sin(self.steepest)
+
+    def arm(self, side: int) -> float:
+        """How far the deck reaches on one side of the axle, -1 or 1 [m]."""
+        return self.length / 2 - side * self.pivot_offset
+
+    def on_deck(self, along: float, tilt: float) -> Vec3:
+        """The point of the deck's upper face at `along` [m] when it is tilted [rad], in the seesaw's axes [m]."""
+        return self.axle * UP + about_y(tilt) @ np.array([along, 0.0, -self.drop])
+
+    def stretches(self, side: int, inner: float, rim: float, taken: float, apart: float) -> list[tuple[float, float]]:
+        """The parts of one arm, -1 or 1, where something more can stand: from where to where along the deck [m].
 
         Args:
-            loads: mass [kg], place along the deck [m] and height over the deck [m] of each centre of mass.
+            inner: least distance from the axle [m].
+            rim: least distance from the end of the deck [m].
+            taken: where on the deck something stands already [m].
+            apart: least distance from that [m].
         """
-        masses = [(self.mass, -self.pivot_offset, -self.thickness / 2), *loads]
-        return sum(m * s for m, s, _ in masses) / sum(m * (self.drop - h) for m, _, h in masses)
-
-    def spec(self) -> mujoco.MjSpec:
-        spec = mujoco.MjSpec()
-        spec.compiler.degree = False
-        stand = spec.worldbody.add_body(name="body")
-        box, grey = mujoco.mjtGeom.mjGEOM_BOX, [0.35, 0.37, 0.40, 1]
-        side = self.width / 2 + CHEEK + SLACK + POST / 2
-        foot = [0.04, side + POST / 2, 0.004]
-        stand.add_geom(name="foot", type=box, size=foot, pos=[0, 0, 0.004], rgba=grey, solref=STIFF, priority=PRIORITY)
-        for y in (-side, side):
-            size, pos = [POST / 2, POST / 2, self.axle / 2], [0, y, self.axle / 2]
-            stand.add_geom(type=box, size=size, pos=pos, rgba=grey, solref=STIFF, priority=PRIORITY)
-        self._hang(stand.add_body(name="beam", pos=[0, 0, self.axle], quat=_about_y(self.tilt)), side)
-        return spec
-
-    def _hang(self, beam: mujoco.MjsBody, side: float) -> None:
-        """Fill the body of the beam, whose origin is on the axle. Its joint reads 0 where the deck is level."""
-        stop = math.radians(self.stop)
-        beam.add_joint(
-            name="axle",
-            type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=[0, 1, 0],
-            ref=self.tilt,
-            range=[-stop, stop],
-            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-            solref_limit=STIFF,
-            damping=self.damping,
-            frictionloss=self.rubbing,
-        )
-        beam.add_geom(
-            name="deck",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[self.length / 2, self.width / 2, self.thickness / 2],
-            pos=[-self.pivot_offset, 0, -self.drop - self.thickness / 2],
-            mass=self.mass,
-            friction=[self.friction, 0.005, 0.0001],
-            condim=4,
-            solref=STIFF,
-            priority=PRIORITY,
-            rgba=self.rgba,
-        )
-        tall = self.drop + self.thickness
-        for y in (-1, 1):
-            beam.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=[0.010, CHEEK / 2, tall / 2],
-                pos=[0, y * (self.width + CHEEK) / 2, -tall / 2],
-                mass=0,
-                solref=STIFF,
-                priority=PRIORITY,
-                rgba=self.rgba,
-            )
-        beam.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[AXLE, side + POST / 2, 0],
-            quat=[math.sqrt(0.5), math.sqrt(0.5), 0, 0],
-            mass=0,
-            group=1,
-            contype=0,
-            conaffinity=0,
-            rgba=[0.2, 0.2, 0.22, 1],
-        )
-
-
-def _about_y(angle: float) -> list[float]:
-    """The turn by `angle` [rad] about y, as a quaternion (wxyz)."""
-    return [math.cos(angle / 2), 0, math.sin(angle / 2), 0]
+        outer, away = self.arm(side) - rim, side * taken
+        parts = [(inner, away - apart), (away + apart, outer)] if away > 0 else [(inner, outer)]
+        parts = [(near, far) for near, far in parts if near <= far]
+        return parts if side > 0 else [(-far, -near) for near, far in reversed(parts)]
 
 
 if __name__ == "__main__":

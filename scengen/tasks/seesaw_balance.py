@@ -10,41 +10,42 @@ Bottleneck: the place of the counterweight follows from three masses that nobody
 The seesaw is a balance, not a plank on an edge (assets/seesaw.py): axle above the deck, stops at 10 deg. Between the
 stops its tilt is proportional to the excess moment, and the counterweight may stand within
 
-    margin = tan(5 deg) * (stiffness / g) / (mass of the counterweight),    some 8 to 25 mm,
+    margin = tan(5 deg) * stiffness / (mass of the counterweight),    some 8 to 25 mm,
 
-of the balancing place. Scenarios with less than `ROOM` of balancing deck are refuted.
+of the balancing place.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 
 * All masses are hidden; blocks and beam look the same whatever they weigh. What can be seen, may be used: geometry,
   and which side is down. The oracle starts from the masses that one would expect and learns only from tilts.
 * A place that anybody would try first must not balance: the mirror image of the target's, and the one that follows
-  if blocks that look alike weigh alike. With masses drawn at will one of them would in every second scene; therefore
-  a counterweight is clearly lighter or clearly heavier than the target.
+  if blocks that look alike weigh alike. Therefore a counterweight is clearly lighter or heavier than the target.
 * The beam weighs in: its middle lies off the axle. It can even outweigh the target, so that the counterweight
   belongs on the target's own arm.
 * Level counts only hands off, with both blocks standing on the deck and nowhere else, the target where it was: else the
   hand could hold the beam, the counterweight could prop it up from the table, or both blocks could be moved to the
-  axle, where they weigh nothing. None of these needs any balance of moments.
-* Level must last for `HOLD` = 3 s: the beam also sweeps through level on its way from stop to stop.
+  axle, where they weigh nothing. It must last: the beam also sweeps through level on its way from stop to stop.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from ..assets.box import Block
-from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
-from ..assets.seesaw import Seesaw
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.seesaw import Seesaw, standing
 from ..errors import GaveUp
-from ..params import param
-from ..robots.panda import REACH, SHOULDER
-from ..scenario import Plan, Planner, Refutation, Scenario
-from ..sim.world import ROBOT, Mat3, Vec3, World
-from ..skills.motion import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, release, wait
+from ..geometry import UP, Vec3, about_z, heading, quat
+from ..params import param, with_values
+from ..predicates import fallen
+from ..robots.jaw import PALM_ALONG
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.world import ROBOT, World
+from ..skills.jaw import pick, put
+from ..skills.motion import CLOSED, COARSE, STEADY, closing_along, go_to, hold, push, retreat, wait
 
 LEVEL = math.radians(5.0)
 """Tilt that counts as level [rad] (paper, App. B, T19)."""
@@ -59,24 +60,15 @@ MOVED = 0.017
 """By how much the target may be moved without levelling the deck, the counterweight in its mirror image [m]."""
 ROOM = 0.016
 """Least deck on which the counterweight balances [m]: 8 mm to either side, twice the error of a careful placement."""
-INNER = 0.055
-"""Least distance between block and axle [m]: the fingers pass the posts by 1 cm."""
-BESIDE = 0.056
-"""Least distance between the middles of two blocks [m]: 16 mm of air at 40 mm of width."""
-PALM = 0.110
-"""Half the width of the hand across the fingers, and 8 mm of air [m]: hull of the hand in robosuite's gripper."""
-RIM = 0.004
-"""Least deck beyond a block [m]."""
-EXPECTED_BEAM, EXPECTED_BLOCK = 0.28, 0.22
-"""Masses that one would expect without having tried [kg]: a common beam, and blocks that look alike weighing alike."""
-EXPECTED_MARGIN = 0.013
-"""`margin` for these masses and the nominal seesaw [m]."""
+INNER, BESIDE = 0.055, 0.056
+"""Least distance of the middle of a block from the axle, at which the palm passes the posts by 5 mm where this arm is
+down; and of the middles of two blocks [m]."""
+RIM, AIR = 0.004, 0.006
+"""Least deck beyond a block; least air between a deck and the palm of a hand that takes a block beside it [m]."""
+EXPECTED = {"seesaw.mass": 0.28, "target.mass": 0.22, "weight.mass": 0.22}
+"""What one would expect without having tried [kg]: a common beam, and blocks that look alike weighing alike."""
 TRANSIT = TABLE_TOP + 0.25
 """Height of the hand when it carries a block across [m]: 40 mm over a block on the raised end of the longest arm."""
-
-BRISK = 0.30
-"""Speed of the hand between places [m/s]: as fast as an action of 1 goes."""
-
 BEAM = "seesaw/beam"
 
 
@@ -85,9 +77,8 @@ class SeesawBalance(Scenario):
     """A seesaw with the target on its deck, and a counterweight on the table in front of it."""
 
     HOLD = 3.0
-    """How long the deck must stay level [s]: no swing passes for balance. A beam on its way from one side to 6 deg on
-    the other creeps through +-5 deg in (damping / stiffness) ln(11 / 1) = 0.16 / 0.26 x 2.4 = 1.5 s; 0.26 N m/rad is
-    the softest seesaw of the task file."""
+    """How long the deck must stay level [s]. On its way to 6 deg on the other side it creeps through +-5 deg in
+    (damping / stiffness) ln(11 / 1) = 0.16 / 0.26 x 2.4 = 1.5 s, for the softest seesaw of the task file."""
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
@@ -103,13 +94,178 @@ class SeesawBalance(Scenario):
     target: Block = Block(rgba=(0.78, 0.10, 0.10, 1.0))
     weight: Block = Block()
 
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        scene, yaw, tilt = table(), math.radians(self.heading), self.tilt_at(None)
+        place(scene, replace(self.seesaw, tilt=tilt), "seesaw", self.foot, yaw, free=False)
+        place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
+        place(scene, self.target, "target", self.on_deck(self.offset, tilt), yaw)
+        scene.body("target").quat = quat("y", tilt)
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        blocks = world.free_bodies
+        return (
+            world.tilt(BEAM) <= LEVEL
+            and abs(self.along(world, "target") - self.offset) <= STAYS
+            and all(world.touching_bodies(block).difference(blocks) == {BEAM} for block in blocks)
+            and not world.touching(ROBOT, BEAM)
+        )
+
+    def failure(self, world: World) -> str | None:
+        if world.touched("target", "table"):
+            return "the target fell off the seesaw"
+        return "a block fell off the table" if fallen(world, *world.free_bodies) else None
+
+    def along(self, world: World, block: str) -> float:
+        """Where a block is, measured along the deck from the axle [m]."""
+        return float(world.rot(BEAM)[:, 0] @ (world.pos(block) - world.pos(BEAM)))
+
+    def tilt(self, world: World) -> float:
+        """Tilt of the deck, positive where +s is down [rad]."""
+        return -math.asin(float(world.rot(BEAM)[2, 0]))
+
+    def up(self, world: World) -> int:
+        """The arm that is up, -1 or 1."""
+        return -1 if self.tilt(world) > 0 else 1
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Guess, put, let go, look; then narrow the stretch that is left, until the deck is level. Reads no mass."""
+        side = self.up(world)
+        spans = self.spans(side)
+        low, high, along = spans[0][0], spans[-1][1], self.guess(side)
+        while True:
+            yield from self.put_at(world, along)
+            tilt, stood = self.tilt(world), self.along(world, "weight")
+            if abs(tilt) <= SURELY:
+                return
+            low, high = (low, min(high, stood)) if tilt > 0 else (max(low, stood), high)
+            if high - low < 0.004:
+                raise GaveUp("the balancing place was not found")
+            along = self.nearest(side, self._next(low, high, stood, tilt))
+
+    def _next(self, low: float, high: float, stood: float, tilt: float) -> float:
+        """The next place to try between `low` and `high` [m], from the tilt with the counterweight at `stood` [rad].
+
+        A deck on its stop says only which way to go. Between the stops the tilt is proportional to the error, and the
+        factor that one would expect is off by a factor of two at most.
+        """
+        middle = (low + high) / 2
+        if abs(tilt) > self.seesaw.steepest - math.radians(0.5):
+            return middle
+        there = stood - math.tan(tilt) / math.tan(LEVEL) * with_values(self, EXPECTED).margin
+        return there if low < there < high else middle
+
+    def put_at(self, world: World, along: float) -> Plan:
+        """Put the counterweight on the deck from wherever it stands, let go, and see whether the deck stays level."""
+        arm, at = world.arm, world.com("weight")
+        high = TRANSIT - at[2]
+        yield from pick(arm, at, closing=world.rot("weight")[:, 1], above=high, lift=high, pace=STEADY)
+        spot = self.on_deck(along, self.tilt(world))
+        yield from go_to(arm, [*spot[:2], TRANSIT], closing_along(arm, self.across), COARSE)
+        yield from put(arm, "weight", spot + world.com("weight") - world.pos("weight"), on=BEAM, hover=0.02)
+        yield from retreat(arm, 0.08)
+        yield from hold(arm, 0.2)
+        yield from wait(arm, lambda: np.abs(world.velocity(BEAM)[:3]).max() < 0.01, give_up=4.0)
+        if world.tilt(BEAM) <= SURELY:
+            yield from hold(arm, self.HOLD)
+
+    # --- shortcuts and ablations ------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "mirror_the_target": Shortcut(lambda world: self.put_at(world, self.mirror)),
+            "put_it_once": Shortcut(lambda world: self.put_at(world, self.guess(self.up(world)))),
+            "hold_the_deck_level": Shortcut(self._hold_level),
+        }
+
+    def _hold_level(self, world: World) -> Plan:
+        """Put the counterweight in the mirror image and hold the deck level by hand: level it is, but not balanced."""
+        yield from self.put_at(world, self.mirror)
+        arm, side = world.arm, self.up(world)
+        spot = self.on_deck(side * (self.seesaw.arm(side) - 0.02), self.tilt(world))
+        yield from go_to(arm, [*arm.hand[:2], TRANSIT], pace=COARSE, grip=CLOSED)
+        yield from go_to(arm, [*spot[:2], TRANSIT], pace=COARSE)
+        yield from push(arm, -0.08 * UP, until=lambda: side * self.tilt(world) > 0)
+        yield from hold(arm, 1.2 * self.HOLD)
+        yield from retreat(arm, 0.08)
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        scene = self.build()
+        scene.delete(scene.body("weight"))
+        return {"no_counterweight": scene}
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        """The arrangement, whatever weighs what; the lever law against the places that there are; no easy guess."""
+        deck, lever = self.seesaw, abs(self.offset)
+        far = deck.arm(1 if self.offset > 0 else -1) - self.target.width / 2 - RIM
+        yield require(INNER <= lever <= far, "the target has no room on its arm", offset=lever, farthest=far)
+        yield on_table("the stand or the counterweight", [self.foot, self.start], margin=0.05)
+        dip, under = deck.dip, deck.height - deck.thickness
+        yield require(dip <= under, "the deck strikes the table before its stop", dip=dip, height=under)
+        beside, need = abs(float(self.across @ (self.start - self.foot))), PALM_ALONG + AIR + deck.width / 2
+        fits = beside >= need
+        yield require(fits, "the hand cannot take the counterweight beside the seesaw", beside=beside, needed=need)
+        grip, need = max(deck.friction, min(self.target.friction, self.weight.friction)), 1.5 * math.tan(deck.steepest)
+        yield require(grip >= need, "blocks slide on the tilted deck", friction=grip, needed=need)
+
+        at, margin, up = self.balance, self.margin, -1 if self.balance < 0 else 1
+        spans = self.spans(up)
+        yield require(bool(spans), "the raised arm has no room", arm=deck.arm(up))
+        room = max(min(high, at + margin) - max(low, at - margin) for low, high in spans)
+        why = "no place on the deck balances with room to spare"
+        yield require(room >= ROOM, why, balance=at, margin=margin, room=room, needed=ROOM)
+        yield within_reach("a place of the counterweight", self.on_deck(at, 0.0) + self.weight.height * UP, self.start)
+
+        alone, stop = abs(self.tilt_at(None)), deck.steepest
+        yield require(alone >= stop, "the seesaw is not on its stop at the start", tilt=alone, stop=stop)
+        tilt = abs(self.tilt_at(self.mirror))
+        yield require(tilt >= CLEARLY, "the mirror image of the target's place balances", tilt=tilt, needed=CLEARLY)
+        low, high = self.tilt_at(self.mirror, -MOVED), self.tilt_at(self.mirror, MOVED)
+        never = low > LEVEL or high < -LEVEL
+        yield require(never, "the mirror image balances once the target is nudged", low=low, high=high)
+        tilt = abs(self.tilt_at(self.guess(up)))
+        yield require(tilt >= CLEARLY, "the first guess balances", tilt=tilt, needed=CLEARLY)
+
+    def features(self) -> Mapping[str, float]:
+        """The torque to be balanced by that of the counterweight in the mirror image, and where it balances [m]."""
+        return {"torque_ratio": -self.balance / self.offset, "place_of_balance": self.balance}
+
+    # --- statics --------------------------------------------------------------------------
+
+    def tilt_at(self, along: float | None, moved: float = 0.0) -> float:
+        """Tilt with the counterweight at `along`, or without it, and the target moved by `moved` along s [m] [rad]."""
+        target = standing(self.target, self.offset + moved)
+        return self.seesaw.rest([target] if along is None else [target, standing(self.weight, along)])
+
+    @property
+    def balance(self) -> float:
+        """Where the counterweight makes the deck exactly level, along s [m]: m_w s_w = -(m_t s_t + m_b s_b)."""
+        return -self.seesaw.moment([standing(self.target, self.offset)]) / self.weight.mass
+
+    @property
+    def margin(self) -> float:
+        """How far from `balance` the counterweight may stand for the tilt to stay within `LEVEL` [m]."""
+        loads = [standing(self.target, self.offset), standing(self.weight, self.balance)]
+        return math.tan(LEVEL) * self.seesaw.stiffness(loads) / self.weight.mass
+
+    def guess(self, side: int) -> float:
+        """The place on one arm that would balance, were all masses as one expects; as far as it reaches [m]."""
+        return self.nearest(side, with_values(self, EXPECTED).balance)
+
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def s(self) -> Vec3:
-        """Unit vector along the level deck, shape (3,)."""
-        a = math.radians(self.heading)
-        return np.array([math.cos(a), math.sin(a), 0.0])
+    def across(self) -> Vec3:
+        """Unit vector along the axle: fingers that close along it lie against faces that no tilt turns."""
+        return heading(self.heading + 90.0)
 
     @property
     def foot(self) -> Vec3:
@@ -121,297 +277,20 @@ class SeesawBalance(Scenario):
         """Foot of the counterweight on the table [m]."""
         return np.array([self.weight_x, self.weight_y, TABLE_TOP])
 
-    def spans(self, side: int) -> list[tuple[float, float]]:
-        """Stretches of one arm (-1 or 1) where the middle of the counterweight can stand, from the inside out [m].
-
-        Both ends of a stretch are distances from the axle.
-        """
-        inside, outside = INNER, abs(self.seesaw.ends[(side + 1) // 2]) - self.weight.width / 2 - RIM
-        stretches = [(inside, outside)]
-        if side * self.offset > 0:
-            stretches = [(inside, abs(self.offset) - BESIDE), (abs(self.offset) + BESIDE, outside)]
-        return [(low, high) for low, high in stretches if low <= high]
-
-    def nearest(self, side: int, place: float) -> float:
-        """The place on one arm, if it has any, that is nearest to `place`, both along s [m]."""
-        near = [min(max(side * place, low), high) for low, high in self.spans(side)]
-        return side * min(near, key=lambda at: abs(at - side * place))
-
-    # --- statics --------------------------------------------------------------------------
-
-    def tilt_at(self, place: float | None, moved: float = 0.0) -> float:
-        """Tilt with the counterweight at `place` [m], or without it [rad]. Positive where +s is down.
-
-        Args:
-            moved: by how much the target has been moved along s [m].
-        """
-        loads = [(self.target.mass, self.offset + moved, self.target.height / 2)]
-        if place is not None:
-            loads.append((self.weight.mass, place, self.weight.height / 2))
-        stop = math.radians(self.seesaw.stop)
-        return min(max(math.atan(self.seesaw.slope(loads)), -stop), stop)
-
-    @property
-    def moment(self) -> float:
-        """First moment of target and beam about the axle [kg m]; times g it is the torque to be balanced."""
-        return self.target.mass * self.offset - self.seesaw.mass * self.seesaw.pivot_offset
-
-    @property
-    def balance(self) -> float:
-        """Where the counterweight makes the deck exactly level, along s [m]: m_w s_w = -(m_t s_t + m_b s_b)."""
-        return -self.moment / self.weight.mass
-
-    @property
-    def margin(self) -> float:
-        """How far from `balance` the counterweight may stand for the tilt to stay within `LEVEL` [m]."""
-        block, beam = self.seesaw.drop - self.weight.height / 2, self.seesaw.drop + self.seesaw.thickness / 2
-        stiffness = self.seesaw.mass * beam + (self.target.mass + self.weight.mass) * block
-        return math.tan(LEVEL) * stiffness / self.weight.mass
-
-    @property
-    def torque_ratio(self) -> float:
-        """Torque of target and beam over that of the counterweight in the mirror image of the target's place.
-
-        At 1 the mirror image balances; below 0 the counterweight belongs on the target's own arm.
-        """
-        return self.moment / (self.weight.mass * self.offset)
-
-    @property
-    def raised(self) -> int:
-        """The arm that is up at the start, -1 or 1."""
-        return -1 if self.moment > 0 else 1
-
     @property
     def mirror(self) -> float:
         """The place opposite to the target, as far as the deck reaches [m]."""
         return self.nearest(-1 if self.offset > 0 else 1, -self.offset)
 
-    def expected(self, side: int) -> float:
-        """The place that would balance, were all masses as one expects; as far as that arm has it [m]."""
-        moment = EXPECTED_BLOCK * self.offset - EXPECTED_BEAM * self.seesaw.pivot_offset
-        return self.nearest(side, -moment / EXPECTED_BLOCK)
+    def spans(self, side: int) -> list[tuple[float, float]]:
+        """Stretches of one arm, -1 or 1, where the middle of the counterweight can be [m]; see `Seesaw.stretches`."""
+        return self.seesaw.stretches(side, INNER, self.weight.width / 2 + RIM, taken=self.offset, apart=BESIDE)
 
-    def infeasible(self) -> Refutation | None:
-        return self._misplaced() or self._unbalanceable() or self._too_easy()
+    def nearest(self, side: int, along: float) -> float:
+        """The place on one arm, if it has any, that is nearest to `along` [m]."""
+        near = [min(max(along, low), high) for low, high in self.spans(side)]
+        return min(near, key=lambda at: abs(at - along))
 
-    def _misplaced(self) -> Refutation | None:
-        """What is wrong with the arrangement, whatever weighs what."""
-        arm = abs(self.seesaw.ends[1 if self.offset > 0 else 0])
-        far = arm - self.target.width / 2 - RIM
-        if not INNER <= abs(self.offset) <= far:
-            return Refutation("the target has no room on its arm", {"offset": abs(self.offset), "farthest": far})
-        if (out := float(np.abs([self.x, self.y, self.weight_x, self.weight_y]).max())) > TABLE_HALF - 0.05:
-            return Refutation(
-                "the stand or the counterweight is not on the table", {"farthest": out, "edge": TABLE_HALF}
-            )
-        dip = max(map(abs, self.seesaw.ends)) * math.sin(math.radians(self.seesaw.stop))
-        if (under := self.seesaw.height - self.seesaw.thickness) < dip:
-            return Refutation("the deck strikes the table before its stop", {"dip": dip, "height": under})
-        away = self.start - self.foot
-        beside = abs(float(self.s[0] * away[1] - self.s[1] * away[0]))
-        if beside < (need := PALM + self.seesaw.width / 2):
-            return Refutation(
-                "the hand cannot take the counterweight beside the seesaw", {"beside": beside, "needed": need}
-            )
-        grip = max(self.seesaw.friction, min(self.target.friction, self.weight.friction))
-        if grip < (need := 1.5 * math.tan(math.radians(self.seesaw.stop))):
-            return Refutation("blocks slide on the tilted deck", {"friction": grip, "needed": need})
-        return None
-
-    def _unbalanceable(self) -> Refutation | None:
-        """The lever law against the places that there are."""
-        spans = self.spans(self.raised)
-        if not spans:
-            return Refutation("the raised arm has no room", {"arm": abs(self.seesaw.ends[(self.raised + 1) // 2])})
-        at, margin = self.raised * self.balance, self.margin
-        room = max(min(high, at + margin) - max(low, at - margin) for low, high in spans)
-        if room < ROOM:
-            return Refutation(
-                "no place on the deck balances with room to spare",
-                {
-                    "balance": at,
-                    "margin": margin,
-                    "room": room,
-                    "needed": ROOM,
-                    "inner": spans[0][0],
-                    "outer": spans[-1][1],
-                },
-            )
-        reaches = [
-            np.linalg.norm(self.foot + self.raised * at * self.s + 0.15 * UP - SHOULDER),
-            np.linalg.norm(self.start - SHOULDER),
-        ]
-        if (away := float(max(reaches))) > REACH:
-            return Refutation("a place of the counterweight is out of reach", {"distance": away, "reach": REACH})
-        return None
-
-    def _too_easy(self) -> Refutation | None:
-        """What is level without any search is no puzzle."""
-        stop = math.radians(self.seesaw.stop)
-        if (alone := abs(self.tilt_at(None))) < stop:
-            return Refutation("the seesaw is not on its stop at the start", {"tilt": alone, "stop": stop})
-        if (tilt := abs(self.tilt_at(self.mirror))) < CLEARLY:
-            return Refutation("the mirror image of the target's place balances", {"tilt": tilt, "needed": CLEARLY})
-        low, high = self.tilt_at(self.mirror, -MOVED), self.tilt_at(self.mirror, MOVED)
-        if low <= LEVEL and high >= -LEVEL:
-            return Refutation("the mirror image balances once the target is nudged", {"from": low, "to": high})
-        if (tilt := abs(self.tilt_at(self.expected(self.raised)))) < CLEARLY:
-            return Refutation("the first guess balances", {"tilt": tilt, "needed": CLEARLY})
-        return None
-
-    # --- scene ----------------------------------------------------------------------------
-
-    def build(self) -> mujoco.MjSpec:
-        scene, yaw = table(), math.radians(self.heading)
-        tilt = self.tilt_at(None)
-        place(scene, replace(self.seesaw, tilt=tilt), "seesaw", self.foot, yaw, free=False)
-        place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
-        place(scene, self.target, "target", self._on_deck(self.offset, tilt), yaw)
-        turn = np.zeros(4)
-        mujoco.mju_mulQuat(
-            turn, scene.body("target").quat, np.array([math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0])
-        )
-        scene.body("target").quat = turn
-        return scene
-
-    def _on_deck(self, along: float, tilt: float) -> Vec3:
-        """The point of the deck's upper face at `along` when it is tilted [m]."""
-        level = np.array([math.cos(tilt), -math.sin(tilt)]) * along
-        hangs = np.array([math.sin(tilt), math.cos(tilt)]) * -self.seesaw.drop
-        run, rise = level + hangs
-        return self.foot + self.seesaw.axle * UP + run * self.s + rise * UP
-
-    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        scene = self.build()
-        scene.delete(scene.body("weight"))
-        return {"no counterweight": scene}
-
-    # --- goal -----------------------------------------------------------------------------
-
-    def success(self, world: World) -> bool:
-        return (
-            world.tilt(BEAM) <= LEVEL
-            and abs(self.along(world, "target") - self.offset) <= STAYS
-            and all(self._stands(world, block) for block in world.free_bodies)
-            and not world.touching(ROBOT, BEAM)
-        )
-
-    def failure(self, world: World) -> str | None:
-        if world.touched("target", "table"):
-            return "the target fell off the seesaw"
-        if any(world.pos(block)[2] < TABLE_TOP - 0.1 for block in world.free_bodies):
-            return "a block fell off the table"
-        return None
-
-    def _stands(self, world: World, block: str) -> bool:
-        """Whether a block is carried by the deck, and by nothing and nobody else."""
-        others = (ROBOT, "table", "seesaw")
-        return world.touching(block, BEAM) and not any(world.touching(block, other) for other in others)
-
-    def along(self, world: World, block: str) -> float:
-        """Where a block is, measured along the deck from the axle [m]."""
-        return float(world.rot(BEAM)[:, 0] @ (world.pos(block) - world.pos(BEAM)))
-
-    def tilt(self, world: World) -> float:
-        """Tilt of the deck, positive where +s is down [rad]."""
-        return -math.asin(float(world.rot(BEAM)[2, 0]))
-
-    # --- oracle ---------------------------------------------------------------------------
-
-    def oracle(self, world: World) -> Plan:
-        """Guess, put, let go, look; then halve the stretch that is left, until the deck is level. Reads no mass."""
-        side = -1 if self.tilt(world) > 0 else 1
-        spans = self.spans(side)
-        low, high, guess = spans[0][0], spans[-1][1], self.expected(side)
-        while True:
-            yield from self.put(world, guess)
-            yield from self.watch(world)
-            excess, stood = side * self.tilt(world), side * self.along(world, "weight")
-            if abs(excess) <= SURELY:
-                return
-            low, high = (low, min(high, stood)) if excess > 0 else (max(low, stood), high)
-            if high - low < 0.004:
-                raise GaveUp("the balancing place was not found")
-            guess = self.nearest(side, side * self._next(low, high, stood, excess))
-
-    def _next(self, low: float, high: float, stood: float, excess: float) -> float:
-        """The next distance to try between `low` and `high` [m], from the tilt towards the counterweight [rad].
-
-        A deck on its stop says only which way to go. Between the stops the tilt is proportional to the error, and the
-        factor that one would expect is off by a factor of two at most.
-        """
-        middle = (low + high) / 2
-        if abs(excess) > math.radians(self.seesaw.stop - 0.5):
-            return middle
-        there = stood - math.tan(excess) / math.tan(LEVEL) * EXPECTED_MARGIN
-        return there if low < there < high else middle
-
-    def put(self, world: World, along: float) -> Plan:
-        """Take the counterweight from where it stands and put it on the deck, as gently as the deck allows."""
-        yield from self.take(world, "weight")
-        spot = self._on_deck(along, self.tilt(world))
-        hangs = float(world.hand[2] - world.pos("weight")[2])
-        yield from go_to(world, [spot[0], spot[1], TRANSIT], self._across(world, self.s), BRISK, within=0.015)
-        yield from go_to(world, spot + (hangs + 0.006) * UP, self._across(world, self.s), BRISK, within=0.003)
-        yield from push(world, -0.04 * UP, until=lambda: world.touching("weight", BEAM))
-        yield from release(world, 0.15)
-        yield from go_to(world, world.hand + 0.08 * UP, speed=BRISK, within=0.02, grip=OPEN)
-
-    def take(self, world: World, block: str) -> Plan:
-        """Grasp a block where and as it stands, and lift it clear of everything."""
-        frame = self._across(world, world.rot(block)[:, 0])
-        high = 0.6 * self.weight.height * UP
-        over = world.pos(block) + high
-        over[2] = max(world.hand[2] - 0.02, TABLE_TOP + 0.14)
-        yield from go_to(world, over, frame, BRISK, within=0.02, grip=OPEN)
-        yield from go_to(world, world.pos(block) + high, frame, BRISK, within=0.003, grip=OPEN)
-        yield from grasp(world, 0.2)
-        yield from go_to(world, [*world.hand[:2], TRANSIT], speed=BRISK, within=0.03, grip=CLOSED)
-
-    def watch(self, world: World) -> Plan:
-        """Wait until the beam has come to rest, and where that is level, whether it lasts."""
-        yield from hold(world, 0.2)
-        yield from wait(world, lambda: np.abs(world.velocity(BEAM)[:3]).max() < 0.01, give_up=4.0)
-        if world.tilt(BEAM) <= SURELY:
-            yield from hold(world, self.HOLD)
-
-    def _across(self, world: World, along: Vec3) -> Mat3:
-        """The hand pointing down, closing across `along`: pads then lie against faces that no tilt turns.
-
-        Of the two orientations that look alike, the one closer to the hand's own: it never turns half round.
-        """
-        x = world.hand_rot[:, 0]
-        here, there = math.atan2(-x[0], x[1]), math.atan2(along[1], along[0])
-        return facing_down(here + (there - here + math.pi / 2) % math.pi - math.pi / 2)
-
-    # --- shortcuts ------------------------------------------------------------------------
-
-    def shortcuts(self) -> Mapping[str, Planner]:
-        return {
-            "mirror the target": lambda world: self._once(world, self.mirror),
-            "put it once": lambda world: self._once(world, self.expected(-1 if self.tilt(world) > 0 else 1)),
-            "hold the deck level": self._hold_level,
-        }
-
-    def _once(self, world: World, along: float) -> Plan:
-        """Put the counterweight somewhere and leave it there."""
-        yield from self.put(world, along)
-        yield from self.watch(world)
-
-    def _hold_level(self, world: World) -> Plan:
-        """Put the counterweight in the mirror image and hold the deck level by hand: level it is, but not balanced."""
-        yield from self._once(world, self.mirror)
-        side = -1 if self.tilt(world) > 0 else 1
-        spot = self._on_deck(self.seesaw.ends[(side + 1) // 2] - side * 0.02, self.tilt(world))
-        frame = self._across(world, self.s)
-        yield from go_to(world, [*world.hand[:2], TRANSIT], frame, BRISK, within=0.03, grip=CLOSED)
-        yield from go_to(world, [*spot[:2], TRANSIT], frame, BRISK, within=0.015, grip=CLOSED)
-        yield from push(world, -0.08 * UP, until=lambda: side * self.tilt(world) > 0, grip=CLOSED)
-        yield from hold(world, 1.2 * self.HOLD, CLOSED)
-        yield from go_to(world, world.hand + 0.08 * UP, within=0.02)
-
-    # --- features -------------------------------------------------------------------------
-
-    def features(self) -> Mapping[str, float]:
-        """How wrong the mirror image is, and where the counterweight belongs [m]."""
-        return {"torque ratio": self.torque_ratio, "place of balance": self.balance}
+    def on_deck(self, along: float, tilt: float) -> Vec3:
+        """The point of the deck's upper face at `along` [m] when it is tilted [rad], in the world [m]."""
+        return self.foot + about_z(math.radians(self.heading)) @ self.seesaw.on_deck(along, tilt)

@@ -10,8 +10,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from scengen.assets.box import Block
-from scengen.assets.prop import TABLE_TOP, UP, place, table
-from scengen.assets.seesaw import Seesaw
+from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.assets.seesaw import Seesaw, standing
+from scengen.geometry import UP
 
 GRAVITY = 9.81
 BEAM = "seesaw/beam"
@@ -42,8 +43,7 @@ class Balance:
 
 def stiffness(seesaw: Seesaw, *masses: float) -> float:
     """Restoring torque per small angle of a deck with blocks [N m/rad]: the weight of all that hangs, by its depth."""
-    block, beam = seesaw.drop - Block().height / 2, seesaw.drop + seesaw.thickness / 2
-    return GRAVITY * (seesaw.mass * beam + sum(masses) * block)
+    return GRAVITY * seesaw.stiffness([standing(Block(mass=mass), 0.0) for mass in masses])
 
 
 @given(mass=st.floats(0.1, 0.4), ratio=st.floats(0.5, 2.0), lever=st.floats(0.06, 0.13))
@@ -60,9 +60,8 @@ def test_unequal_moments_tilt_it_by_their_difference_over_the_stiffness():
     """Two blocks of 250 g at 140 and 120 mm, beam 350 g: tan = 0.25 x 0.02 / (0.35 x 0.066 + 0.5 x 0.035) = 0.123."""
     deck = Balance(Seesaw(), (0.25, 0.14), (0.25, -0.12)).after(4.0)
     assert deck.tilt == pytest.approx(7.02, abs=0.35)
-    assert math.degrees(math.atan(Seesaw().slope([(0.25, 0.14, 0.025), (0.25, -0.12, 0.025)]))) == pytest.approx(
-        7.02, abs=0.01
-    )
+    rest = Seesaw().rest([standing(Block(mass=0.25), 0.14), standing(Block(mass=0.25), -0.12)])
+    assert math.degrees(rest) == pytest.approx(7.02, abs=0.01)
 
 
 @given(
@@ -92,7 +91,7 @@ def test_too_much_on_one_arm_puts_it_on_its_stop(side):
 def test_without_friction_it_swings_like_a_physical_pendulum(mass, pivot):
     """T = 2 pi sqrt(I / k), with I about the axle: 1.45 s for a deck 0.6 m long, 66 mm below it, whatever it weighs."""
     seesaw = Seesaw(mass=mass, pivot_offset=pivot, damping=0.0, rubbing=0.0, height=0.15, stop=25.0)
-    rest = math.atan(seesaw.slope([]))
+    rest = seesaw.rest([])
     depth = seesaw.drop + seesaw.thickness / 2
     inertia = mass * ((seesaw.length**2 + seesaw.thickness**2) / 12 + pivot**2 + depth**2)
     expected = 2 * math.pi * math.sqrt(inertia / (mass * GRAVITY * math.hypot(depth, pivot)))
@@ -126,8 +125,34 @@ def test_the_ends_of_the_deck_are_where_it_says(pivot, length):
     geom = deck.data.geom("seesaw/deck")
     along = geom.xpos[0] - deck.data.body(BEAM).xpos[0]
     half = deck.model.geom("seesaw/deck").size[0]
-    assert (along - half, along + half) == pytest.approx(Seesaw(pivot_offset=pivot, length=length).ends)
+    seesaw = Seesaw(pivot_offset=pivot, length=length)
+    assert (along - half, along + half) == pytest.approx((-seesaw.arm(-1), seesaw.arm(1)))
     assert geom.xpos[2] + deck.model.geom("seesaw/deck").size[2] == pytest.approx(TABLE_TOP + Seesaw().height)
+
+
+@given(along=st.floats(-0.3, 0.3), tilt=st.floats(-0.15, 0.15))
+@settings(max_examples=25, deadline=None)
+def test_a_point_of_the_tilted_deck_is_on_its_upper_face(along, tilt):
+    deck = Balance(Seesaw(tilt=tilt, pivot_offset=0.05))
+    geom, seesaw = deck.data.geom("seesaw/deck"), Seesaw(pivot_offset=0.05)
+    point = TABLE_TOP * UP + seesaw.on_deck(along, tilt)
+    away = geom.xmat.reshape(3, 3).T @ (point - geom.xpos)
+    assert away == pytest.approx([along + seesaw.pivot_offset, 0.0, seesaw.thickness / 2])
+
+
+@pytest.mark.parametrize(
+    ("side", "taken", "parts"),
+    [
+        (-1, 0.14, [(-0.276, -0.055)]),
+        (1, 0.14, [(0.055, 0.084), (0.196, 0.276)]),
+        (-1, -0.14, [(-0.276, -0.196), (-0.084, -0.055)]),
+        (1, 0.10, [(0.156, 0.276)]),
+        (1, 0.25, [(0.055, 0.194)]),
+    ],
+)
+def test_there_is_room_on_an_arm_up_to_its_end_and_to_either_side_of_what_stands_there(side, taken, parts):
+    found = Seesaw().stretches(side, inner=0.055, rim=0.024, taken=taken, apart=0.056)
+    assert np.allclose(found, parts)
 
 
 def test_level_is_where_its_joint_reads_zero_whatever_it_starts_from():
