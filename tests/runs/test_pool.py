@@ -8,27 +8,22 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pools import QUICKLY, certificate_of, make, rewritten
 
 from scengen import config, pool
+from scengen.certificate import StoredCertificate
 from scengen.errors import PoolError, UnknownName
-from scengen.pool import Pool
-from scengen.runs.generate import Settings, generate
+from scengen.pool import FORMAT, SCHEMA, Pool, PoolRow
 from scengen.validate.verify import verify
 
 ROOT = Path(__file__).parents[2]
-QUICKLY = ["certify.robust.runs=1", "certify.robust.bound=0.04"]
-"""Settings that keep every check, with one jittered run."""
-
-
-def make(folder, *overrides, n=3, workers=1, seed=0):
-    composed = config.read("generate", ["task=domino_single", f"n={n}", f"seed={seed}", *QUICKLY, *overrides])
-    settings = Settings(n=n, seed=seed, workers=workers, pool=str(folder), split=composed.settings["split"])
-    return generate(composed.task, composed.resolved, composed.level, settings, lambda *_: None)
 
 
 def failures(folder, strict=True, workers=1):
@@ -48,22 +43,45 @@ def mine(made, tmp_path):
     return Path(shutil.copytree(made, tmp_path / "mine"))
 
 
-def rewritten(folder, change):
-    """Change the rows of a pool and write hashes to match, as a forger would."""
-    opened = Pool.open(folder)
-    rows = [change(row) or row for row in opened.rows()]
-    kept = {k: v for k, v in opened.manifest.items() if k not in ("format", "shards")}
-    pool.write(folder, kept, rows)
-
-
 # --- reading --------------------------------------------------------------------------------
 
 
 def test_a_pool_holds_the_first_certified_indices_in_order(made):
     rows = list(Pool.open(made).rows())
-    assert [r["index"] for r in rows] == [0, 1, 2]
-    assert all(r["certificate"]["verdict"] == "certified" and r["split"] == "id" for r in rows)
-    assert all(r["witness"].dtype == np.float32 and r["witness"].shape[1] == 7 for r in rows)
+    assert [r.index for r in rows] == [0, 1, 2]
+    assert all(r.certificate.complete and r.split == "id" and r.axes == () and r.shifted == {} for r in rows)
+    assert all(r.witness.dtype == np.float32 and r.witness.shape[1] == 7 for r in rows)
+
+
+def test_a_row_has_a_field_for_every_column():
+    assert [f.name for f in fields(PoolRow)] == SCHEMA.names
+    certificate = SCHEMA.field("certificate").type
+    assert [f.name for f in fields(StoredCertificate)] == [f.name for f in certificate]
+
+
+def test_rows_are_values_that_cannot_be_changed_and_come_back_from_plain_data(made):
+    row = next(Pool.open(made).rows())
+    with pytest.raises(AttributeError):
+        row.task = "other"
+    again = PoolRow.of(row.plain(), row.witness)
+    assert again == row and again.plain() == row.plain() and replace(row, index=9) != row
+
+
+def test_light_reading_gives_the_same_values(made):
+    opened = Pool.open(made)
+    rows = list(opened.rows())
+    assert list(opened.columns("id", "params")) == [(r.id, r.params) for r in rows]
+    assert list(opened.rows(witness=False)) == rows and all(len(r.witness) == 0 for r in opened.rows(witness=False))
+    with pytest.raises(UnknownName, match="did you mean 'witness_sha256'"):
+        next(opened.columns("witness"))
+
+
+def test_the_manifest_is_read_by_names(made):
+    opened = Pool.open(made)
+    assert (opened.task, opened.split, opened.sampler, opened.seed) == ("domino_single", "id", "iid", 0)
+    assert (opened.settings, opened.indices, opened.chosen) == ("quick", 3, False)
+    assert opened.funnel["certified"] == 3 and opened.reasons == {} and opened.versions["mujoco"]
+    assert opened.task_node == config.task("domino_single").node
 
 
 def test_plain_pyarrow_reads_it(made):
@@ -72,7 +90,7 @@ def test_plain_pyarrow_reads_it(made):
 
 
 def test_nothing_in_a_pool_names_the_machine_or_the_time(made):
-    text = (made / "manifest.json").read_text() + "".join(map(str, Pool.open(made).rows()))
+    text = (made / "manifest.json").read_text() + "".join(str(r.plain()) for r in Pool.open(made).rows())
     assert str(made.parent) not in text and os.uname().nodename not in text.split() and str(Path.home()) not in text
 
 
@@ -85,7 +103,7 @@ def test_the_instruction_names_neither_axis_nor_values(made):
 def test_a_scenario_is_found_by_the_beginning_of_its_id(made):
     opened = Pool.open(made)
     first = next(opened.rows())
-    assert opened.row(first["id"][:6])["index"] == 0
+    assert opened.row(first.id[:6]).index == 0
     with pytest.raises(UnknownName, match="no scenario in"):
         opened.row("zzz")
 
@@ -162,6 +180,12 @@ def test_other_settings_cannot_continue_a_run(made):
         make(made, "task.id.gap_ratio=[uniform,0.7,1.0]")
 
 
+def test_a_run_of_one_spelling_of_a_split_is_continued_by_another(tmp_path):
+    first = make(tmp_path / "pool", split="wide_gaps@1", n=1).pool
+    again = make(tmp_path / "pool", split="wide_gaps@01", n=1).pool
+    assert first.split == again.split == "wide_gaps@1" and next(again.rows()).axes == ("wide_gaps@1",)
+
+
 # --- damage ---------------------------------------------------------------------------------------
 
 
@@ -189,110 +213,168 @@ def test_a_truncated_shard_is_found_and_nothing_reads_it(mine):
 
 
 def flip_scene(row):
-    row["scene_xml"] = row["scene_xml"].replace('mass="0.0', 'mass="0.1', 1)
+    return replace(row, scene_xml=row.scene_xml.replace('mass="0.0', 'mass="0.1', 1))
 
 
-def flip_tape(row):
-    row["witness"] = row["witness"].copy()
-    row["witness"].view(np.uint8)[100, 3] ^= 1
+def flip_witness(row):
+    witness = row.witness.copy()
+    witness.view(np.uint8)[100, 3] ^= 1
+    return replace(row, witness=witness)
 
 
 def flip_params(row):
-    params = json.loads(row["params"])
-    row["params"] = json.dumps({**params, "count": params["count"] - 1}, sort_keys=True)
+    return replace(row, params={**row.params, "count": row.params["count"] - 1})
 
 
-def forge_tape(row):
+def drop_a_parameter(row):
+    """One with its nominal value: the scenario, and so its id, is the same without it."""
+    return replace(row, params={name: value for name, value in row.params.items() if name != "slab.mass"})
+
+
+def forge_witness(row):
     """Cut the actions short and write hashes to match: only the replay can tell."""
-    row["witness"] = row["witness"][:120]
-    forged = pool.sha256(row["witness"].tobytes())
-    row["witness_sha256"] = row["certificate"]["witness_sha256"] = forged
+    forged = pool.sha256(row.witness[:120].tobytes())
+    row = replace(row, witness=row.witness[:120], witness_sha256=forged)
+    return certificate_of(row, witness_sha256=forged)
 
 
 def forge_scene(row):
-    row["scene_xml"] = row["scene_xml"].replace('name="tile_1"', 'name="tile_1" pos2=""', 1)
-    row["scene_sha256"] = row["certificate"]["scene_sha256"] = pool.sha256(row["scene_xml"])
+    return with_scene(row, row.scene_xml.replace('name="tile_1"', 'name="tile_1" pos2=""', 1))
 
 
 def hostile_scene(row):
-    row["scene_xml"] = row["scene_xml"].replace("<worldbody>", '<include file="/etc/passwd"/><worldbody>', 1)
-    row["scene_sha256"] = row["certificate"]["scene_sha256"] = pool.sha256(row["scene_xml"])
+    return with_scene(row, row.scene_xml.replace("<worldbody>", '<include file="/etc/passwd"/><worldbody>', 1))
+
+
+def with_scene(row, text):
+    forged = pool.sha256(text)
+    return certificate_of(replace(row, scene_xml=text, scene_sha256=forged), scene_sha256=forged)
 
 
 def skip_a_check(row):
-    row["certificate"]["checks"][8]["passed"] = None
+    checks = list(row.certificate.checks)
+    checks[8] = replace(checks[8], passed=None)
+    return certificate_of(row, checks=tuple(checks))
+
+
+def forget_the_settling_time(row):
+    return certificate_of(row, checks=tuple(replace(check, settings={}) for check in row.certificate.checks))
 
 
 def foreign_task(row):
-    row["task"] = "domino_singel"
+    return replace(row, task="domino_singel")
 
 
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
         (flip_scene, "the scene has another sha256"),
-        (flip_tape, "the witness has another sha256"),
+        (flip_witness, "the witness has another sha256"),
         (flip_params, "the id does not belong to the parameters"),
-        (forge_tape, "the witness fails"),
+        (drop_a_parameter, "the parameters are not all there"),
+        (forge_witness, "the witness fails"),
         (forge_scene, "XML"),
         (hostile_scene, "contains <include>"),
         (skip_a_check, "the certificate is not complete"),
+        (forget_the_settling_time, "does not say how long the goal must hold"),
         (foreign_task, "did you mean 'domino_single'"),
     ],
 )
 def test_a_forged_row_is_found_by_its_id(mine, damage, says):
-    victim = next(Pool.open(mine).rows())["id"]
-    rewritten(mine, lambda row: damage(row) if row["id"] == victim else None)
+    victim = next(Pool.open(mine).rows()).id
+    rewritten(mine, lambda row: damage(row) if row.id == victim else None)
     found = failures(mine)
     assert [f["id"] for f in found] == [victim] and says in found[0]["reason"]
 
 
 def test_a_scenario_that_occurs_twice_is_found(mine):
     first = next(Pool.open(mine).rows())
-    rewritten(mine, lambda row: first if row["index"] == 1 else None)
+    rewritten(mine, lambda row: first if row.index == 1 else None)
     assert [f["reason"] for f in failures(mine)] == ["the id occurs twice"]
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 1}', '{"format": 99, "shards": []}', "\x00"])
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 2}', '{"format": 2, "shards": []}', "\x00"])
 def test_a_damaged_manifest_is_one_clear_error(mine, text):
     (mine / "manifest.json").write_text(text)
-    with pytest.raises(PoolError, match="damaged|format"):
+    with pytest.raises(PoolError, match="is damaged; restore it"):
         Pool.open(mine)
 
 
-def test_a_certificate_expires_with_the_code_of_its_family(mine):
-    def age(row):
-        row["certificate"]["source_sha256"] = "0" * 64
+@pytest.mark.parametrize("gone", ["config", "funnel", "versions", "indices"])
+def test_a_manifest_that_lacks_a_part_is_damaged(mine, gone):
+    manifest = json.loads((mine / "manifest.json").read_text())
+    (mine / "manifest.json").write_text(json.dumps({k: v for k, v in manifest.items() if k != gone}))
+    with pytest.raises(PoolError, match="is damaged; restore it"):
+        Pool.open(mine)
 
-    rewritten(mine, age)
+
+@pytest.mark.parametrize("number", [1, 99])
+def test_a_pool_of_another_format_is_one_clear_error(mine, number):
+    manifest = json.loads((mine / "manifest.json").read_text())
+    (mine / "manifest.json").write_text(json.dumps({**manifest, "format": number}))
+    with pytest.raises(PoolError, match=f"has pool format {number}, this scengen reads {FORMAT}; generate the pool"):
+        Pool.open(mine)
+
+
+def uncanonical(columns):
+    columns["params"][1] = columns["params"][1].replace(", ", ",")
+
+
+def gap(columns):
+    columns["instruction"][1] = None
+
+
+def gap_in_a_certificate(columns):
+    columns["certificate"][1]["source_sha256"] = None
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (uncanonical, "from row 1 on .*no mapping in canonical JSON"),
+        (gap, "column instruction has gaps"),
+        (gap_in_a_certificate, "from row 1 on .*the certificate lacks source_sha256"),
+        (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 2"),
+    ],
+)
+def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says):
+    """With hashes that match, as from a stranger."""
+    path = mine / "scenarios-00000.parquet"
+    columns = pq.read_table(path).to_pydict()
+    damage(columns)
+    pq.write_table(pa.table(columns, schema=pa.schema([f for f in SCHEMA if f.name in columns])), path)
+    manifest = json.loads((mine / "manifest.json").read_text())
+    manifest["shards"][0] |= {"bytes": path.stat().st_size, "sha256": pool.sha256(path.read_bytes())}
+    (mine / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(PoolError, match=says):
+        list(Pool.open(mine).check().rows())
+    assert failures(mine)[0]["id"] == "shards"
+
+
+def test_a_certificate_expires_with_the_code_of_its_family(mine):
+    rewritten(mine, lambda row: certificate_of(row, source_sha256="0" * 64))
     assert all("expired" in f["reason"] for f in failures(mine)) and len(failures(mine)) == 3
     assert failures(mine, strict=False) == []
 
 
 def test_on_a_machine_that_rounds_otherwise_the_verdict_counts_and_not_the_bits(mine):
-    def elsewhere(row):
-        row["certificate"]["fingerprint"] = row["certificate"]["final_state"] = "0" * 16
-
-    rewritten(mine, elsewhere)
+    rewritten(mine, lambda row: certificate_of(row, fingerprint="0" * 16, final_state="0" * 16))
     report = verify(Pool.open(mine), config.task, 1, True, lambda _: None)
     assert report.holds and report.drifted == 3
 
 
 def test_on_the_same_machine_other_bits_fail(mine):
-    def other_end(row):
-        row["certificate"]["final_state"] = "0" * 16
-
-    rewritten(mine, other_end)
+    rewritten(mine, lambda row: certificate_of(row, final_state="0" * 16))
     assert all("ends in another state" in f["reason"] for f in failures(mine))
 
 
 def test_verification_needs_no_oracle(made, tmp_path):
-    """Delete every `oracle` from a copy of the package and verify with the copy."""
+    """Delete the `oracle` of every family from a copy of the package and verify with the copy."""
     copy = tmp_path / "tree"
     shutil.copytree(ROOT / "scengen", copy / "scengen", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(ROOT / "conf", copy / "conf")
     removed = 0
-    for path in (copy / "scengen").rglob("*.py"):
+    for path in (copy / "scengen" / "tasks").glob("*.py"):
         tree = ast.parse(path.read_text())
         lines = path.read_text().splitlines(keepends=True)
         for node in ast.walk(tree):
