@@ -39,6 +39,20 @@ class Shortcut:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """What a family asks for, as one number: for an adversary that answers without looking.
+
+    Its values mean the same in every scenario of the family: the number of a lane, a share of a height or an offset.
+    """
+
+    candidates: tuple[float, ...]
+    act: Callable[[World, float], Plan]
+    """Acts on a guess as the oracle acts on the right answer, and leaves the scene such that another may follow."""
+    right: Callable[[float], bool] | None = None
+    """Whether a guess is right, by statics, without simulating anything; None if only a rollout can tell."""
+
+
+@dataclass(frozen=True)
 class Refutation:
     """A checkable reason why a combination of parameters is an invalid scenario."""
 
@@ -124,6 +138,10 @@ class Scenario(abc.ABC):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene with its intended means taken away, by name in snake_case: there the witness must fail."""
         return {}
+
+    def answer(self) -> Answer | None:
+        """What is asked for, as one number, if it can be told so: fixed guesses are tried on it."""
+        return None
 
     def constraints(self) -> Iterator[Refutation | None]:
         """What must hold of the parameters, one `require(...)` after the other; later ones may rely on earlier ones."""
