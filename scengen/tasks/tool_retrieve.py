@@ -120,7 +120,7 @@ class ToolRetrieve(Scenario):
         """Grasp the handle across."""
         rot = world.rot("hook")
         at = world.pos("hook") + rot @ [self.hook.inside - self.stretch, 0, GRASP_HEIGHT]
-        yield from pick(world.arm, at, closing=rot[:, 1], lift=0.0, squeeze=0.4)
+        yield from pick(world.arm, at, closing=rot[:, 1], lift=0.0)
 
     def draw_in(self, world: World, mirror: float = 1.0) -> Plan:
         """Pass the hook by the cube on the side away from its tip, put the tip behind the cube, pull.
