@@ -96,6 +96,17 @@ def test_a_hook_weighs_what_it_should_and_lies_flat(hook):
     assert bottom == pytest.approx(0.0, abs=1e-12) and top == pytest.approx(hook.height)
 
 
+@given(hook=st.one_of(anywhere(LHook), anywhere(JHook), anywhere(THook)))
+@settings(max_examples=40, deadline=None)
+def test_the_outline_is_that_of_the_compiled_boxes(hook):
+    model, data = hung(hook)
+    seen = []
+    for i in range(model.ngeom):
+        along, left = (data.geom_xmat[i].reshape(3, 3)[:2, axis] * model.geom_size[i, axis] for axis in (0, 1))
+        seen += [data.geom_xpos[i, :2] + end * along + side * left for end in (-1, 1) for side in (1, -1)]
+    assert hook.corners == pytest.approx(np.array(seen))
+
+
 @given(hook=st.one_of(anywhere(LHook), anywhere(JHook)))
 @settings(max_examples=20, deadline=None)
 def test_a_mirrored_hook_is_the_mirror_image(hook):
