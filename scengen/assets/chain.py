@@ -3,7 +3,9 @@
 x runs along the chain, from the middle of an intact one; y is to its left.
 """
 
+import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +54,11 @@ class Chain:
     defect: Defect | None = None
 
     @property
+    def end(self) -> str:
+        """What its slab is: a `slab`, or a `decoy` that does not count."""
+        return "decoy" if self.defect and self.defect.kind == DECOY else "slab"
+
+    @property
     def gaps(self) -> NDArray[np.float64]:
         """Free spaces, the one before the slab included [m], shape (count,).
 
@@ -77,3 +84,43 @@ class Chain:
         if self.defect and self.defect.kind == MISSING:
             del feet[self.defect.broken(self.count)]
         return feet
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Parallel chains side by side, the first on the right, whose first tiles stand in one row and slabs in another."""
+
+    chains: tuple[Chain, ...]
+    spacing: float
+    """Distance between neighbouring chains [m]."""
+
+    @cached_property
+    def feet(self) -> dict[str, Vec3]:
+        """Where everything stands, from the middle of the middle lane [m].
+
+        `tile_3_0` is the first tile in lane 3, `slab_3` its slab, or `decoy_3`.
+        """
+        feet = {}
+        for k, chain in enumerate(self.chains):
+            across = (k - len(self.chains) // 2) * self.spacing * np.array([0.0, 1.0, 0.0])
+            for i, foot in chain.feet.items():
+                feet[f"{chain.end}_{k}" if i == chain.count else f"tile_{k}_{i}"] = foot + across
+        return feet
+
+    def defects(self, *kinds: int) -> list[Defect]:
+        """The defects of some kinds."""
+        return [chain.defect for chain in self.chains if chain.defect and chain.defect.kind in kinds]
+
+    def piece(self, name: str) -> Domino:
+        """The tile or slab of that name."""
+        chain = self.chains[int(name.split("_")[1])]
+        return chain.tile if name.startswith("tile") else chain.slab
+
+    @property
+    def room(self) -> float:
+        """Least free space across the chains between pieces of different ones [m]; negative where they overlap."""
+        pairs = [(a, b) for a, b in itertools.combinations(self.feet, 2) if a.split("_")[1] != b.split("_")[1]]
+        return min(abs(self.feet[a][1] - self.feet[b][1]) - self._widths(a, b) / 2 for a, b in pairs)
+
+    def _widths(self, *names: str) -> float:
+        return sum(self.piece(name).width for name in names)

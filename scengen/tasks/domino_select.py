@@ -11,21 +11,17 @@
 Bottleneck: the choice is made by looking, because a toppled chain cannot be tried again. Near the hand all chains look
 the same: their first tiles stand in one row and so do their slabs, and only what lies between tells them apart.
 
-Decisions and deviations.
+Decisions:
 
 * The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide
   without standing in each other's way. Here every chain has a slab of its own: a red one counts wherever it stands, a
   blue one never does. So colour tells the decoys and nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth that repeats a kind.
-* One try: the robot may touch one first tile and nothing else. A second chain, a later tile (the paper notes that
-  policies knock over tiles in the middle) or a slab is a latched failure. Touching a wrong first tile is none: nothing
-  can be won any more, and so every wrong chain is judged by physics alone. Each certificate topples each wrong chain
-  as the oracle topples the right one, and watches until all is still.
-* How hard a first tile is pushed does not matter. It gets 2 rad/s from the oracle and 8 from the fastest hand, but
-  11 from its own fall over a gap of 0.6 heights; a tile slides by no more than the 2 mm by which a drift of 1.05
-  heights exceeds its reach.
-* A first tile may be toppled, not carried: a robot that pushes it up to the break, or takes it to the slab, needs no
-  chain.
+* One try: the robot may touch one first tile and nothing else, and topple it but not carry it; all else is a latched
+  failure. Touching a wrong first tile is none: nothing can be won any more, and so every wrong chain is judged by
+  physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until all is still.
+* How hard a first tile is pushed does not matter: it gets 2 rad/s from the oracle and 8 from the fastest hand, but 11
+  from its own fall over a gap of 0.6 heights.
 """
 
 import itertools
@@ -38,11 +34,11 @@ import mujoco
 import numpy as np
 
 from ..assets.box import Domino
-from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect
+from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, about_z, heading
 from ..params import param
-from ..predicates import displaced
+from ..predicates import displaced, touched_only
 from ..robots.jaw import FINGER, TIP
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
@@ -56,13 +52,11 @@ SLAB_MOVES = 0.05
 CLEAR = 0.002
 """Free space across the chains that neighbouring chains must leave [m]: the jitter of the robustness check."""
 CARRIED = 0.01
-"""How far the foot of a first tile may have moved while the robot still touches it [m]. In a topple it moves less than
-1 mm; to fall across a gap in the chain the tile would have to be brought `2 * gap + thickness - height` closer."""
+"""How far the foot of a first tile may have moved while the robot still touches it [m]; in a topple less than 1 mm."""
 TOLERANCE = 1e-10
-"""Solver tolerance. It is relative to the inertia of the whole scene: at MuJoCo's 1e-8 two dozen tiles of 20 g never
-stop rocking by 2e-3 rad/s; here they come to rest, at the same cost."""
+"""Solver tolerance: at MuJoCo's 1e-8 of the scene's inertia two dozen tiles of 20 g never stop rocking."""
 TOPPLED = math.radians(30.0)
-"""Lean at which a first tile falls on by itself, even where it has to carry its neighbour along [rad]."""
+"""Lean at which a first tile falls on by itself, even if it carries its neighbour along [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +87,7 @@ class DominoSelect(Scenario):
         scene = table()
         scene.option.tolerance = TOLERANCE
         for name, foot in self.feet.items():
-            place(scene, self._domino(name), name, foot, math.radians(self.heading))
+            place(scene, self.lanes.piece(name), name, foot, math.radians(self.heading))
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -102,18 +96,13 @@ class DominoSelect(Scenario):
         return any(displaced(world, slab, foot) >= SLAB_MOVES for slab, foot in self.targets.items())
 
     def failure(self, world: World) -> str | None:
-        touched = [piece for piece in world.free_bodies if world.touched(ROBOT, piece)]
-        if any(not piece.startswith("tile") for piece in touched):
-            return "the robot touched a slab"
-        if any(not piece.endswith("_0") for piece in touched):
-            return "the robot touched a tile other than a first one"
-        if len(touched) > 1:
+        firsts = [f"tile_{k}_0" for k in range(LANES)]
+        if touched_only(world, *firsts):
+            return "the robot touched a slab or a tile other than a first one"
+        if len(touched := [tile for tile in firsts if world.touched(ROBOT, tile)]) > 1:
             return "the robot touched a second chain"
-        if any(
-            world.touching(ROBOT, tile) and math.dist(world.pos(tile), self.feet[tile]) > CARRIED for tile in touched
-        ):
-            return "the robot carried the first tile away"
-        return None
+        moved = [tile for tile in touched if math.dist(world.pos(tile), self.feet[tile]) > CARRIED]
+        return "the robot carried the first tile away" if any(world.touching(ROBOT, tile) for tile in moved) else None
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -130,14 +119,9 @@ class DominoSelect(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """Each wrong chain, toppled as the oracle topples the right one, and four ways around the choice.
-
-        A wrong chain must be seen to fall short: a rule that ends its cascade would hide that it works.
-        """
-        chains = {
-            f"topple_chain_{k}": Shortcut(partial(self.topple, tile=f"tile_{k}_0"), to_rest=True) for k in self.wrong
-        }
-        return chains | {
+        """Each wrong chain, which must be seen to fall short by itself, and four ways around the choice."""
+        wrong = {f"topple_chain_{k}": partial(self.topple, tile=f"tile_{k}_0") for k in self.wrong}
+        return {name: Shortcut(plan, to_rest=True) for name, plan in wrong.items()} | {
             "try_a_second_chain": Shortcut(self._try_a_second_chain),
             "push_a_slab": Shortcut(self._push_slab),
             "push_the_last_tile": Shortcut(partial(self.topple, tile=f"tile_{self.intact}_{self.count - 1}")),
@@ -151,14 +135,14 @@ class DominoSelect(Scenario):
         yield from self.topple(world, f"tile_{self.intact}_0")
 
     def _push_slab(self, world: World) -> Plan:
-        """Straight to the target: knock the slab of the intact chain over along its lane, from in front of it."""
+        """Straight to the target: knock the slab of the intact chain over along its lane."""
         before = self.feet[f"slab_{self.intact}"] + 0.8 * self.slab.height * UP - 0.06 * self.u
         yield from poke(world.arm, before, 0.15 * self.u, lambda: self.success(world), above=0.06)
 
     def _carry(self, world: World) -> Plan:
         """Take the intact chain's first tile, which may be touched, and knock its slab over with the tile's foot."""
         tile, slab = self.feet[f"tile_{self.intact}_0"], self.feet[f"slab_{self.intact}"]
-        yield from pick(world.arm, tile + 0.7 * self.tile.height * UP, closing=self.v, above=0.06, lift=0.10)
+        yield from pick(world.arm, tile + 0.7 * self.tile.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
         yield from go_to(world.arm, slab + (self.slab.height + TIP + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
@@ -174,18 +158,16 @@ class DominoSelect(Scenario):
     def constraints(self) -> Iterator[Refutation | None]:
         gap, height, spaces = self.gap, self.tile.height, self.count * self.gap
         yield require(gap < height, "a falling tile cannot reach its neighbour", gap=gap, height=height)
-        beyond, broken = 2 * gap + self.tile.thickness, self._all(GAP, MISSING)
+        beyond, broken = 2 * gap + self.tile.thickness, self.lanes.defects(GAP, MISSING)
         yield require(beyond > height or not broken, "a falling tile reaches across the gap", gap=beyond, height=height)
-        widest = max((drift.stretch * height for drift in self._all(DRIFT)), default=0.0)
+        widest = max((drift.stretch * height for drift in self.lanes.defects(DRIFT)), default=0.0)
         yield require(widest < spaces, "the drift takes more space than the chain has", widest=widest, spaces=spaces)
-        red = len(self.targets)
+        red, room = len(self.targets), self.lanes.room
         yield require(red > 1, "colour alone tells the intact chain", red_slabs=red)
-        pairs = [(a, b) for a, b in itertools.combinations(self.feet, 2) if a.split("_")[1] != b.split("_")[1]]
-        room = min(self._room(a, b) for a, b in pairs)
         yield require(room >= CLEAR, "a piece stands in a neighbouring chain", room=room, needed=CLEAR)
         starts = [self.feet[f"tile_{k}_0"] for k in range(LANES)]
-        ends = [foot + self.slab.height * self.u for name, foot in self.feet.items() if not name.startswith("tile")]
-        yield on_table("a chain", starts + ends)
+        fallen = [foot + self.slab.height * self.u for name, foot in self.feet.items() if not name.startswith("tile")]
+        yield on_table("a chain", starts + fallen)
         yield within_reach("a first tile", *(start + height * UP for start in starts))
 
     def features(self) -> Mapping[str, float]:
@@ -193,18 +175,9 @@ class DominoSelect(Scenario):
         return {
             "gap_over_height": self.gap / self.tile.height,
             "lane_over_slab_width": self.lane / self.slab.width,
-            "least_drift_over_height": min((drift.stretch for drift in self._all(DRIFT)), default=0.0),
-            "least_offset_over_width": min((gap.offset for gap in self._all(GAP)), default=0.0),
+            "least_drift_over_height": min((drift.stretch for drift in self.lanes.defects(DRIFT)), default=0.0),
+            "least_offset_over_width": min((gap.offset for gap in self.lanes.defects(GAP)), default=0.0),
         }
-
-    def _room(self, a: str, b: str) -> float:
-        """Free space across the chains between two pieces [m]."""
-        apart = abs(float((self.feet[a] - self.feet[b]) @ self.v))
-        return apart - (self._domino(a).width + self._domino(b).width) / 2
-
-    def _all(self, *kinds: int) -> list[Defect]:
-        """The defects of some kinds."""
-        return [defect for defect in self.defects if defect and defect.kind in kinds]
 
     # --- geometry -------------------------------------------------------------------------
 
@@ -212,11 +185,6 @@ class DominoSelect(Scenario):
     def u(self) -> Vec3:
         """Unit vector along the chains, shape (3,)."""
         return heading(self.heading)
-
-    @property
-    def v(self) -> Vec3:
-        """Unit vector across the chains, to their left, shape (3,)."""
-        return np.array([-self.u[1], self.u[0], 0.0])
 
     @property
     def gap(self) -> float:
@@ -234,28 +202,19 @@ class DominoSelect(Scenario):
         """Lanes of the chains that have a defect."""
         return [k for k in range(LANES) if k != self.intact]
 
-    def chain(self, k: int) -> Chain:
-        """The chain in lane `k`."""
-        defect = self.defects[k]
-        slab = self.decoy if defect and defect.kind == DECOY else self.slab
-        return Chain(self.count, self.gap, self.tile, slab, defect)
+    @cached_property
+    def lanes(self) -> Lanes:
+        """The five chains in their own axes."""
+        ends = [(self.decoy if defect and defect.kind == DECOY else self.slab, defect) for defect in self.defects]
+        return Lanes(tuple(Chain(self.count, self.gap, self.tile, *end) for end in ends), self.lane)
 
     @cached_property
     def feet(self) -> dict[str, Vec3]:
-        """Where everything stands [m]: `tile_3_0` is the first tile in lane 3, `slab_3` or `decoy_3` its slab."""
-        feet, turn = {}, about_z(math.radians(self.heading))
-        for k, defect in enumerate(self.defects):
-            lane = np.array([self.x, self.y, TABLE_TOP]) + (k - LANES // 2) * self.lane * self.v
-            end = "decoy" if defect and defect.kind == DECOY else "slab"
-            for i, foot in self.chain(k).feet.items():
-                feet[f"{end}_{k}" if i == self.count else f"tile_{k}_{i}"] = lane + turn @ foot
-        return feet
+        """Where everything stands, by its name as in `Lanes.feet` [m]."""
+        middle, turn = np.array([self.x, self.y, TABLE_TOP]), about_z(math.radians(self.heading))
+        return {name: middle + turn @ foot for name, foot in self.lanes.feet.items()}
 
     @cached_property
     def targets(self) -> dict[str, Vec3]:
         """The red slabs and where they stand [m]."""
         return {name: foot for name, foot in self.feet.items() if name.startswith("slab")}
-
-    def _domino(self, name: str) -> Domino:
-        """The piece of that name."""
-        return {"tile": self.tile, "slab": self.slab, "decoy": self.decoy}[name.split("_")[0]]
