@@ -2,19 +2,20 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from pools import make, rewritten
 from scipy import stats
-from test_pool import make, rewritten
 
 from scengen import cli, config
 from scengen.analysis.bias import acceptance_map, bias
-from scengen.analysis.redraw import proposed
+from scengen.analysis.redraw import redrawn
 from scengen.errors import BadConfig, PoolError
 from scengen.params import values
 from scengen.pool import Pool
-from scengen.samplers.task import ID
+from scengen.samplers.split import ID
 
 TASK = config.task("domino_single")
 DRAWS = [TASK.draw(ID, 0, i) for i in range(300)]
@@ -89,17 +90,17 @@ def made(tmp_path_factory):
 
 
 def test_the_proposals_of_a_pool_are_drawn_again_from_its_manifest_alone(made):
-    drawn = proposed(Pool.open(made))
-    ids = [row["id"] for row in Pool.open(made).rows(["id"])]
+    drawn = redrawn(Pool.open(made))
+    ids = [id_ for (id_,) in Pool.open(made).columns("id")]
     assert [p.scenario.id for p in drawn if p.certified] == ids
     assert all(0 < u < 1 for p in drawn for u in p.quantiles.values()) and "gap_ratio" in drawn[0].quantiles
 
 
 def test_a_pool_that_does_not_come_out_again_is_refused(made, tmp_path):
     other = shutil.copytree(made, tmp_path / "other")
-    rewritten(other, lambda row: {**row, "id": "0" * 12})
+    rewritten(other, lambda row: replace(row, id="0" * 12))
     with pytest.raises(PoolError, match="the family has changed since"):
-        proposed(Pool.open(other))
+        redrawn(Pool.open(other))
 
 
 def test_the_command_tells_about_a_pool_and_refuses_a_chosen_one(made, tmp_path, capsys):

@@ -11,7 +11,7 @@ from scengen.analysis.coverage import evenness, farthest_points
 from scengen.analysis.distance import energy, near_duplicates, offsets, per_parameter
 from scengen.analysis.space import of_features, of_parameters
 from scengen.params import with_values
-from scengen.samplers.task import ID
+from scengen.samplers.split import ID
 from scengen.symmetry import Symmetry
 
 TASK = config.task("domino_single")
@@ -72,7 +72,7 @@ def test_a_turn_by_the_period_is_no_distance():
 def test_the_energy_distance_is_over_the_declared_features():
     ids, wide = list(TRAINED.values()), [TASK.draw("wide_gaps", 0, i).scenario for i in range(40)]
     space = of_features(TASK, ids, wide)
-    assert space.names[0] == "gap over height"
+    assert space.names[0] == "gap_over_height"
     assert energy(space.points(ids), space.points(wide), 99).pvalue <= 0.01
     turned = [TASK.draw("diagonal", 0, i).scenario for i in range(40)]
     assert energy(space.points(ids), space.points(turned), 99).distance == pytest.approx(0.0, abs=1e-6)

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from test_pool import QUICKLY, make
+from pools import QUICKLY, make
 
 from scengen import cli, config
 from scengen.errors import BadConfig
@@ -63,7 +63,8 @@ GENERATE = ("generate", "task=domino_single")
         (("verify", "pool=nowhere"), "no pool at nowhere"),
         (("show", "pool=nowhere"), "no pool at nowhere"),
         (("export", "pool=nowhere", "to=x"), "no pool at nowhere"),
-        (("tasks", "name=domino_singel"), "did you mean 'domino_single'"),
+        (("tasks", "task=domino_singel"), "did you mean 'domino_single'"),
+        (("tasks", "name=domino_single"), "no setting of tasks named 'name'; known: task"),
     ],
 )
 def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
@@ -109,18 +110,18 @@ def test_fewer_than_asked_for_is_status_1_and_keeps_what_there_is(capsys, tmp_pa
     status, err = said(capsys, *GENERATE, *QUICKLY, *hopeless, f"pool={folder}")
     assert status == 1 and "only 0 of 2 could be certified among 2 indices" in err
     opened = Pool.open(folder)
-    assert len(opened) == 0 and opened.manifest["funnel"]["not trivial"] == 2
-    assert [r["certificate"]["verdict"] for r in opened.rejected] == ["unknown", "unknown"]
-    assert all("the oracle failed" in r["certificate"]["reason"] for r in opened.rejected)
+    assert len(opened) == 0 and opened.funnel["not trivial"] == 2
+    assert [r.certificate.verdict for r in opened.rejected] == ["unknown", "unknown"]
+    assert all("the oracle failed" in r.certificate.reason and len(r.witness) == 0 for r in opened.rejected)
 
 
 def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
     """Indices that were drawn again, and one that could not be drawn at all."""
     far = ("task.id.x=[uniform,0.1,0.4]", "+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=3", "n=1")
     assert said(capsys, *GENERATE, *QUICKLY, *far, f"pool={tmp_path / 'far'}")[0] == 1
-    manifest = Pool.open(tmp_path / "far").manifest
-    infeasible = {why: n for why, n in manifest["reasons"].items() if why.startswith("feasible: ")}
-    lost = manifest["funnel"]["proposed"] - manifest["funnel"]["feasible"]
+    opened = Pool.open(tmp_path / "far")
+    infeasible = {why: n for why, n in opened.reasons.items() if why.startswith("feasible: ")}
+    lost = opened.funnel["proposed"] - opened.funnel["feasible"]
     assert infeasible.keys() == {"feasible: the chain leaves the table"} and sum(infeasible.values()) == lost > 0
 
 
@@ -136,23 +137,24 @@ def test_an_axis_from_the_command_line_is_proved_like_any_other(capsys, tmp_path
     slick = "+task.axes.slick={why: slippery, replace: {tile: {friction: [uniform, 0.2, 0.3]}}}"
     assert cli.run((*GENERATE, slick, "split=slick", "n=1", *QUICKLY, f"pool={tmp_path / 'slick'}")) == 0
     (row,) = Pool.open(tmp_path / "slick").rows()
-    assert row["axes"] == ["slick"] and '"tile.friction": 0.2' in row["shifted"]
+    assert row.axes == ("slick",) and row.shifted.keys() == {"tile.friction"}
+    assert 0.2 <= row.shifted["tile.friction"] <= 0.3
     same = slick.replace("[uniform, 0.2, 0.3]", "0.5")
     assert said(capsys, *GENERATE, same, "split=slick")[0] == 2
 
 
 def test_show_prints_pools_and_scenarios(capsys, made):
     row = next(Pool.open(made).rows())
-    assert cli.run(("show", f"pool={made}")) == 0 and row["id"] in capsys.readouterr().out
-    assert cli.run(("show", f"pool={made}", f"id={row['id'][:5]}")) == 0
+    assert cli.run(("show", f"pool={made}")) == 0 and row.id in capsys.readouterr().out
+    assert cli.run(("show", f"pool={made}", f"id={row.id[:5]}")) == 0
     out = capsys.readouterr().out
-    assert "certified" in out and "gap_ratio" in out and "necessity" in out
+    assert "certified" in out and "gap_ratio" in out and "ablations" in out
 
 
 def test_tasks_lists_every_task_with_units_bounds_and_proofs(capsys):
     assert cli.run(("tasks",)) == 0
     assert "domino_single" in capsys.readouterr().out
-    assert cli.run(("tasks", "name=domino_single")) == 0
+    assert cli.run(("tasks", "task=domino_single")) == 0
     out = capsys.readouterr().out
     assert "tile.mass" in out and "0.005 to 0.5" in out and "stout_starter" in out
 
@@ -161,10 +163,10 @@ def test_exported_scenes_open_from_anywhere(made, tmp_path):
     assert cli.run(("export", f"pool={made}", f"to={tmp_path / 'out'}")) == 0
     moved = (tmp_path / "out").rename(tmp_path / "elsewhere")
     for row in Pool.open(made).rows():
-        folder = moved / row["id"]
+        folder = moved / row.id
         alone = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
         whole = mujoco.MjModel.from_xml_path(str(folder / "scene_with_robot.xml"))
-        world = World.load(row["scene_xml"], row["embodiment"], visual=True)
+        world = World.load(row.scene_xml, row.embodiment, visual=True)
         assert alone.nbody < whole.nbody == world.model.nbody and whole.nq == world.model.nq
         start = mujoco.MjData(whole)
         mujoco.mj_resetDataKeyframe(whole, start, whole.key("home").id)
@@ -176,14 +178,14 @@ def test_a_contact_sheet_shows_every_scene_or_says_why_not(made, tmp_path):
     page = tmp_path / "sheet.html"
     assert cli.run(("show", f"pool={made}", f"to={page}")) == 0
     text = page.read_text()
-    assert all(row["id"] in text for row in Pool.open(made).rows())
+    assert all(row.id in text for row in Pool.open(made).rows())
     assert (text.count("data:image/webp") == 2) != ("No pictures: no OpenGL" in text)
 
 
 def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys, tmp_path):
     row = next(Pool.open(made).rows())
     try:
-        scenario = config.task(row["task"]).scenario(row["params"])
+        scenario = config.task(row.task).scenario(row.params)
         picture = film.strip(film.Take.witness(row, scenario), frames=4)
     except render.NoPictures as error:
         assert "libegl1" in str(error)

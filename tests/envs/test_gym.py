@@ -2,7 +2,6 @@
 
 import shutil
 import warnings
-from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -13,7 +12,7 @@ from helpers import REFERENCE, pictures_are_possible
 
 from scengen import config
 from scengen.envs import observations
-from scengen.envs.gym import ScenarioEnv
+from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError, UnknownName
 from scengen.pool import Pool
 from scengen.sim.world import IDLE
@@ -30,7 +29,7 @@ def env():
 def test_gymnasiums_own_checker_has_nothing_to_say():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(ScenarioEnv("domino_single", REFERENCE, observations=EVERYTHING), skip_render_check=True)
+        check_env(PoolEnv("domino_single", REFERENCE, observations=EVERYTHING), skip_render_check=True)
 
 
 def test_every_task_is_registered():
@@ -39,9 +38,9 @@ def test_every_task_is_registered():
 
 def test_witnesses_reach_the_goal_and_end_in_the_certified_seconds(env):
     for row in Pool.open(REFERENCE).rows():
-        _, info = env.reset(options={"scenario": row["id"]})
-        assert (info["scenario"], info["scene_sha256"]) == (row["id"], row["scene_sha256"])
-        for action in row["witness"]:
+        _, info = env.reset(options={"scenario": row.id})
+        assert (info["scenario"], info["scene_sha256"]) == (row.id, row.scene_sha256)
+        for action in row.witness:
             _, reward, terminated, truncated, info = env.step(action)
             if terminated or truncated:
                 break
@@ -63,7 +62,7 @@ def test_a_rule_broken_ends_the_episode_with_its_reason(env):
     env.reset(seed=0)
     world = env.unwrapped.world
     for _ in range(400):
-        toward = world.pos("tile_1") - world.hand
+        toward = world.pos("tile_1") - world.arm.hand
         action = np.zeros(7, np.float32)
         action[:3], action[6] = np.clip(8 * toward, -1, 1), 1.0
         _, _, terminated, _, info = env.step(action)
@@ -103,27 +102,27 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
 @pytest.mark.parametrize(
     ("make", "error", "says"),
     [
-        (lambda: ScenarioEnv("domino_singel", REFERENCE), UnknownName, "did you mean 'domino_single'"),
-        (lambda: ScenarioEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
-        (lambda: ScenarioEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
-        (lambda: ScenarioEnv("domino_single", []), PoolError, "no pool"),
+        (lambda: PoolEnv("domino_singel", REFERENCE), UnknownName, "did you mean 'domino_single'"),
+        (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
+        (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
+        (lambda: PoolEnv("domino_single", []), PoolError, "no pool"),
         (
-            lambda: ScenarioEnv("domino_single", REFERENCE, ["robot0_eef_poss"]),
+            lambda: PoolEnv("domino_single", REFERENCE, ["robot0_eef_poss"]),
             UnknownName,
             "did you mean 'robot0_eef_pos'",
         ),
         (
-            lambda: ScenarioEnv("domino_single", REFERENCE, render_mode="human"),
+            lambda: PoolEnv("domino_single", REFERENCE, render_mode="human"),
             UnknownName,
             "known: rgb_array",
         ),
         (
-            lambda: ScenarioEnv("domino_single", REFERENCE).reset(options={"scenario": "0000"}),
+            lambda: PoolEnv("domino_single", REFERENCE).reset(options={"scenario": "0000"}),
             UnknownName,
             "no scenario named '0000'",
         ),
         (
-            lambda: ScenarioEnv("domino_single", REFERENCE).reset(options={"scenari": 1}),
+            lambda: PoolEnv("domino_single", REFERENCE).reset(options={"scenari": 1}),
             UnknownName,
             "did you mean 'scenario'",
         ),
@@ -140,11 +139,11 @@ def test_a_pool_made_with_another_mujoco_is_refused(tmp_path):
     manifest = tmp_path / "pool" / "manifest.json"
     manifest.write_text(manifest.read_text().replace(f'"mujoco": "{mujoco.__version__}"', '"mujoco": "3.1.0"'))
     with pytest.raises(PoolError, match=r"certified with mujoco 3\.1\.0, this is"):
-        ScenarioEnv("domino_single", tmp_path / "pool")
+        PoolEnv("domino_single", tmp_path / "pool")
 
 
 def test_readings_have_the_papers_shapes_and_mean_what_they_say():
-    env = ScenarioEnv("domino_single", REFERENCE, observations=EVERYTHING)
+    env = PoolEnv("domino_single", REFERENCE, observations=EVERYTHING)
     seen, _ = env.reset(seed=0)
     shapes = {name: value.shape for name, value in seen.items()}
     assert (
@@ -152,15 +151,15 @@ def test_readings_have_the_papers_shapes_and_mean_what_they_say():
     )
     assert shapes["robot0_tactile_left"] == shapes["robot0_tactile_right"] == (8, 8)
     world = env.world
-    assert np.allclose(seen["robot0_eef_pos"], world.hand, atol=1e-6)
+    assert np.allclose(seen["robot0_eef_pos"], world.arm.hand, atol=1e-6)
     x, y, z, w = seen["robot0_eef_quat"]
     turned = np.empty(9)
     mujoco.mju_quat2Mat(turned, np.array([w, x, y, z], float))
-    assert np.allclose(turned.reshape(3, 3), world.hand_rot, atol=1e-6)
+    assert np.allclose(turned.reshape(3, 3), world.arm.hand_rot, atol=1e-6)
 
 
 def test_the_wrist_carries_the_weight_of_the_hand_at_rest():
-    env = ScenarioEnv("domino_single", REFERENCE, observations=["force_torque_world"])
+    env = PoolEnv("domino_single", REFERENCE, observations=["force_torque_world"])
     env.reset(seed=0)
     for _ in range(100):
         seen, *_ = env.step(IDLE)
@@ -171,7 +170,7 @@ def test_the_wrist_carries_the_weight_of_the_hand_at_rest():
 
 
 def test_the_fingers_feel_what_they_press_and_nothing_else():
-    env = ScenarioEnv("domino_single", REFERENCE, observations=["robot0_tactile_left", "robot0_tactile_right"])
+    env = PoolEnv("domino_single", REFERENCE, observations=["robot0_tactile_left", "robot0_tactile_right"])
     seen, _ = env.reset(seed=0)
     assert not seen["robot0_tactile_left"].any()
     closed = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -192,7 +191,7 @@ def test_vectors_of_environments_step_together():
 
 @pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
 def test_cameras_see_the_scene():
-    env = ScenarioEnv(
+    env = PoolEnv(
         "domino_single",
         REFERENCE,
         observations=list(observations.CAMERAS),

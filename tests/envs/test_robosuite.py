@@ -2,25 +2,30 @@
 
 import json
 import logging
+from dataclasses import replace
+from functools import cache
 
 import mujoco
 import numpy as np
 import pytest
 from helpers import REFERENCE, pictures_are_possible
+from pools import certificate_of
 
 from scengen import config
+from scengen.certificate import Certificate
 from scengen.cli import run as scengen
 from scengen.envs import agreement
 from scengen.envs.agreement import Comparison, compare, compare_all
-from scengen.envs.robosuite import ScenarioEnv, environment
+from scengen.envs.robosuite import RobosuiteEnv, env_class
 from scengen.envs.robosuite_models import SceneModel
+from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.params import canonical
-from scengen.pool import Pool
+from scengen.pool import NO_WITNESS, Pool
+from scengen.runs.generate import row_of
 from scengen.sim import scene_text
 from scengen.sim.world import World
+from scengen.validate.certify import Certified
 from scengen.validate.identity import versions
-from scengen.validate.rollout import Judge
 
 # isort: split
 import robosuite
@@ -43,23 +48,17 @@ def row():
     return next(Pool.open(REFERENCE).rows())
 
 
+@cache
 def drawn(task):
     """A row as in a pool, of a scenario that nobody has certified."""
     found = config.task(task)
-    scenario = found.draw("id", 0, 0).scenario
-    return {
-        "id": scenario.id,
-        "task": task,
-        "horizon": found.horizon,
-        "params": canonical(scenario),
-        "embodiment": found.embodiment,
-        "scene_xml": scene_text.emit(scenario.build())[0],
-        "certificate": {"versions": json.dumps(versions())},
-    }
+    draw = found.draw("id", 0, 0)
+    text = scene_text.emit(draw.scenario.build())[0]
+    return row_of(found, draw, Certified(Certificate("quick", ()), text, NO_WITNESS, ""))
 
 
 def made(row, **arguments):
-    return environment(row["task"])(scenario=row, **{**BLIND, **arguments})
+    return env_class(row.task)(scenario=row, **{**BLIND, **arguments})
 
 
 @pytest.fixture(scope="module")
@@ -102,28 +101,28 @@ def test_robosuite_knows_every_task():
 
 @pytest.mark.parametrize("task", config.tasks())
 def test_the_text_of_a_scene_means_the_same_to_robosuite(task):
-    text = drawn(task)["scene_xml"]
+    text = drawn(task).scene_xml
     assert different(SceneModel(text).get_model(), mujoco.MjModel.from_xml_string(text), 0.0) == []
 
 
 def test_robosuite_compiles_the_certified_model(row, env):
-    ours = World.load(row["scene_xml"], row["embodiment"], visual=True).model
+    ours = World.load(row.scene_xml, row.embodiment, visual=True).model
     assert different(env.world.model, ours, 0.0) == []
     for kind, count in ((mujoco.mjtObj.mjOBJ_BODY, ours.nbody), (mujoco.mjtObj.mjOBJ_ACTUATOR, ours.nu)):
         assert names(env.world.model, kind, count) == names(ours, kind, count)
 
 
 def test_robosuite_compiles_the_certified_model_with_a_suction_cup(sucking):
-    ours = World.load(sucking.row["scene_xml"], sucking.row["embodiment"], visual=True).model
+    ours = World.load(sucking.row.scene_xml, sucking.row.embodiment, visual=True).model
     # The cup passes through a text of six digits; `site_size` differs in numbers that a sphere does not have.
     assert set(different(sucking.world.model, ours, 1e-12)) <= {"site_size"}
 
 
 def test_an_episode_begins_in_the_certified_state(row, env):
-    for action in row["witness"][:50]:
+    for action in row.witness[:50]:
         env.step(action)
     env.reset()
-    world = World.load(row["scene_xml"], row["embodiment"])
+    world = World.load(row.scene_xml, row.embodiment)
     for name in ("qpos", "qvel", "qacc_warmstart", "ctrl", "act", "time"):
         np.testing.assert_array_equal(getattr(env.world.data, name), getattr(world.data, name), err_msg=name)
 
@@ -132,15 +131,15 @@ def test_an_episode_begins_in_the_certified_state(row, env):
 
 
 def test_until_it_touches_something_the_arm_moves_as_certified_to_the_last_bits(row, env):
-    world = World.load(row["scene_xml"], row["embodiment"])
+    world = World.load(row.scene_xml, row.embodiment)
     env.reset()
-    start, apart = world.hand, 0.0
-    for action in row["witness"][:100]:
+    start, apart = world.arm.hand, 0.0
+    for action in row.witness[:100]:
         world.apply(action)
         env.step(action)
-        apart = max(apart, float(np.linalg.norm(world.hand - env.world.hand)))
-    assert not world.loop.touched[-1].any(), "the actions is too short for a claim about free motion"
-    assert np.linalg.norm(world.hand - start) > 0.05
+        apart = max(apart, float(np.linalg.norm(world.arm.hand - env.world.arm.hand)))
+    assert not world.loop.touched[-1].any(), "the witness is too short for a claim about free motion"
+    assert np.linalg.norm(world.arm.hand - start) > 0.05
     assert apart <= 1e-12
 
 
@@ -152,9 +151,9 @@ def test_a_witness_succeeds_in_robosuite(row):
 
 
 def test_contacts_are_latched_in_robosuite_as_here(row, env):
-    world = World.load(row["scene_xml"], row["embodiment"])
+    world = World.load(row.scene_xml, row.embodiment)
     env.reset()
-    for action in row["witness"][:250]:
+    for action in row.witness[:250]:
         world.apply(action)
         env.step(action)
     assert world.loop.touched[-1].any()
@@ -162,10 +161,10 @@ def test_contacts_are_latched_in_robosuite_as_here(row, env):
 
 
 def test_a_robot_that_does_not_obey_is_seen_as_a_difference(row, monkeypatch):
-    pre_action = ScenarioEnv._pre_action
-    monkeypatch.setattr(ScenarioEnv, "_pre_action", lambda env, action, new: pre_action(env, 0.0 * action, new))
-    horizon = len(row["witness"]) * 0.01 - 0.9  # just enough, because a witness goes on for a second
-    found = compare({**row, "horizon": horizon})
+    pre_action = RobosuiteEnv._pre_action
+    monkeypatch.setattr(RobosuiteEnv, "_pre_action", lambda env, action, new: pre_action(env, 0.0 * action, new))
+    horizon = len(row.witness) * 0.01 - 0.9  # just enough, because a witness goes on for a second
+    found = compare(replace(row, horizon=horizon))
     assert (found.ours, found.theirs, found.agrees) == ("success", "timeout", False)
     assert found.apart > 0.1
 
@@ -176,14 +175,14 @@ def test_suction_pulls_only_what_closes_the_cup(sucking):
     cup = world.model.actuator("gripper0_right_suction").id
     for _ in range(5):
         sucking.step(np.array([0, 0, 0, 0, 0, 0, 1.0]))
-    assert not world.sealed and world.data.ctrl[cup] == 0.0
+    assert not world.arm.sealed and world.data.ctrl[cup] == 0.0
     for action in sucking.scenario.oracle(world):
         sucking.step(world.filter(action))
-        if world.sealed:
+        if world.arm.sealed:
             break
-    assert world.sealed and world.data.ctrl[cup] == 1.0 and world.touching("gripper0_right_suction_pad", "piece_0")
+    assert world.arm.sealed and world.data.ctrl[cup] == 1.0 and world.touching("gripper0_right_suction_pad", "piece_0")
     sucking.step(np.array([0, 0, 0, 0, 0, 0, -1.0]))
-    assert not world.sealed and world.data.ctrl[cup] == 0.0
+    assert not world.arm.sealed and world.data.ctrl[cup] == 0.0
 
 
 # --- verdict and clock --------------------------------------------------------------------
@@ -195,7 +194,7 @@ class Stub:
     HOLD = 0.02
 
     def __init__(self):
-        self.reached, self.lost, self.events = False, None, 0
+        self.reached, self.lost, self.begun = False, None, 0
 
     def success(self, world):
         return self.reached
@@ -204,7 +203,7 @@ class Stub:
         return self.lost
 
     def events(self, world):
-        self.events += 1
+        self.begun += 1
 
 
 @pytest.fixture
@@ -224,7 +223,7 @@ def test_the_goal_must_hold_and_then_stays_reached(env, stub):
     assert env.step(IDLE)[1] == 1.0
     stub.reached = False
     _, reward, _, info = env.step(IDLE)
-    assert reward == env.reward() == 1.0 and info == {"scenario": env.row["id"], "success": True, "reason": ""}
+    assert reward == env.reward() == 1.0 and info == {"scenario": env.row.id, "success": True, "reason": ""}
 
 
 def test_a_failure_is_final(env, stub):
@@ -246,13 +245,13 @@ def test_a_failure_undoes_a_success(env, stub):
 
 def test_events_and_verdict_keep_their_clock_under_any_control_frequency(row, monkeypatch):
     looks = []
-    look = Judge.look
-    monkeypatch.setattr(Judge, "look", lambda judge, world: looks.append(world.time) or look(judge, world))
+    judge = Episode.judge
+    monkeypatch.setattr(Episode, "judge", lambda episode: looks.append(episode.world.time) or judge(episode))
     slow = made(row, control_freq=20, hard_reset=False)
     slow.reset()
     slow.step(IDLE), slow.step(IDLE)
     np.testing.assert_allclose(looks, 0.01 * np.arange(1, 11), atol=1e-9)
-    assert slow.horizon == 20 * row["horizon"]
+    assert slow.horizon == 20 * row.horizon
 
 
 # --- robosuite's habits -------------------------------------------------------------------
@@ -263,7 +262,7 @@ def test_robosuite_makes_it_with_its_usual_arguments(row):
         "DominoSingle",
         robots=["Panda"],
         pool=REFERENCE,
-        scenario=row["id"][:6],
+        scenario=row.id[:6],
         has_renderer=False,
         control_freq=100,
         horizon=3,
@@ -281,13 +280,13 @@ def test_robosuite_makes_it_with_its_usual_arguments(row):
 
 
 def test_a_pool_gives_scenarios_by_seed_with_what_lies_in_them():
-    first, again = (environment("domino_single")(pool=REFERENCE, seed=7, **BLIND) for _ in range(2))
+    first, again = (env_class("domino_single")(pool=REFERENCE, seed=7, **BLIND) for _ in range(2))
     seen = set()
     for _ in range(4):
         observations = first.reset()
         again.reset()
-        assert first.row["id"] == again.row["id"]
-        seen.add(first.row["id"])
+        assert first.row.id == again.row.id
+        seen.add(first.row.id)
         tiles = {key for key in observations if key.startswith("tile_") and key.endswith("_pos")}
         assert len(tiles) == sum(name.startswith("tile_") for name in first.world.free_bodies)
     assert len(seen) > 1
@@ -305,16 +304,16 @@ def test_a_pool_gives_scenarios_by_seed_with_what_lies_in_them():
 )
 def test_bad_input_is_refused_in_one_line(row, change, error, says):
     with pytest.raises(error, match=says) as caught:
-        environment("domino_single")(**{"scenario": row, **change})
+        env_class("domino_single")(**{"scenario": row, **change})
     assert "\n" not in str(caught.value)
 
 
 def test_scenarios_of_other_tasks_or_versions_are_refused(row):
     with pytest.raises(PoolError, match="belongs to domino_single, not to packing"):
-        environment("packing")(scenario=row)
-    old = {"versions": json.dumps({**versions(), "mujoco": "2.0"})}
+        env_class("packing")(scenario=row)
+    old = certificate_of(row, versions={**versions(), "mujoco": "2.0"})
     with pytest.raises(PoolError, match="with mujoco 2.0"):
-        environment("domino_single")(scenario={**row, "certificate": old})
+        env_class("domino_single")(scenario=old)
 
 
 @pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
@@ -342,7 +341,7 @@ def test_cameras_show_the_things_of_the_scene(row):
 
 def test_comparisons_come_in_the_order_of_ids_and_no_more_than_asked_for(monkeypatch):
     monkeypatch.setattr(
-        agreement, "compare", lambda row, search: Comparison(row["task"], row["id"], "success", "success", "", 0.0, 0.0)
+        agreement, "compare", lambda row, search: Comparison(row.task, row.id, "success", "success", "", 0.0, 0.0)
     )
     counts = []
     found = compare_all([Pool.open(REFERENCE)], 1, counts.append, first=4)
@@ -351,11 +350,11 @@ def test_comparisons_come_in_the_order_of_ids_and_no_more_than_asked_for(monkeyp
 
 
 @pytest.mark.parametrize(("differing", "status"), [(0, 0), (1, 1)])
-def test_the_command_fails_below_the_bar(differing, status, monkeypatch, tmp_path):
+def test_the_command_fails_below_the_limit(differing, status, monkeypatch, tmp_path):
     def fake(row, search):
         fails = fake.left > 0
         fake.left -= 1
-        return Comparison(row["task"], row["id"], "success", "failure" if fails else "success", "", 0.0, 0.0)
+        return Comparison(row.task, row.id, "success", "failure" if fails else "success", "", 0.0, 0.0)
 
     fake.left = differing
     monkeypatch.setattr(agreement, "compare", fake)
@@ -365,7 +364,7 @@ def test_the_command_fails_below_the_bar(differing, status, monkeypatch, tmp_pat
     assert result["same"] == len(Pool.open(REFERENCE)) - differing == len(result["scenarios"]) - differing
 
 
-@pytest.mark.parametrize("given", ["bar=1.5", "first=0", "workers=0", "bat=1", "pool=nowhere"])
+@pytest.mark.parametrize("given", ["limit=1.5", "first=0", "workers=0", "limt=1", "pool=nowhere"])
 def test_the_command_explains_bad_input(given, capsys):
     pool = [] if given.startswith("pool") else [f"pool={REFERENCE}"]
     assert scengen(["robosuite", *pool, given]) == 2

@@ -1,7 +1,6 @@
 """Evaluation: who must succeed succeeds, who must fail fails, and a run that was cut short goes on."""
 
 import json
-from pathlib import Path
 
 import helpers
 import pytest

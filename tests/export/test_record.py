@@ -6,16 +6,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-import scengen.record as recording
 from helpers import REFERENCE, pictures_are_possible
 
 from scengen import cli, config, pool
+from scengen.export import recording
 from scengen.export.cameras import calibration
 from scengen.export.lerobot import DataSet, Feature
 from scengen.export.recording import Settings, record
@@ -135,19 +136,19 @@ def test_rewards_are_zero_until_the_last_row_and_one_there(made):
 def test_episodes_name_their_scenario_and_nothing_else_does(made, witnesses):
     for episode, row in zip(episodes_of(made), witnesses, strict=False):
         for name in ("id", "split", "scene_sha256", "witness_sha256", "seed", "index", "id_twin"):
-            assert episode[f"scengen/{name}"] == row[name]
-        assert episode["scengen/success"] and episode["tasks"] == [row["instruction"]]
+            assert episode[f"scengen/{name}"] == getattr(row, name)
+        assert episode["scengen/success"] and episode["tasks"] == [row.instruction]
     tasks = pq.read_table(made / "meta" / "tasks.parquet")
-    assert tasks.to_pylist() == [{"task_index": 0, "task": witnesses[0]["instruction"]}]
+    assert tasks.to_pylist() == [{"task_index": 0, "task": witnesses[0].instruction}]
     assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
 
 
-def test_the_tape_is_the_witness_bit_by_bit(made, witnesses):
+def test_the_actions_are_the_witness_bit_by_bit(made, witnesses):
     for episode, row in zip(episodes_of(made), witnesses, strict=False):
         actions = column(made, "actions")[episode["dataset_from_index"] : episode["dataset_to_index"]]
         played = actions.astype(np.float32).reshape(-1, 7)
-        assert played.tobytes() == row["witness"][: len(played)].tobytes()
-        assert len(played) <= len(row["witness"]) - 90, "the second after the goal is not recorded"
+        assert played.tobytes() == row.witness[: len(played)].tobytes()
+        assert len(played) <= len(row.witness) - 90, "the second after the goal is not recorded"
 
 
 def test_the_action_of_a_row_asks_for_the_motion_of_its_control_periods(made):
@@ -158,10 +159,10 @@ def test_the_action_of_a_row_asks_for_the_motion_of_its_control_periods(made):
 
 
 def test_a_row_shows_the_moment_before_its_actions(made, witnesses):
-    world = World.load(witnesses[0]["scene_xml"], witnesses[0]["embodiment"])
+    world = World.load(witnesses[0].scene_xml, witnesses[0].embodiment)
     for number in range(30):
-        assert np.allclose(column(made, "robot0_eef_pos")[number], world.hand, atol=1e-6)
-        for action in witnesses[0]["witness"][4 * number : 4 * number + 4]:
+        assert np.allclose(column(made, "robot0_eef_pos")[number], world.arm.hand, atol=1e-6)
+        for action in witnesses[0].witness[4 * number : 4 * number + 4]:
             world.apply(action)
 
 
@@ -173,7 +174,7 @@ def test_the_state_is_all_proprioception(made):
 def test_at_100_rows_a_second_every_action_has_its_row(tmp_path, witnesses):
     recorded(tmp_path / "fast", n=1, fps=100)
     actions = column(tmp_path / "fast", "action").astype(np.float32)
-    assert actions.tobytes() == witnesses[0]["witness"][: len(actions)].tobytes()
+    assert actions.tobytes() == witnesses[0].witness[: len(actions)].tobytes()
 
 
 def test_a_suction_cup_has_no_jaw_streams():
@@ -250,7 +251,7 @@ def test_calibration_says_where_the_slab_is_in_the_picture(filmed, witnesses):
         picture = frames_of(filmed)[start][1].astype(int)
         red = picture[:, :, 0] - picture[:, :, 1:].max(axis=2) > 60
         seen = np.argwhere(red).mean(axis=0)[::-1] + 0.5
-        slab = World.load(row["scene_xml"]).com("slab")
+        slab = World.load(row.scene_xml).com("slab")
         in_camera = np.linalg.inv(calibration["extrinsics"]) @ [*slab, 1.0]
         pixel = np.array(calibration["intrinsics"]) @ (in_camera[:3] / in_camera[2])
         assert np.linalg.norm(pixel[:2] - seen) < 2.0, (
@@ -259,9 +260,9 @@ def test_calibration_says_where_the_slab_is_in_the_picture(filmed, witnesses):
 
 
 def test_the_wrist_camera_is_given_in_the_hands_frame(witnesses):
-    world = World.load(witnesses[0]["scene_xml"])
+    world = World.load(witnesses[0].scene_xml)
     before = calibration(world, "robot0_eye_in_hand", WIDTH, HEIGHT)
-    for action in witnesses[0]["witness"][:200]:
+    for action in witnesses[0].witness[:200]:
         world.apply(action)
     assert before == calibration(world, "robot0_eye_in_hand", WIDTH, HEIGHT) and before["frame"] == "robot0_eef"
     assert before["extrinsics"][2][2] == pytest.approx(1.0, abs=0.01), "it looks where the hand points"
@@ -294,19 +295,18 @@ def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):
 
 
 def test_a_witness_that_fails_is_recorded_as_a_failure(tmp_path, capsys, witnesses):
-    cut = {**witnesses[0], "witness": witnesses[0]["witness"][:50]}
-    kept = {k: v for k, v in Pool.open(REFERENCE).manifest.items() if k not in ("format", "shards")}
-    pool.write(tmp_path / "cut", kept, [cut])
+    cut = replace(witnesses[0], witness=witnesses[0].witness[:50])
+    pool.write(tmp_path / "cut", Pool.open(REFERENCE).about, [cut])
     target = tmp_path / "out"
     assert cli.run(["record", f"pool={tmp_path / 'cut'}", f"to={target}", "cameras=none", "fps=5"]) == 1
-    assert f"FAILED {cut['id']}" in capsys.readouterr().err
+    assert f"FAILED {cut.id}" in capsys.readouterr().err
     (episode,) = episodes_of(target)
     assert not episode["scengen/success"] and not column(target, "reward").any() and column(target, "next.done")[-1]
 
 
 def test_a_full_file_is_followed_by_another(tmp_path, monkeypatch):
-    monkeypatch.setattr("scengen.record.lerobot.DATA_SIZE", 0)
-    monkeypatch.setattr("scengen.record.lerobot.FILES", 2)
+    monkeypatch.setattr("scengen.export.lerobot.DATA_SIZE", 0)
+    monkeypatch.setattr("scengen.export.lerobot.FILES", 2)
     with DataSet(tmp_path, 25, "robot", {"x": Feature("float32")}, [], (0, 0)) as data:
         for episode in range(3):
             data.add({"x": float(episode)}, {})

@@ -1,4 +1,4 @@
-"""Tapes of ID twins, played out of distribution, and the card that tells of it."""
+"""Witnesses of ID twins, replayed out of distribution, and the card that tells of it."""
 
 import json
 
@@ -13,7 +13,7 @@ TASK = config.task("domino_single")
 
 
 def test_the_four_verdicts_are_what_their_names_say():
-    kinds = [Trial(0, actions, oracle, "").kind for actions, oracle in ((0, 1), (1, 1), (0, 0), (1, 0))]
+    kinds = [Trial(0, replay, oracle, "").kind for replay, oracle in ((0, 1), (1, 1), (0, 0), (1, 0))]
     assert kinds == [EXTRAPOLATION, COSMETIC, UNKNOWN, BUG]
 
 

@@ -13,8 +13,10 @@ from scengen.envs.observations import CAMERAS
 from scengen.pictures import film, render
 from scengen.pictures.view import view
 from scengen.pool import Pool
+from scengen.scenario import Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
+from scengen.validate.certify import certify
 
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)))
 drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
@@ -27,7 +29,7 @@ def row():
 
 @pytest.fixture(scope="module")
 def scenario(row):
-    return config.task(row["task"]).scenario(row["params"])
+    return config.task(row.task).scenario(row.params)
 
 
 def on_screen(world, camera, points, aspect):
@@ -49,7 +51,7 @@ def test_the_default_view_holds_everything_that_stands_on_the_table(task):
     world = World.load(scene_text.emit(loaded.family().build())[0], loaded.embodiment)
     model, data = world.model, world.data
     others = {world.body(name) for name in ("world", "table", "robot0_base")}
-    points = [world.hand]
+    points = [world.arm.hand]
     for geom in range(model.ngeom):
         if model.body_rootid[model.geom_bodyid[geom]] not in others:
             frame, box = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
@@ -62,13 +64,13 @@ def test_the_default_view_holds_everything_that_stands_on_the_table(task):
 
 
 @drawing
-def test_a_strip_begins_at_the_start_and_ends_when_the_tape_does(row, scenario):
+def test_a_strip_begins_at_the_start_and_ends_when_the_witness_does(row, scenario):
     take = film.Take.witness(row, scenario)
     picture = film.strip(take, frames=3, width=96, height=72)
     assert picture.shape == (72, 288, 3)
-    with render.camera(row["scene_xml"], row["embodiment"], 96, 72) as eye:
+    with render.camera(row.scene_xml, row.embodiment, 96, 72) as eye:
         assert (picture[:, :96] == eye.take()).all()
-        for action in row["witness"]:
+        for action in row.witness:
             eye.world.apply(action)
         assert (picture[:, -96:] == eye.take()).all()
         assert not (picture[:, :96] == picture[:, -96:]).all()
@@ -76,48 +78,62 @@ def test_a_strip_begins_at_the_start_and_ends_when_the_tape_does(row, scenario):
 
 @drawing
 def test_an_unfinished_row_of_a_strip_is_white(row, scenario):
-    take = film.Take(scenario, row["scene_xml"], row["embodiment"], row["witness"][:5])
+    take = film.Take(scenario, row.scene_xml, row.embodiment, row.witness[:5])
     picture = film.strip(take, frames=6, width=64, height=48)
     assert picture.shape == (96, 256, 3)
     assert (picture[48:, 128:] == 255).all() and not (picture[48:, :128] == 255).all()
 
 
 @drawing
-def test_a_video_lasts_as_long_as_the_tape(row, tmp_path):
+def test_a_video_lasts_as_long_as_the_witness(row, tmp_path):
     import av
 
     target = tmp_path / "sub" / "film.mp4"
-    arguments = ["film", f"pool={REFERENCE}", f"id={row['id']}", f"to={target}", "fps=2", "width=64", "height=48"]
+    arguments = ["film", f"pool={REFERENCE}", f"id={row.id}", f"to={target}", "fps=2", "width=64", "height=48"]
     assert cli.run([*arguments, "camera=rgb_gripper_cam"]) == 0
     with av.open(str(target)) as file:
         times = [float(frame.time) for frame in file.decode(video=0)]
-    assert times == pytest.approx(np.arange(0, len(row["witness"]) / 100, 0.5))
+    assert times == pytest.approx(np.arange(0, len(row.witness) / 100, 0.5))
 
 
 @drawing
 def test_a_shortcut_is_filmed_and_its_end_is_told(row, tmp_path, capsys):
     target = tmp_path / "film.png"
-    arguments = ["film", f"pool={REFERENCE}", f"id={row['id']}", f"to={target}", "frames=2", "width=64", "height=48"]
-    assert cli.run([*arguments, "plan=push the slab"]) == 0
-    assert "push the slab: failure" in capsys.readouterr().out
+    arguments = ["film", f"pool={REFERENCE}", f"id={row.id}", f"to={target}", "frames=2", "width=64", "height=48"]
+    assert cli.run([*arguments, "of=push_the_slab"]) == 0
+    assert "push_the_slab: failure" in capsys.readouterr().out
     assert Image.open(target).size == (128, 48)
 
 
 @drawing
 def test_show_draws_the_same_strip_as_film(row, scenario, tmp_path):
     target = tmp_path / "film.png"
-    assert cli.run(["show", f"pool={REFERENCE}", f"id={row['id']}", f"to={target}"]) == 0
+    assert cli.run(["show", f"pool={REFERENCE}", f"id={row.id}", f"to={target}"]) == 0
     assert (np.array(Image.open(target)) == film.strip(film.Take.witness(row, scenario))).all()
 
 
 def test_every_shortcut_of_a_scenario_can_be_filmed_and_fails(row, scenario):
     for name in scenario.shortcuts():
-        take, episode = film.shortcut(row, scenario, name)
-        assert not episode.solved and len(take.actions) > 10
+        take, rollout = film.shortcut(row, scenario, name)
+        assert not rollout.solved and len(take.actions) > 10
+
+
+def test_a_film_shows_of_every_shortcut_what_the_certificate_saw(row, scenario, monkeypatch):
+    """Those that are simulated to rest get three time limits in both."""
+    (check,) = [check for check in row.certificate.checks if check.name == "shortcuts"]
+    for name, seen in check.numbers.items():
+        _, rollout = film.shortcut(row, scenario, name)
+        assert (rollout.outcome, rollout.reason, rollout.seconds) == (seen["outcome"], seen["reason"], seen["seconds"])
+    patient = {"wait": Shortcut(lambda world: iter(()), to_rest=True)}
+    monkeypatch.setattr(type(scenario), "shortcuts", lambda self: patient)
+    monkeypatch.setattr("scengen.validate.rollout.STILL", 0.0)  # nothing is ever at rest
+    certificate = certify(scenario, row.horizon, last="shortcuts").certificate
+    _, rollout = film.shortcut(row, scenario, "wait")
+    assert rollout.seconds == certificate["shortcuts"].numbers["wait"]["seconds"] == 3 * row.horizon
 
 
 def test_cameras_have_the_papers_names_and_the_models(row):
-    world = World.load(row["scene_xml"])
+    world = World.load(row.scene_xml)
     assert set(CAMERAS.values()) <= {world.model.camera(i).name for i in range(world.model.ncam)}
 
 
@@ -125,14 +141,14 @@ def test_without_a_display_the_viewer_says_so(row, monkeypatch, capsys):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr("sys.platform", "linux")
-    assert cli.run(["view", f"pool={REFERENCE}", f"id={row['id']}"]) == 2
+    assert cli.run(["view", f"pool={REFERENCE}", f"id={row.id}"]) == 2
     err = capsys.readouterr().err
     assert "no display to open a window on" in err and err.count("\n") == 1
 
 
 def test_the_viewer_plays_the_witness_until_the_window_is_closed(row, scenario, monkeypatch):
     """With a window that is closed half a second after the witness's goal."""
-    window = Window(len(row["witness"]) - 50)
+    window = Window(len(row.witness) - 50)
     monkeypatch.setattr("mujoco.viewer.launch_passive", window.open)
     monkeypatch.setattr("time.sleep", lambda _: None)
     view(row, scenario, replay=True)
@@ -170,14 +186,14 @@ class Window:
     ("arguments", "says"),
     [
         (["to=film.gif"], "a film strip is a .png file, a video an .mp4 file"),
-        (["to=x.png", "plan=push the slob"], "no plan named 'push the slob' (did you mean 'push the slab'?)"),
+        (["to=x.png", "of=push_the_slob"], "no shortcut named 'push_the_slob' (did you mean 'push_the_slab'?)"),
         (["to=x.png", "frames=0"], "frames = 0; it must be at least 1"),
         (["to=x.mp4", "fps=24"], "no fps that divides the control rate of 100 Hz named '24'"),
         (["to=x.png", "id=zzz"], "no scenario in"),
     ],
 )
 def test_bad_input_is_one_line(row, capsys, arguments, says):
-    assert cli.run(["film", f"pool={REFERENCE}", f"id={row['id']}", *arguments]) == 2
+    assert cli.run(["film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1
 
@@ -192,6 +208,6 @@ def test_bad_input_is_one_line(row, capsys, arguments, says):
     ],
 )
 def test_bad_input_that_needs_a_camera_is_one_line(row, capsys, arguments, says):
-    assert cli.run(["film", f"pool={REFERENCE}", f"id={row['id']}", *arguments]) == 2
+    assert cli.run(["film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1

@@ -2,13 +2,11 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import pytest
 from helpers import REFERENCE
 
 from scengen import cli
-
 
 
 def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):

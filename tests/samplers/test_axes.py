@@ -8,7 +8,7 @@ from scengen.samplers.support import Interval, distance
 from scengen.samplers.task import load
 
 TASKS = config.tasks()
-NODE = config.read("one_task", ["task=domino_single"]).resolved["task"]
+NODE = config.task("domino_single").node
 
 
 def with_axis(**replace):

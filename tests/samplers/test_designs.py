@@ -15,9 +15,10 @@ from scengen.params import values
 from scengen.runs.generate import Settings
 from scengen.samplers.designs import Grid, Latin, Sobol
 from scengen.samplers.keyed import unit
-from scengen.samplers.task import ID, load
+from scengen.samplers.split import ID
+from scengen.samplers.task import load
 
-NODE = config.read("one_task", ["task=domino_single"]).resolved["task"]
+NODE = config.task("domino_single").node
 TASK = config.task("domino_single")
 SPELLED = ["iid", "sobol", "lhs:16", "grid:3"]
 VARIED = [name for name, dist in TASK.training.items() if dist.support[0].low != dist.support[-1].high]

@@ -13,11 +13,12 @@ from scengen.errors import BadConfig, Infeasible
 from scengen.params import values
 from scengen.samplers.dists import Choice, Fixed, Integer, LogUniform, Uniform, parse
 from scengen.samplers.keyed import normal, unit
-from scengen.samplers.task import ID, load
+from scengen.samplers.split import ID
+from scengen.samplers.task import load
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "draws.json"
 TASKS = config.tasks()
-NODES = {name: config.read("one_task", [f"task={name}"]).resolved["task"] for name in TASKS}
+NODE = config.task("domino_single").node
 
 
 def test_a_number_depends_on_its_key_alone():
@@ -98,8 +99,7 @@ def test_composed_axes_move_what_each_moves_alone():
 
 
 def test_a_new_parameter_or_axis_moves_no_other_value():
-    node = NODES["domino_single"]
-    richer = load("domino_single", {**node, "id": {**node["id"], "slab": {"mass": ["uniform", 0.05, 0.07]}}})
+    richer = load("domino_single", {**NODE, "id": {**NODE["id"], "slab": {"mass": ["uniform", 0.05, 0.07]}}})
     for index in range(20):
         before = values(config.task("domino_single").draw(ID, 0, index).scenario)
         after = values(richer.draw(ID, 0, index).scenario)
@@ -107,16 +107,14 @@ def test_a_new_parameter_or_axis_moves_no_other_value():
 
 
 def test_rejected_draws_are_counted_by_reason():
-    node = NODES["domino_single"]
-    task = load("domino_single", {**node, "id": {**node["id"], "gap_ratio": ["uniform", 1.5, 2.5], "x": 0.0, "y": 0.0}})
+    task = load("domino_single", {**NODE, "id": {**NODE["id"], "gap_ratio": ["uniform", 1.5, 2.5], "x": 0.0, "y": 0.0}})
     draws = [task.draw(ID, 0, i) for i in range(30)]
     assert any(d.rejected.get("a falling tile cannot reach its neighbour") for d in draws)
     assert all(sum(d.rejected.values()) == d.attempt for d in draws)
 
 
 def test_a_distribution_without_a_feasible_draw_says_why():
-    node = NODES["domino_single"]
-    task = load("domino_single", {**node, "id": {**node["id"], "gap_ratio": 2.4}})
+    task = load("domino_single", {**NODE, "id": {**NODE["id"], "gap_ratio": 2.4}})
     with pytest.raises(Infeasible, match="none of 100 draws was feasible .*cannot reach its neighbour"):
         task.draw(ID, 0, 0)
 
@@ -140,7 +138,7 @@ def _drawn(task, split, index):
 
 
 def test_the_first_hundred_draws_of_every_split_are_what_they_were():
-    """If this fails on purpose: say so in the CHANGELOG under "Draws", and run `python tests/test_samplers.py`."""
+    """If this fails on purpose: say so in the CHANGELOG under "Draws", and run this file with Python."""
     assert golden_draws() == json.loads(GOLDEN.read_text())
 
 

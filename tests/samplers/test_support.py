@@ -1,4 +1,4 @@
-"""What it takes to be outside: open and closed ends, mixtures, periods, symmetries, features, levels."""
+"""What it takes to be outside: open and closed ends, mixtures, periods, symmetries, features, severities."""
 
 import pytest
 from hypothesis import given
@@ -8,14 +8,16 @@ from scengen import config
 from scengen.errors import BadConfig, OutOfBounds
 from scengen.ood.features import at_most, departure, sampled, unseen
 from scengen.params import Parameter, parameters, values
+from scengen.runs.generate import Settings
 from scengen.samplers.axis import Axis, spell
 from scengen.samplers.dists import Choice, Fixed, Mixture, Uniform, parse
+from scengen.samplers.split import ID
 from scengen.samplers.support import Interval, distance, meet, nearest
-from scengen.samplers.task import ID, leaves, load
+from scengen.samplers.task import leaves, load
 from scengen.symmetry import Symmetry, images
 from scengen.tasks.domino_single import DominoSingle
 
-NODE = {k: v for k, v in config.read("one_task", ["task=domino_single"]).resolved["task"].items() if k != "boundary"}
+NODE = {k: v for k, v in config.task("domino_single").node.items() if k != "limits"}
 KNOWN = {p.name: p for p in parameters(DominoSingle())}
 
 
@@ -144,11 +146,11 @@ def test_bounds_of_sampled_proofs_are_those_of_the_textbook():
 def test_an_axis_moves_the_features_that_follow_from_what_it_moves():
     task = config.task("domino_single")
     by_name = {d.feature: d for d in sampled(task, "wide_gaps", draws=60).departures}
-    gap = by_name["gap over height"]
+    gap = by_name["gap_over_height"]
     assert gap.leaves and gap.inside == 0 and gap.bound == pytest.approx(at_most(0, 60)) and "60 draws" in gap.kind
     low, high = (ratio * DominoSingle().tile.width / DominoSingle().tile.height for ratio in (0.6, 1.2))
     assert low <= gap.training[0] and gap.training[1] <= high < gap.here[0]
-    assert not by_name["slab over tile mass"].leaves
+    assert not by_name["slab_over_tile_mass"].leaves
 
 
 def test_other_numbers_with_the_same_features_are_told_apart_from_new_physics():
@@ -168,103 +170,103 @@ def test_the_features_of_a_family_have_names_of_their_own(name):
     assert not scenario.features().keys() & values(scenario).keys()
 
 
-# --- levels ---------------------------------------------------------------------------------
+# --- severities -----------------------------------------------------------------------------
 
 
-def test_levels_go_in_equal_steps_from_the_edge_of_training_to_the_far_end():
-    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, levels=4)
+def test_severities_go_in_equal_steps_from_the_edge_of_training_to_the_far_end():
+    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, severities=4)
     assert [task.shifts(f"mine@{k}")["gap_ratio"].value for k in (1, 2, 3, 4)] == pytest.approx([1.25, 1.30, 1.35, 1.4])
 
 
-def test_levels_of_several_values_go_towards_each_from_its_own_side_also_over_the_seam():
-    task = with_axis({"heading": ["choice", -45.0, 135.0]}, levels=3)
+def test_severities_of_several_values_go_towards_each_from_its_own_side_also_over_the_seam():
+    task = with_axis({"heading": ["choice", -45.0, 135.0]}, severities=3)
     assert task.shifts("mine@1")["heading"].options == pytest.approx((-15.0, 105.0))
     over = {
         **NODE,
         "id": {**NODE["id"], "heading": 170.0},
-        "axes": {"mine": {"replace": {"heading": -150.0}, "levels": 4}},
+        "axes": {"mine": {"replace": {"heading": -150.0}, "severities": 4}},
     }
     assert [load("x", over).shifts(f"mine@{k}")["heading"].value % 360 for k in (1, 4)] == pytest.approx([180, 210])
 
 
 def test_a_measured_limit_becomes_the_far_end():
-    node = {**NODE, "axes": {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}}
-    task = load("domino_single", {**node, "boundary": {"mine": {"gap_ratio": 1.6}}})
+    node = {**NODE, "axes": {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "severities": 2}}}
+    task = load("domino_single", {**node, "limits": {"mine": {"gap_ratio": 1.6}}})
     assert [task.shifts(f"mine@{k}")["gap_ratio"].value for k in (1, 2)] == pytest.approx([1.4, 1.6])
 
 
-def test_a_level_is_a_split_like_any_other_and_its_twins_differ_in_nothing_else():
-    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, levels=5)
+def test_a_severity_is_a_split_like_any_other_and_its_twins_differ_in_nothing_else():
+    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, severities=5)
     for index in range(5):
         trained, shifted = (values(task.draw(split, 0, index).scenario) for split in (ID, "mine@3"))
         assert {n for n in trained if trained[n] != shifted[n]} == {"gap_ratio"}
 
 
 @pytest.mark.parametrize(
-    ("split", "levels", "says"),
+    ("split", "severities", "says"),
     [
-        ("mine@1", 0, "the axis has none: give it `levels: N`"),
-        ("mine@6", 5, "the axis has levels 1 to 5"),
-        ("mine@0", 5, "the axis has levels 1 to 5"),
-        ("mine@high", 5, "after the @ stands a whole number"),
+        ("mine@1", 0, "the axis has none: give it `severities: N`"),
+        ("mine@6", 5, "the axis has severities 1 to 5"),
+        ("mine@0", 5, "the axis has severities 1 to 5"),
+        ("mine@high", 5, "the severity after @ is a whole number"),
         ("mine@2+mine@3", 5, "two of its axes move gap_ratio"),
     ],
 )
-def test_a_level_that_does_not_exist_is_refused(split, levels, says):
-    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, levels=levels)
+def test_a_severity_that_does_not_exist_is_refused(split, severities, says):
+    task = with_axis({"gap_ratio": ["uniform", 1.25, 1.4]}, severities=severities)
     with pytest.raises(BadConfig, match=says):
         task.draw(split, 0, 0)
 
 
-def test_levels_of_whole_numbers_are_whole_or_refused():
-    assert with_axis({"count": ["integer", 7, 8]}, levels=2).shifts("mine@1")["count"] == Fixed(7)
+def test_severities_of_whole_numbers_are_whole_or_refused():
+    assert with_axis({"count": ["integer", 7, 8]}, severities=2).shifts("mine@1")["count"] == Fixed(7)
     with pytest.raises(BadConfig, match="there are 2 steps"):
-        with_axis({"count": ["integer", 7, 8]}, levels=5)
+        with_axis({"count": ["integer", 7, 8]}, severities=5)
 
 
 @pytest.mark.parametrize(
-    ("boundary", "error"),
+    ("limits", "error"),
     [
         ({"mine": {"gap_ratio": 99.0}}, OutOfBounds),
         ({"mine": 1.6}, BadConfig),
     ],
 )
-def test_a_limit_that_makes_no_sense_is_refused(boundary, error):
-    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}
+def test_a_limit_that_makes_no_sense_is_refused(limits, error):
+    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "severities": 2}}
     with pytest.raises(error):
-        load("domino_single", {**NODE, "axes": axes, "boundary": boundary})
+        load("domino_single", {**NODE, "axes": axes, "limits": limits})
 
 
-def test_a_limit_inside_training_is_refused_when_the_level_is_asked_for_and_only_then():
-    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}
-    task = load("domino_single", {**NODE, "axes": axes, "boundary": {"mine": {"gap_ratio": 1.0}}})
+def test_a_limit_inside_training_is_refused_when_the_severity_is_asked_for_and_only_then():
+    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "severities": 2}}
+    task = load("domino_single", {**NODE, "axes": axes, "limits": {"mine": {"gap_ratio": 1.0}}})
     assert task.draw("mine", 0, 0)
     with pytest.raises(BadConfig, match=r"axis mine@1: .*drop the axis \(~task.axes.mine\)"):
         task.draw("mine@1", 0, 0)
 
 
 def test_limits_of_an_axis_that_was_dropped_or_changed_do_not_stand_in_the_way():
-    boundary = {"gone": {"gap_ratio": 1.6}, "mine": {"count": 9}}
-    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "levels": 2}}
-    assert load("domino_single", {**NODE, "axes": axes, "boundary": boundary}).axes["mine"].limits == {}
+    limits = {"gone": {"gap_ratio": 1.6}, "mine": {"count": 9}}
+    axes = {"mine": {"replace": {"gap_ratio": ["uniform", 1.25, 1.4]}, "severities": 2}}
+    assert load("domino_single", {**NODE, "axes": axes, "limits": limits}).axes["mine"].limits == {}
 
 
 @pytest.mark.parametrize("name", config.tasks())
-def test_every_recorded_limit_belongs_to_a_parameter_of_an_axis_with_one_way_to_go(name):
-    task, recorded = config.task(name), config.read("one_task", [f"task={name}"]).resolved["task"].get("boundary", {})
-    for axis, limits in recorded.items():
-        assert {n for n, _ in leaves(limits)} == set(task.axes[axis].limits), "a name in conf/limits is wrong"
+def test_every_recorded_limit_belongs_to_a_parameter_of_an_axis_with_one_path_to_go(name):
+    task, recorded = config.task(name), config.task(name).node.get("limits", {})
+    for axis, measured in recorded.items():
+        assert {n for n, _ in leaves(measured)} == set(task.axes[axis].limits), "a name in conf/limits is wrong"
         assert not any(isinstance(task.axes[axis].replace[n], Choice) for n in task.axes[axis].limits)
 
 
 def test_recorded_limits_are_found_beside_the_task_files_of_any_package(tmp_path):
     for group, text in (
         ("task", (config.conf_dir() / "task" / "domino_single.yaml").read_text()),
-        ("boundary", "wide_gaps:\n  gap_ratio: 1.55\n"),
+        ("limits", "wide_gaps:\n  gap_ratio: 1.55\n"),
     ):
         (tmp_path / group).mkdir()
         (tmp_path / group / "theirs.yaml").write_text(text)
-    asked = ["task=theirs", "++task.axes.wide_gaps.levels=5", f"hydra.searchpath=[file://{tmp_path}]"]
-    composed = config.read("generate", asked)
-    assert composed.task and composed.task.shifts("wide_gaps@5") == {"gap_ratio": Fixed(1.55)}
-    assert composed.resolved["task"]["boundary"] == {"wide_gaps": {"gap_ratio": 1.55}}, "the manifest records it"
+    asked = ["task=theirs", "++task.axes.wide_gaps.severities=5", f"hydra.searchpath=[file://{tmp_path}]"]
+    _, task, _ = config.read_task("generate", asked, Settings)
+    assert task.shifts("wide_gaps@5") == {"gap_ratio": Fixed(1.55)}
+    assert task.node["limits"] == {"wide_gaps": {"gap_ratio": 1.55}}, "and so the manifest records it"

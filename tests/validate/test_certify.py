@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from scengen import config
-from scengen.assets.prop import UP
+from scengen.certificate import CHECKS
+from scengen.geometry import UP
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, World
 from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
-from scengen.validate.certify import CHECKS, certify, lower_bound
+from scengen.validate.certify import certify, lower_bound
 from scengen.validate.rollout import Jitter, replay, run
 from scengen.validate.settings import CertifySettings, Robust
 
@@ -41,7 +42,7 @@ def test_the_certificate_keeps_what_the_physics_depends_on(good):
 
 def test_certifying_twice_gives_the_same_bits(good):
     again = certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
-    assert again.digest == good.digest and np.array_equal(again.actions, good.actions)
+    assert again.digest == good.digest and np.array_equal(again.witness, good.witness)
     assert again.certificate == good.certificate
 
 
@@ -156,17 +157,17 @@ def test_a_shortcut_that_works_refutes_the_scene():
             return "the robot touched the slab" if world.touched(ROBOT, "slab") else None
 
     certificate = certify(Permissive(), HORIZON, CertifySettings()).certificate
-    assert certificate.verdict == "refuted" and "'push the last tile' reaches the goal" in certificate.reason
+    assert certificate.verdict == "refuted" and "'push_the_last_tile' reaches the goal" in certificate.reason
 
 
 def test_a_means_that_is_not_needed_refutes_the_scene():
     @dataclass(frozen=True, kw_only=True)
     class Needless(DominoSingle):
         def ablations(self):
-            return {"no change": self.build()}
+            return {"no_change": self.build()}
 
     certificate = certify(Needless(), HORIZON, CertifySettings()).certificate
-    assert certificate.reason == "necessity: the witness succeeds with 'no change'"
+    assert certificate.reason == "ablations: the witness succeeds with 'no_change'"
 
 
 # --- robustness -------------------------------------------------------------------------------
@@ -209,8 +210,8 @@ def test_jitter_moves_what_it_should_by_what_its_key_says():
 def test_a_replay_after_a_used_world_ends_in_the_same_bits(good):
     scenario = config.task("domino_single").draw("id", 0, 1).scenario
     world = World.load(good.scene_xml)
-    run(scenario, world, scenario.shortcuts()["push the slab"], 3.0)
-    assert replay(scenario, world, good.actions, HORIZON).digest == good.digest
+    run(scenario, world, scenario.shortcuts()["push_the_slab"].plan, 3.0)
+    assert replay(scenario, world, good.witness, HORIZON).digest == good.digest
 
 
 def test_a_success_that_does_not_last_is_none():
@@ -220,11 +221,11 @@ def test_a_success_that_does_not_last_is_none():
             return 1.0 < world.time < 1.2
 
     episode = run(Fleeting(), World.load(scene_text.emit(DominoSingle().build())[0]), DominoSingle().oracle, HORIZON)
-    assert episode.outcome == "timeout" and "did not hold" in episode.reason
+    assert episode.outcome == "timeout" and "did not last" in episode.reason
 
 
 def test_a_touch_of_the_slab_between_two_looks_is_remembered():
     scenario = DominoSingle()
     world = World.load(scene_text.emit(scenario.build())[0])
-    episode = run(scenario, world, scenario.shortcuts()["push the slab"], HORIZON)
+    episode = run(scenario, world, scenario.shortcuts()["push_the_slab"].plan, HORIZON)
     assert episode.outcome == "failure" and world.touched(ROBOT, "slab")
