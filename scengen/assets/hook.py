@@ -53,13 +53,13 @@ class Hook(Prop):
 
     @property
     def corners(self) -> NDArray[np.float64]:
-        """Corners of its bars seen from above [m], shape (n, 2)."""
+        """Corners of its bars on the ground [m], shape (n, 3)."""
         corners = []
         for start, end, more in self.bars:
             along = (end - start) / np.linalg.norm(end - start)
             left = self.width / 2 * np.array([-along[1], along[0]])
             corners += [spot + side * left for spot in (start - more * along, end + more * along) for side in (1, -1)]
-        return np.array(corners)
+        return np.pad(np.array(corners), ((0, 0), (0, 1)))
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         lengths = [float(np.linalg.norm(end - start)) for start, end, _ in self.bars]

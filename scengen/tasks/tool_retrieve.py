@@ -11,14 +11,12 @@ hook, pass it behind the cube on the side where its tip can catch, draw the cube
 
 Out of reach. The robot's own table is enough: the arm swings about a shoulder 0.445 m above it, and a band of 2 cm
 before the far edge, the corners aside, is beyond it. Scenarios are refuted unless *no part of the gripper* can touch
-the cube in any posture (`ik.TOUCH`, a bound that ignores joint limits, so that no search has to be believed); the grip
-site misses the cube's centre by 70 mm or more, by a bound of the same kind and by inverse kinematics alike.
+the cube in any posture, by a bound that ignores joint limits (`ik.TOUCH`), so that no search has to be believed.
 
-The goal. The paper says "lift the cube above the table", without numbers. Here: 4 cm above where a cube on the
-table has its centre, as in robosuite's Lift; held by the robot and by nothing else, the hook let go, for 0.3 s, which
-are the paper's 30 steps of its other lifting tasks (T12, T13). That the hook must not be touched then says in the goal
-what the paper says in words ("set the hook down, then grasp the cube and lift"). There is no other rule: a policy may
-push with the tip, sweep with the handle, or throw, if it can.
+The goal. The paper says "lift the cube above the table", without numbers. Here: 4 cm above where a cube on the table
+has its centre, as in robosuite's Lift; held by the robot and by nothing else, the hook let go ("set the hook down, then
+grasp the cube and lift"), for 0.3 s, which are the paper's 30 steps of its other lifting tasks (T12, T13). There is no
+other rule: a policy may push with the tip, sweep with the handle, or throw, if it can.
 
 The oracle works in polar coordinates about the robot's first axis, where all bearings look the same to the arm.
 """
@@ -33,7 +31,7 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.hook import LHook
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Outline, Vec3, about_y, about_z, corners
+from ..geometry import UP, Vec3, about_y, about_z, corners, heading
 from ..params import param
 from ..predicates import fallen, held
 from ..robots import ik
@@ -130,14 +128,11 @@ class ToolRetrieve(Scenario):
         bearing, there = _polar(world.com("cube"))
         along = world.rot("cube").T @ about_z(bearing)[:, 0]
         across = self.half * float(np.abs(along).sum())  # half the cube's width, seen along the bearing
-        passing = across + WIDE + self.hook.tip + self.hook.width / 2
         before, behind = there - across - self.hook.width - WIDE, there + across + CLEAR
-        beside = self.half + self.hook.width / 2 - SQUARING
-        drawn = max(DRAWN_TO, NEAREST_HAND + self.stretch - self.half)
-        yield from self.slide(world, bearing, before, mirror * passing)
-        yield from self.slide(world, bearing, behind, mirror * passing)
-        yield from self.slide(world, bearing, behind, mirror * beside)
-        yield from self.slide(world, bearing, drawn + self.half, mirror * beside)
+        drawn = self.half + max(DRAWN_TO, NEAREST_HAND + self.stretch - self.half)
+        past, against = across + WIDE + self.hook.tip + self.hook.width / 2, self.half + self.hook.width / 2 - SQUARING
+        for inside, beside in ((before, past), (behind, past), (behind, against), (drawn, against)):
+            yield from self.slide(world, bearing, inside, mirror * beside)
 
     def slide(self, world: World, bearing: float, inside: float, beside: float) -> Plan:
         """Move the held hook over the table until it lies along `bearing` [rad], seen from the robot's first axis.
@@ -223,16 +218,16 @@ class ToolRetrieve(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        hook, edge, gap = self.hook, self.cube.edge, self.out_of_touch
-        yield on_table("hook or cube", self.outline)
+        turn, at = about_z(math.radians(self.hook_yaw)), np.array([self.hook_x, self.hook_y, TABLE_TOP])
+        yield on_table("the hook", self.hook.corners @ turn.T + at)
+        yield on_table("the cube", corners(self.spot, math.radians(self.cube_yaw), self.cube.size))
+        gap, hand_at = self.out_of_touch, self._behind - self.stretch
         yield require(gap > 0, "the arm may touch the cube without the hook", gap=gap, reach=ik.TOUCH)
-        hand_at = self._behind - self.stretch
         yield require(hand_at <= ARM, "the hook is too short", hand_at=hand_at, arm=ARM)
-        both = edge + hook.width
+        both, tip = self.cube.edge + self.hook.width, self.hook.tip
         yield require(both > OPENING, "the jaw can hold hook and cube together", both=both, jaw=OPENING)
-        yield require(hook.tip >= self.half, "the tip ends before the cube's middle", tip=hook.tip, half=self.half)
-        along = about_z(math.radians(self.hook_yaw))[:2, 0]
-        away = math.hypot(*([self.hook_x, self.hook_y] + (hook.inside - self.stretch) * along - BASE[:2]))
+        yield require(tip >= self.half, "the tip ends before the cube's middle", tip=tip, half=self.half)
+        _, away = _polar(at + turn @ [self.hook.inside - self.stretch, 0.0, 0.0])
         yield require(away <= ARM, "the handle is out of reach", distance=away, arm=ARM)
 
     def features(self) -> Mapping[str, float]:
@@ -248,8 +243,8 @@ class ToolRetrieve(Scenario):
     @property
     def spot(self) -> Vec3:
         """Where the centre of the cube's foot stands [m]."""
-        out = self.distance * about_z(math.radians(self.bearing))[:, 0]
-        return np.array([BASE[0] + out[0], BASE[1] + out[1], TABLE_TOP])
+        away = self.distance * heading(self.bearing)
+        return np.array([BASE[0] + away[0], BASE[1] + away[1], TABLE_TOP])
 
     @property
     def half(self) -> float:
@@ -262,13 +257,6 @@ class ToolRetrieve(Scenario):
         turn, centre = about_z(math.radians(self.cube_yaw)), self.spot + self.half * UP
         inside = np.clip(turn.T @ (SHOULDER - centre), -self.half, self.half)
         return ik.shortfall(centre + turn @ inside, ik.TOUCH)
-
-    @property
-    def outline(self) -> Outline:
-        """The corners of hook and cube seen from above [m], shape (n, 2)."""
-        turn = about_z(math.radians(self.hook_yaw))[:2, :2]
-        hook = self.hook.corners @ turn.T + [self.hook_x, self.hook_y]
-        return np.vstack([hook, corners(self.spot, math.radians(self.cube_yaw), self.cube.size)])
 
     @property
     def stretch(self) -> float:
