@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scengen.assets.box import Domino
-from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect
+from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 
 TILE = Domino(height=0.05, width=0.025, thickness=0.008)
 SLAB = Domino(height=0.11, width=0.04, thickness=0.012)
@@ -50,3 +50,10 @@ def test_whatever_is_wrong_the_first_tile_and_the_slab_stand_where_they_do_in_an
     feet, intact = chain(Defect(kind=kind)).feet, chain().feet
     assert feet[0] == pytest.approx(intact[0]) and feet[4] == pytest.approx(intact[4])
     assert len(feet) == len(intact) - (kind == MISSING)
+
+
+@pytest.mark.parametrize(("side", "room"), [(0, 0.050), (1, 0.020)])
+def test_the_room_between_lanes_is_that_of_the_pieces_that_come_nearest_to_each_other(side, room):
+    """90 mm apart, slabs of 40 mm leave 50; a tile of 25 mm, 37.5 mm to the left, leaves 90 - 37.5 - (25 + 40) / 2."""
+    aside = Defect(kind=GAP, offset=1.5, side=side)
+    assert Lanes((chain(aside), chain()), 0.09).room == pytest.approx(room)
