@@ -20,6 +20,7 @@ VERBS = (
     "record",
     "tasks",
     "evaluate",
+    "attack",
     "axis",
     "report",
     "robosuite",

@@ -24,6 +24,7 @@ LAYERS = (
     ("validate",),
     ("config",),
     ("runs",),
+    ("attack",),
     ("pictures",),
     ("envs",),
     ("export", "evaluate"),

@@ -1,0 +1,248 @@
+"""An attack on several scenarios of a task: subjects, jobs in parallel, and the report."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..episode import Actions
+from ..errors import BadConfig, Infeasible, UnknownName, at_least
+from ..parallel import each
+from ..pool import Pool
+from ..runs.log import Log
+from ..samplers.task import Task
+from ..scenario import Plan, Scenario
+from ..sim import scene_text
+from ..sim.world import World
+from ..validate.identity import source_sha256
+from ..validate.rollout import run
+from .evidence import Hit, Rate, rates
+from .play import Arena
+from .priors import Judge, Prior, by_statics, fit, has_statics
+from .search import PRIOR, TIERS, Attack, Result
+
+GRAMMAR = 1
+"""Version of macros and tiers: reports of different ones are not comparable."""
+TRIES = 4
+"""How many draws are tried for every scenario wanted."""
+STATICS, ROLLOUTS = 300, 8
+"""On how many draws fixed answers are fitted: by statics, or by a rollout for each draw and candidate."""
+FITTED, FRESH = 1_000_003, 2_000_003
+"""Added to the seed of the attack: the seeds of the draws on which fixed answers are fitted, and measured."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen attack`; meanings stand in conf/command/attack.yaml."""
+
+    pool: str | None = None
+    split: str = "id"
+    n: int = 5
+    budget: int = 200
+    seed: int = 0
+    tiers: str | list[str] | None = None
+    workers: int = 1
+    to: str | None = None
+    json: str | None = None
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """The tiers that are played."""
+        asked = [self.tiers] if isinstance(self.tiers, str) else self.tiers
+        return tuple(tier for tier in TIERS if asked is None or tier in asked)
+
+    def check(self) -> None:
+        """Raise `ScengenError` for settings that make no sense."""
+        at_least(self, n=1, budget=1, seed=0, workers=1)
+        for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
+            if tier not in TIERS:
+                raise UnknownName("tier", tier, TIERS)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scenario that is attacked, with a witness that reaches its goal."""
+
+    scenario: Scenario
+    scene_xml: str
+    embodiment: str
+    horizon: float
+    witness: Actions
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an attack came to."""
+
+    task: str
+    scenarios: tuple[str, ...]
+    rates: tuple[Rate, ...]
+    hits: tuple[Hit, ...]
+    priors: tuple[Prior, ...]
+    cpu: float
+    """Processor time of the adversary's rollouts [s]; differs from run to run."""
+
+    @property
+    def rollouts(self) -> int:
+        return sum(rate.rollouts for rate in self.rates)
+
+    @property
+    def refuting(self) -> list[Hit]:
+        """Hits that show a way around what the task is about."""
+        return [hit for hit in self.hits if hit.refutes]
+
+    def plain(self) -> dict[str, Any]:
+        """Everything but actions and processor time."""
+        return {
+            "task": self.task,
+            "grammar": GRAMMAR,
+            "scenarios": list(self.scenarios),
+            "rollouts": self.rollouts,
+            "rates": [rate.plain() for rate in self.rates],
+            "priors": [{**asdict(prior), "bound": prior.bound} for prior in self.priors],
+            "hits": [{"name": hit.name, "refutes": hit.refutes, **hit.plain()} for hit in self.hits],
+        }
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the attacks of one report have in common; called with a number, it attacks that scenario."""
+
+    subjects: tuple[Subject, ...]
+    budget: int
+    """Rollouts for each scenario."""
+    seed: int
+    tiers: tuple[str, ...]
+    priors: tuple[Prior, ...]
+    until: Callable[[Hit], bool] = lambda hit: False
+
+    def __call__(self, number: int) -> Result:
+        attacked = self.subjects[number]
+        arena = arena_of(attacked)
+        arena.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
+        attack = Attack(arena, self.seed, number, len(self.subjects), self.priors, self.until)
+        return attack.run(self.budget, self.tiers)
+
+
+def attack(
+    task: Task, subjects: Sequence[Subject], settings: Settings, folder: Path, progress: Callable[[int, int], None]
+) -> Report:
+    """Attack every subject, continuing what stands in `folder`; hits are stored there.
+
+    Args:
+        progress: told how many scenarios are done, and how many hits there are.
+    """
+    priors = tuple(fitted(task, settings)) if PRIOR in settings.chosen else ()
+    budget = max(1, settings.budget // len(subjects))
+    job = Job(tuple(subjects), budget, settings.seed, settings.chosen, priors)
+    identity = {
+        "grammar": GRAMMAR,
+        "scenarios": [one.scenario.id for one in subjects],
+        "budget": budget,
+        "seed": settings.seed,
+        "tiers": list(settings.chosen),
+        "source_sha256": source_sha256(task.family),
+    }
+    with Log(folder / "attack.jsonl", identity) as log:
+        done = {record["scenario"] for record in log.records}
+        todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
+        for result in each(job, todo, settings.workers):
+            for hit in result.hits:
+                hit.store(folder)
+            log.add(_record(result))
+            progress(len(log.records), sum(len(record["hits"]) for record in log.records))
+        return _report(task, subjects, log, folder, priors)
+
+
+def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
+    """The first `n` scenarios of a split that their oracle solves, out of at most `TRIES` times as many.
+
+    Raises:
+        BadConfig: there is none.
+    """
+    found: list[Subject] = []
+    for index in range(TRIES * n):
+        try:
+            scenario = task.draw(split, seed, index).scenario
+        except Infeasible:
+            continue
+        text, _ = scene_text.emit(scenario.build())
+        rollout = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
+        if rollout.solved:
+            found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions))
+        if len(found) == n:
+            return found
+    if not found:
+        raise BadConfig(f"{task.name}/{split}: the oracle solves none of {TRIES * n} draws; nothing can be attacked")
+    return found
+
+
+def pooled(task: Task, pool: Pool, n: int) -> list[Subject]:
+    """The first `n` scenarios of a pool."""
+    found = []
+    for row in pool.rows():
+        if len(found) == n:
+            break
+        scenario = task.scenario(row.params)
+        found.append(Subject(scenario, row.scene_xml, row.embodiment, row.horizon, row.witness))
+    return found
+
+
+def arena_of(subject: Subject) -> Arena:
+    """Where a subject is attacked."""
+    return Arena(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
+
+
+def fitted(task: Task, settings: Settings) -> list[Prior]:
+    """The best fixed answers of a task, fitted on other draws; none if its family does not say what it asks for."""
+    answer = task.family().answer()
+    if answer is None:
+        return []
+    static = has_statics(answer)
+    count = STATICS if static else ROLLOUTS
+    training = list(_draws(task, settings.split, settings.seed + FITTED, count))
+    if not training:
+        return []
+    fresh = list(_draws(task, settings.split, settings.seed + FRESH, count)) if static else []
+    return fit(training, by_statics if static else _by_rollouts(task), fresh)
+
+
+def _by_rollouts(task: Task) -> Judge:
+    def judge(scenario: Scenario, value: float) -> bool:
+        text, _ = scene_text.emit(scenario.build())
+
+        def guess(world: World) -> Plan:
+            answer = scenario.answer()
+            assert answer is not None, "asked for once for the family"
+            return answer.act(world, value)
+
+        return run(scenario, World.load(text, task.embodiment), guess, task.horizon, until_settled=True).solved
+
+    return judge
+
+
+def _draws(task: Task, split: str, seed: int, count: int) -> Iterator[Scenario]:
+    for index in range(count):
+        try:
+            yield task.draw(split, seed, index).scenario
+        except Infeasible:
+            continue
+
+
+def _record(result: Result) -> dict[str, Any]:
+    counts = [asdict(rate) for rate in result.rates]
+    return {"scenario": result.scenario, "rates": counts, "hits": [h.name for h in result.hits], "cpu": result.cpu}
+
+
+def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> Report:
+    order = [one.scenario.id for one in subjects]
+    records = sorted(log.records, key=lambda record: order.index(record["scenario"]))
+    counts = [Rate(**rate) for record in records for rate in record["rates"]]
+    hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
+    cpu = sum(record["cpu"] for record in records)
+    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, cpu)
+
+
+def _sorted(counts: Sequence[Rate]) -> list[Rate]:
+    """In the order of the tiers."""
+    return sorted(counts, key=lambda rate: (TIERS.index(rate.tier.split("_")[0]), rate.tier, rate.raw))

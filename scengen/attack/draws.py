@@ -1,0 +1,151 @@
+"""Random macros by identity: the same key gives the same macro, whoever asks and whenever."""
+
+import math
+
+from ..samplers.keyed import spread, unit
+from .macros import Macro
+from .play import Arena
+from .solids import TABLE, Solid, handles, sides
+
+Key = tuple[str | int, ...]
+
+KINDS = {
+    "pick": 0.30,
+    "push": 0.26,
+    "place": 0.12,
+    "press": 0.10,
+    "turn": 0.08,
+    "shake": 0.06,
+    "throw": 0.04,
+    "wait": 0.04,
+}
+"""Shares of the kinds of macro."""
+MOST = 5
+"""Macros of a random plan, at most."""
+ALIGNED = 0.8
+"""Share of the directions that are those of the thing in question."""
+
+
+def plan(arena: Arena, *key: str | int) -> tuple[Macro, ...]:
+    """One to five random macros."""
+    count = 1 + int(MOST * unit(*key, "count"))
+    return tuple(macro(arena, *key, place) for place in range(count))
+
+
+def macro(arena: Arena, *key: str | int) -> Macro:
+    """A random macro. It looks at the world as it is at the start."""
+    arena.rewind()
+    share = unit(*key, "kind")
+    for kind, weight in KINDS.items():
+        share -= weight
+        if share < 0:
+            break
+    return _DRAWS[kind](arena, key)
+
+
+def varied(one: Macro, *key: str | int) -> Macro:
+    """The macro with its numbers changed by up to a fifth, whole ones left alone."""
+    numbers = tuple(n if n == round(n) else n * (1 + spread(0.2, *key, k)) for k, n in enumerate(one.numbers))
+    return one if one.kind in ("shortcut", "replay", "answer", "follow") else Macro(one.kind, one.target, numbers)
+
+
+def _pick(arena: Arena, key: Key) -> Macro:
+    found = handles(arena.solids, arena.suction)
+    if not found:
+        return _push(arena, key)
+    solid = found[int(len(found) * unit(*key, "target"))]
+    fits = sides(arena.world, arena.solids, solid) or [0]
+    which = fits[0] if unit(*key, "side") < 0.7 else fits[-1]
+    return Macro(
+        "pick", solid.name, (unit(*key, "height"), _skew(key), float(which), _within(0.03, 0.25, *key, "lift"))
+    )
+
+
+def _push(arena: Arena, key: Key) -> Macro:
+    solid = _target(arena, key, table=False)
+    numbers = (
+        _direction(arena, solid, key),
+        _within(0.05, 0.95, *key, "height"),
+        0.0 if unit(*key, "middle") < 0.5 else spread(0.8, *key, "offset"),
+        _within(0.03, 0.18, *key, "way"),
+        _speed(key),
+    )
+    return Macro("push", solid.name, numbers)
+
+
+def _place(arena: Arena, key: Key) -> Macro:
+    drop = 0.0 if unit(*key, "lowered") < 0.7 else _within(0.01, 0.12, *key, "drop")
+    numbers = (*_spot(key), drop, _within(0.05, 0.10, *key, "speed"))
+    return Macro("place", _target(arena, key, table=True).name, numbers)
+
+
+def _press(arena: Arena, key: Key) -> Macro:
+    numbers = (*_spot(key), _within(0.1, 0.6, *key, "seconds"), _within(0.05, 0.15, *key, "speed"))
+    return Macro("press", _target(arena, key, table=False).name, numbers)
+
+
+def _turn(arena: Arena, key: Key) -> Macro:
+    axis, angle = int(3 * unit(*key, "axis")), math.radians(_within(20.0, 90.0, *key, "angle"))
+    turn = [0.0, 0.0, 0.0]
+    turn[axis] = angle if unit(*key, "sign") < 0.5 else -angle
+    return Macro("turn", "", (*turn, _within(0.5, 2.5, *key, "rate")))
+
+
+def _shake(arena: Arena, key: Key) -> Macro:
+    along = [0.0, 0.0, 0.0]
+    along[int(3 * unit(*key, "axis"))] = 1.0
+    spin = 0.0 if unit(*key, "spins") < 0.5 else math.copysign(1.0, spread(1.0, *key, "spin"))
+    return Macro("shake", "", (*along, spin, _within(0.1, 0.5, *key, "period"), _within(0.5, 2.5, *key, "duration")))
+
+
+def _throw(arena: Arena, key: Key) -> Macro:
+    yaw, rise = spread(math.pi, *key, "yaw"), _within(0.0, 1.2, *key, "rise")
+    way = (math.cos(rise) * math.cos(yaw), math.cos(rise) * math.sin(yaw), math.sin(rise))
+    return Macro("throw", "", (*way, _within(0.1, 0.6, *key, "seconds")))
+
+
+def _wait(arena: Arena, key: Key) -> Macro:
+    return Macro("wait", "", (_within(0.2, 1.5, *key, "seconds"),))
+
+
+_DRAWS = {
+    "pick": _pick,
+    "push": _push,
+    "place": _place,
+    "press": _press,
+    "turn": _turn,
+    "shake": _shake,
+    "throw": _throw,
+    "wait": _wait,
+}
+
+
+def _target(arena: Arena, key: Key, table: bool) -> Solid:
+    found = [solid for solid in arena.solids.values() if table or solid.body != TABLE]
+    return found[int(len(found) * unit(*key, "target"))]
+
+
+def _direction(arena: Arena, solid: Solid, key: Key) -> float:
+    """Along one of the level axes of a solid, one way or the other, or anywhere [rad]."""
+    if unit(*key, "aligned") > ALIGNED:
+        return spread(math.pi, *key, "direction")
+    along, _ = solid.level_axes(arena.world)[int(2 * unit(*key, "side"))]
+    return math.atan2(along[1], along[0]) + (math.pi if unit(*key, "sign") < 0.5 else 0.0)
+
+
+def _skew(key: Key) -> float:
+    return 0.0 if unit(*key, "aligned") < ALIGNED else spread(math.pi / 4, *key, "skew")
+
+
+def _spot(key: Key) -> tuple[float, float]:
+    """Shares of an upper face."""
+    return spread(0.9, *key, "u"), spread(0.9, *key, "v")
+
+
+def _speed(key: Key) -> float:
+    """Of a push [m/s]: 0.30 is as fast as the hand goes."""
+    return _within(0.08, 0.30, *key, "speed")
+
+
+def _within(low: float, high: float, *key: str | int) -> float:
+    return low + (high - low) * unit(*key)

@@ -1,0 +1,233 @@
+"""Play an attempt of the adversary: from the start or from a saved state, through the teleoperation filter or raw."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control.loop import Loop
+from ..episode import Actions, Episode, Outcome
+from ..errors import BadConfig, GaveUp
+from ..scenario import Plan, Scenario
+from ..sim.world import SUCTION, World
+from ..validate.rollout import STILL, STILL_FOR
+from . import macros
+from .macros import Field, Macro
+from .signature import Signature, signature, starts
+from .solids import Solid, solids
+from .witness import again, follow, trace
+
+SETTLE = 1.0
+"""How long a reached goal has to last without action [s], as in a certificate."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What the adversary does, as data."""
+
+    tier: str
+    macros: tuple[Macro, ...]
+    stage: int | None = None
+    """The stage of the witness at which it begins; the start of the episode without it."""
+
+    def __str__(self) -> str:
+        begin = "" if self.stage is None else f"the first {self.stage} phases of the witness; "
+        return begin + ("; ".join(map(str, self.macros)) or "nothing more")
+
+
+@dataclass(frozen=True)
+class Node:
+    """A state to fork from: everything that the rest of an episode depends on."""
+
+    state: NDArray[np.float64]
+    held: float
+    """How long the goal has held [s]."""
+    actions: Actions
+    """What has led here."""
+    signature: Signature
+    """What has happened so far."""
+
+    @property
+    def seconds(self) -> float:
+        """Since the start of the episode [s]."""
+        return len(self.actions) * Loop.PERIOD
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came of an attempt."""
+
+    outcome: Outcome
+    reason: str
+    seconds: float
+    """When the goal was reached, or when the episode ended [s]."""
+    actions: Actions
+    """Everything since the start of the episode, as the controller received it."""
+    digest: str
+    """Hash of the final physics state."""
+    signature: Signature
+    """When the goal was reached, or at the end."""
+    notes: tuple[str, ...]
+    """Which macros gave up, and why."""
+    nodes: tuple[Node, ...] = field(repr=False)
+    """The states at the ends of its macros while the outcome was open."""
+
+    @property
+    def solved(self) -> bool:
+        return self.outcome == "success"
+
+
+class Arena:
+    """One scenario that is attacked: its world, its limits, and what each kind of macro needs to know."""
+
+    def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, horizon: float, witness: Actions):
+        self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
+        self.world = World.load(scene_xml, embodiment)
+        self._places = starts(self.world)
+        self.start = Node(self.world.state(), 0.0, np.zeros((0, 7), np.float32), self.signature())
+        found = trace(scenario, self.world, witness)
+        if found is None:
+            raise BadConfig(
+                f"scenario {scenario.id}: the witness does not reach the goal, so that nothing can be attacked"
+            )
+        self.trace = found
+        """The witness taken apart."""
+        self.foreign: dict[str, Actions] = {}
+        """Witnesses of other scenarios, by id."""
+
+    @cached_property
+    def solids(self) -> Mapping[str, Solid]:
+        """The solids of the scene."""
+        return solids(self.world)
+
+    @cached_property
+    def field(self) -> Field:
+        """What the plans of macros look at."""
+        return Field(self.world, self.solids, self.suction)
+
+    @property
+    def suction(self) -> bool:
+        """Whether the hand is a suction cup."""
+        return self.embodiment == SUCTION
+
+    def plan(self, macro: Macro, raw: bool) -> Plan:
+        """The moves of one macro."""
+        match macro.kind:
+            case "follow":
+                return follow(self.world, self.trace, macro)
+            case "replay":
+                return again(self.foreign[macro.target], raw)
+            case "shortcut":
+                return self.scenario.shortcuts()[macro.target].plan(self.world)
+            case "answer":
+                answer = self.scenario.answer()
+                assert answer is not None, "only families with an answer are guessed at"
+                return answer.act(self.world, macro.numbers[0])
+        return macros.plan(self.field, macro)
+
+    def stage(self, k: int) -> Node:
+        """The state at the beginning of phase `k` of the witness."""
+        stage = self.trace.stages[k]
+        return Node(stage.state, stage.held, self.trace.actions[: stage.row], stage.signature)
+
+    @cached_property
+    def phases(self) -> int:
+        """How many phases of the witness decide: after them nothing more has to be done."""
+        low, high = 0, len(self.trace.stages) - 1  # from the last stage on nothing is left to do
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if self.play((), False, self.stage(middle)).solved else (middle + 1, high)
+        return low
+
+    def rewind(self, k: int | None = None) -> None:
+        """Put the world at stage `k` of the witness, or at the start: to look at it, before anything is planned."""
+        self.world.restore(self.start.state if k is None else self.trace.stages[k].state)
+
+    def signature(self) -> Signature:
+        """What the episode has left behind so far."""
+        return signature(self.world, self._places)
+
+    def play(self, steps: Sequence[Macro], raw: bool, node: Node | None = None) -> Played:
+        """Play macros one after the other, then nothing, until success, failure, the time limit, or rest.
+
+        A macro that gives up does not end the rest. A success counts if the goal still holds after `SETTLE`.
+
+        Args:
+            raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
+            node: where to begin; the start of the scenario without it.
+        """
+        node = node or self.start
+        self.world.restore(node.state)
+        episode = Episode(self.scenario, self.world, self.horizon)
+        episode.held = node.held
+        return _Run(self, episode, node, raw).to_end(steps)
+
+
+class _Run:
+    """One attempt on its way."""
+
+    def __init__(self, arena: Arena, episode: Episode, node: Node, raw: bool):
+        self.arena, self.episode, self.raw, self.world = arena, episode, raw, arena.world
+        self.rows: list[NDArray[np.float32]] = list(node.actions)
+        self.notes: list[str] = []
+        self.nodes: list[Node] = []
+
+    def to_end(self, steps: Sequence[Macro]) -> Played:
+        for macro in steps:
+            self._macro(macro)
+            if self.episode.outcome is not None:
+                break
+            actions = np.array(self.rows, np.float32).reshape(-1, 7)
+            self.nodes.append(Node(self.world.state(), self.episode.held, actions, self.arena.signature()))
+        self._idle()
+        if self.episode.outcome == "success":
+            return self._settled()
+        reason = self.episode.reason or "everything came to rest without reaching the goal"
+        return self._ended(self.episode.outcome or "timeout", reason, self.world.time)
+
+    def _macro(self, macro: Macro) -> None:
+        try:
+            for action in self.arena.plan(macro, self.raw):
+                if self._step(action) is not None:
+                    return
+        except GaveUp as error:
+            self.notes.append(f"{macro.kind} {macro.target}: {error}")
+
+    def _step(self, action: NDArray[np.float64]) -> Outcome | None:
+        given = np.clip(np.asarray(action, np.float32), -1.0, 1.0) if self.raw else self.world.filter(action)
+        self.rows.append(given)
+        return self.episode.step(given)
+
+    def _idle(self) -> None:
+        """Nothing, until something is decided or everything has been at rest for a while."""
+        still = 0
+        while self.episode.outcome is None and (self.episode.held or self._eventful or still * Loop.PERIOD < STILL_FOR):
+            self._step(self.world.idle)
+            still = 0 if np.abs(self.world.data.qvel).max() >= STILL else still + 1
+
+    @property
+    def _eventful(self) -> bool:
+        return type(self.arena.scenario).events is not Scenario.events
+
+    def _settled(self) -> Played:
+        reached = self.world.time
+        left = self.arena.signature()
+        for _ in range(round(SETTLE / Loop.PERIOD)):
+            if self._step(self.world.idle) != "success":
+                break
+        outcome, reason = self.episode.settled()
+        return self._ended(outcome, reason, reached if outcome == "success" else self.world.time, left)
+
+    def _ended(
+        self,
+        outcome: Outcome,
+        reason: str,
+        seconds: float,
+        left: Signature | None = None,
+    ) -> Played:
+        left = left or self.arena.signature()
+        actions = np.array(self.rows, np.float32).reshape(-1, 7)
+        notes, nodes = tuple(self.notes), tuple(self.nodes)
+        return Played(outcome, reason, round(seconds, 6), actions, self.world.digest, left, notes, nodes)

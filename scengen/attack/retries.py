@@ -1,0 +1,205 @@
+"""Tier of costless retries: one move made again and again while a number is swept, all in one episode.
+
+A task in which a wrong try costs nothing asks for patience instead of insight.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+
+import numpy as np
+
+from ..geometry import UP, Vec3
+from .macros import Macro
+from .play import Arena, Attempt
+from .solids import TABLE, Solid, handles, sides
+from .variations import phase
+
+RETRY = "retry"
+
+TILTS = (65.0, 40.0, 20.0)
+"""By how much a held thing is tipped, one way and the other [deg]: the hand reaches about 70."""
+SHARES = (0.9, -0.9, 0.45, -0.45, 0.0)
+"""Of a face, in the order in which they are tried."""
+STEPS = (-0.025, -0.015, -0.005, 0.005, 0.015)
+"""Where a thing is let go, from where the witness does it [m]: nearer tries first, as far as the time allows."""
+SHIFTS = (0.010, 0.025, -0.010, -0.025)
+"""By how much a phase of the witness is displaced [m]."""
+
+
+def retries(arena: Arena) -> Iterator[Attempt]:
+    """All families in turn, each with what promises most first."""
+    families = (
+        carried(arena),
+        tipped(arena),
+        dropped_again(arena),
+        shaken(arena),
+        placed(arena),
+        bare(arena),
+        shifted(arena),
+    )
+    for round_ in zip_longest(*families):
+        yield from (attempt for attempt in round_ if attempt)
+
+
+def carried(arena: Arena) -> Iterator[Attempt]:
+    """Every graspable free body picked and brought against, over and onto every other body."""
+    for one, other in _pairs(arena):
+        for pick in _picks(arena, one):
+            pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(arena, other))
+            yield Attempt(RETRY, (pick, *pushes[:2]))
+            yield Attempt(RETRY, (pick, *pushes[2:]))
+            yield Attempt(RETRY, (pick, Macro("place", other.name, (0.0, 0.0, 0.06, 0.1))))
+            yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in SHARES[:3])))
+
+
+def bare(arena: Arena) -> Iterator[Attempt]:
+    """Every body pushed from all sides, high and low, then pressed, with the bare hand."""
+    for solid in _targets(arena):
+        for height in (0.8, 0.3):
+            pushes = [Macro("push", solid.name, (angle, height, 0.0, 0.12, 0.2)) for angle in _angles(arena, solid)]
+            yield Attempt(RETRY, tuple(pushes[:2]))
+            yield Attempt(RETRY, tuple(pushes[2:]))
+        yield Attempt(RETRY, tuple(Macro("press", solid.name, (u, 0.0, 0.5, 0.1)) for u in SHARES[:3]))
+
+
+def placed(arena: Arena) -> Iterator[Attempt]:
+    """Every graspable free body put down at one share of a face after the other."""
+    for one, other in _pairs(arena):
+        for pick in _picks(arena, one)[:1]:
+            moves: list[Macro] = []
+            for share in SHARES:
+                moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
+            yield Attempt(RETRY, tuple(moves))
+
+
+def tipped(arena: Arena) -> Iterator[Attempt]:
+    """What the witness holds, tipped one way and the other."""
+    for k in _holding(arena):
+        for axis in _axes(arena, k):
+            for tilt in TILTS[:2]:
+                yield Attempt(RETRY, _seesawing(axis, math.radians(tilt)), k)
+                yield Attempt(RETRY, _seesawing(-axis, math.radians(tilt)), k)
+        for axis in _axes(arena, k):
+            steps = [math.radians(tilt) for tilt in reversed(TILTS)]
+            yield Attempt(RETRY, tuple(move for tilt in steps for move in _seesawing(axis, tilt)), k)
+
+
+def shaken(arena: Arena) -> Iterator[Attempt]:
+    """What the witness holds, shaken level and upwards, with the wrist at rest and turning."""
+    for spin in (1.0, 0.0):
+        for k in _holding(arena):
+            for along in (*_axes(arena, k), UP):
+                for period in (0.3, 0.6):
+                    shake = Macro("shake", "", (*map(float, along), spin, period, 3.0))
+                    yield Attempt(RETRY, (shake, Macro("wait", "", (0.5,))), k)
+
+
+def dropped_again(arena: Arena) -> Iterator[Attempt]:
+    """Let go where the witness does, but elsewhere along the face beneath; caught as it comes back, let go again."""
+    for k, body in arena.trace.releases:
+        for along in _tangents(arena, k, body):
+            moves = [_move(along, STEPS[0])]
+            for before, after in zip(STEPS, (*STEPS[1:], 0.025), strict=True):
+                moves += [Macro("release", "", (0.15, 0.0)), Macro("catch", body, (2.5,)), _move(along, after - before)]
+            yield Attempt(RETRY, tuple(moves), k)
+
+
+def shifted(arena: Arena) -> Iterator[Attempt]:
+    """A phase of the witness displaced, and displaced otherwise, each time from where it begins."""
+    for k in reversed(range(arena.phases)):
+        for axis in range(3):
+            moves = []
+            for step in SHIFTS:
+                displaced = [0.0, 0.0, 0.0]
+                displaced[axis] = step
+                moves.append(phase(arena, k, shift=tuple(displaced)))
+            yield Attempt(RETRY, tuple(moves), k)
+
+
+# --- what to try it on ------------------------------------------------------------------------
+
+
+def _pairs(arena: Arena) -> Iterator[tuple[Solid, Solid]]:
+    """What may be taken and what it may be brought to, those that matter in the witness first."""
+    taken, targets = handles(arena.solids, arena.suction), _targets(arena)
+    known = arena.trace.handled
+    ranked = sorted(taken, key=lambda solid: known.index(solid.body) if solid.body in known else len(known))
+    found = [(i + k, one, other) for i, one in enumerate(ranked) for k, other in enumerate(targets)]
+    for _, one, other in sorted(found, key=lambda ranked: ranked[0]):
+        if one.body != other.body:
+            yield one, other
+
+
+def _targets(arena: Arena) -> list[Solid]:
+    """Whole bodies, those nearest to the goal first, then parts of them; not the table."""
+    near = arena.trace.concerned
+    found = [solid for solid in arena.solids.values() if solid.body != TABLE]
+    order = {solid.name: near.index(solid.body) if solid.body in near else len(near) for solid in found}
+    return sorted(found, key=lambda solid: (solid.name != solid.body, order[solid.name]))
+
+
+def _picks(arena: Arena, solid: Solid) -> list[Macro]:
+    arena.rewind()
+    fits = [0] if arena.suction else sides(arena.world, arena.solids, solid)[:1]
+    return [Macro("pick", solid.name, (0.6, 0.0, float(which), 0.2)) for which in fits]
+
+
+def _angles(arena: Arena, solid: Solid) -> list[float]:
+    """Directions along the level axes of a solid [rad], the shorter one first, both ways."""
+    arena.rewind()
+    angles = [math.atan2(along[1], along[0]) for along, _ in solid.level_axes(arena.world)]
+    return [angle + turn for angle in angles for turn in (0.0, math.pi)]
+
+
+def _holding(arena: Arena) -> list[int]:
+    """Stages of the witness at which something has been in the hand for a whole phase, the middle one first."""
+    stages = arena.trace.stages[: arena.phases]
+    found = [k for k in range(1, len(stages)) if stages[k].holds and stages[k - 1].holds]
+    found = found or [k for k in range(1, len(stages)) if stages[k].holds]
+    return sorted(found, key=lambda k: abs(k - found[len(found) // 2]))[:3]
+
+
+def _axes(arena: Arena, k: int) -> Sequence[Vec3]:
+    """The level axes of what is held at a stage, the longer one last."""
+    arena.rewind(k)
+    body = arena.trace.stages[k].holds
+    assert body is not None
+    return [along for along, _ in arena.solids[body].level_axes(arena.world)]
+
+
+def _tangents(arena: Arena, k: int, body: str) -> list[Vec3]:
+    """Directions along the face that a body touches at a stage: uphill and across; level ones where it touches none."""
+    arena.rewind(k)
+    world = arena.world
+    data, index = world.data, world.body(body)
+    normals = [UP]
+    for contact in data.contact[: data.ncon]:
+        bodies = [int(world.model.geom_bodyid[g]) for g in contact.geom]
+        fixed = any(world.model.body_weldid[b] == 0 for b in bodies)
+        if index in bodies and fixed and contact.dist <= 0.0:
+            normals.append(np.array(contact.frame[:3]))
+    normal = max(normals, key=lambda n: float(np.linalg.norm(n[:2])) if abs(n[2]) > 0.3 else -1.0)
+    normal = normal * math.copysign(1.0, normal[2])
+    uphill = UP - normal * normal[2]
+    if float(np.linalg.norm(uphill)) < 0.05:
+        return [np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])]
+    uphill = uphill / np.linalg.norm(uphill)
+    return [uphill, -uphill]
+
+
+def _seesawing(axis: Vec3, tilt: float) -> tuple[Macro, ...]:
+    """Tip about an axis, wait, tip the other way, wait, and back."""
+    one, other = (tuple(map(float, tilt * axis)), tuple(map(float, -2 * tilt * axis)))
+    pause = Macro("wait", "", (0.8,))
+    return (
+        Macro("turn", "", (*one, 1.0)),
+        pause,
+        Macro("turn", "", (*other, 1.5)),
+        pause,
+        Macro("turn", "", (*one, 1.5)),
+    )
+
+
+def _move(along: Vec3, way: float) -> Macro:
+    return Macro("move", "", (*map(float, way * along), 0.08))

@@ -1,0 +1,48 @@
+"""Tier of perturbed witnesses: a phase dropped, repeated, mirrored, slowed or quickened; another scenario's witness."""
+
+from collections.abc import Iterator
+
+from .macros import Macro
+from .play import Arena, Attempt
+
+WITNESS, FOREIGN = "witness", "foreign"
+
+PACES = (0.4, 2.5)
+"""Slowed and quickened: times the speed of the witness."""
+
+
+def perturbed(arena: Arena) -> Iterator[Attempt]:
+    """Every phase of the witness changed in one way, from the state at which it begins."""
+    count = arena.phases
+    for k in range(count):
+        yield Attempt(WITNESS, rest(arena, k + 1), k)
+        yield Attempt(WITNESS, (phase(arena, k, mirrored=True), *rest(arena, k + 1)), k)
+        yield Attempt(WITNESS, (phase(arena, k), phase(arena, k), *rest(arena, k + 1)), k)
+        for pace in PACES:
+            yield Attempt(WITNESS, (phase(arena, k, pace), *rest(arena, k + 1)), k)
+    for k in range(count - 1):  # two phases change places
+        yield Attempt(WITNESS, (phase(arena, k + 1), phase(arena, k), *rest(arena, k + 2)), k)
+    for pace in PACES:
+        yield Attempt(WITNESS, tuple(phase(arena, k, pace) for k in range(len(arena.trace.phases))))
+
+
+def foreign(arena: Arena) -> Iterator[Attempt]:
+    """The witnesses of other scenarios, as they are: memory alone."""
+    for name in arena.foreign:
+        yield Attempt(FOREIGN, (Macro("replay", name),))
+
+
+def phase(
+    arena: Arena, k: int, pace: float = 1.0, mirrored: bool = False, shift: tuple[float, ...] = (0.0,) * 3
+) -> Macro:
+    """Phase `k` of the witness once more."""
+    first, last = arena.trace.phases[k]
+    return Macro("follow", "", (float(first), float(last), pace, float(mirrored), *shift))
+
+
+def rest(arena: Arena, k: int) -> tuple[Macro, ...]:
+    """The phases of the witness from `k` on, as one."""
+    phases = arena.trace.phases
+    if k >= len(phases):
+        return ()
+    return (Macro("follow", "", (float(phases[k][0]), float(phases[-1][1]), 1.0, 0.0, 0.0, 0.0, 0.0)),)

@@ -1,0 +1,92 @@
+"""the built-in adversary: whether a goal can be reached without what the task is about"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.table import Table
+
+from .. import config
+from ..attack.campaign import Report, Settings, Subject, attack, drawn, pooled
+from ..attack.evidence import Hit, Rate
+from ..attack.priors import Prior
+from ..config import read, search_path
+from ..errors import BadConfig
+from ..pool import Pool
+from ..runs.progress import ProgressBar
+from ..samplers.task import Task
+from . import FAILED, OK, Arguments, err, out, say, warn, write_json
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("attack", arguments, Settings)
+    settings.check()
+    task, subjects = _chosen(arguments, settings)
+    folder = Path(settings.to or f"generated/attack/{task.name}")
+    with ProgressBar(err, f"attack {task.name}", len(subjects)) as progress_bar:
+
+        def progress(done: int, hits: int) -> None:
+            progress_bar.show(done, f"{hits} hits")
+
+        report = attack(task, subjects, settings, folder, progress)
+    out.print(_table(report))
+    for line in _remarks(report):
+        say(line)
+    for hit in report.refuting:
+        warn(_told(hit))
+    cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
+    say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
+    if settings.json:
+        write_json(settings.json, report.plain())
+    return FAILED if report.refuting else OK
+
+
+def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Subject]]:
+    """The task that is attacked, and its scenarios.
+
+    Raises:
+        ScengenError: neither a task nor a pool was given, or both, or nothing can be attacked.
+    """
+    name, others = config.chosen("attack", arguments), [a for a in arguments if a.startswith("task.")]
+    if (name is None) == (settings.pool is None):
+        raise BadConfig("attack needs either task=NAME or pool=FOLDER; see scengen attack --help")
+    if name is not None:
+        task = config.task(name, [*search_path(arguments), *others])
+        return task, drawn(task, settings.split, settings.n, settings.seed)
+    pool = Pool.open(str(settings.pool)).check()
+    task = config.task(pool.task, search_path(arguments))
+    if not (subjects := pooled(task, pool, settings.n)):
+        raise BadConfig(f"{pool.folder} holds no scenario; nothing can be attacked")
+    return task, subjects
+
+
+def _table(report: Report) -> Table:
+    table = Table("tier", "actions", title=f"attack on {report.task}", title_justify="left")
+    for column in ("rollouts", "hits", "rate", "95 % bound", "refuting"):
+        table.add_column(column, justify="right")
+    for rate in report.rates:
+        table.add_row(*_cells(rate))
+    return table
+
+
+def _cells(rate: Rate) -> list[str]:
+    """One line of the table in words."""
+    kind, counts = "raw" if rate.raw else "filtered", (str(rate.rollouts), str(rate.hits))
+    return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]
+
+
+def _remarks(report: Report) -> list[str]:
+    return [_fixed(prior) for prior in report.priors]
+
+
+def _fixed(prior: Prior) -> str:
+    values = ", ".join(f"{value:.3g}" for value in prior.values)
+    told = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
+    if prior.fresh is None or prior.bound is None:
+        return told
+    return f"{told}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"
+
+
+def _told(hit: Hit) -> str:
+    without = ", ".join(f"{one} - {other}" for one, other in hit.lacks)
+    kind = "raw" if hit.raw else "filtered"
+    return f"REFUTED {hit.scenario} ({hit.tier}, {kind}) without {without}: {hit.plan}; {hit.name}.npz"
