@@ -53,8 +53,8 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
     plain, choices = _composed(verb, overrides)
     settings = typed("", kind, _settings(verb, plain))
     found = load(choices["task"], plain["task"])
-    certify = _settled(plain["certify"], found, choices["certify"])
-    return settings, found, typed("certify", CertifySettings, certify)
+    certify_settings = _settled(plain["certify"], found, choices["certify"])
+    return settings, found, typed("certify", CertifySettings, certify_settings)
 
 
 def chosen(verb: str, overrides: Sequence[str]) -> str | None:

@@ -160,11 +160,11 @@ class Pool:
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
             manifest = json.loads(path.read_text())
-            version, known = manifest["format"], manifest["format"] != FORMAT or _whole(manifest)
+            version = manifest["format"]
+            if version == FORMAT:
+                _check(manifest)
         except (ValueError, KeyError, TypeError, UnicodeDecodeError):
-            known = False
-        if not known:
-            raise PoolError(f"{path} is damaged; restore it or generate the pool again")
+            raise PoolError(f"{path} is damaged; restore it or generate the pool again") from None
         if version != FORMAT:
             raise PoolError(
                 f"{folder} has pool format {version}, this scengen reads {FORMAT}; generate the pool again, or use the "
@@ -410,17 +410,15 @@ def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
         yield from map(_PARSE.get(name, _same), column.to_pylist())
 
 
-def _whole(manifest: Mapping[str, Any]) -> bool:
-    """Whether a manifest has what every pool of this format has."""
+def _check(manifest: Mapping[str, Any]) -> None:
+    """Raise `KeyError`, `TypeError` or `ValueError` unless a manifest has what every pool of this format has."""
     config, shards = manifest["config"], manifest["shards"]
-    named = (config["task"]["name"], config["certify"]["name"], config["split"], config["sampler"])
-    counted = (config["seed"], manifest["indices"], *(shard["rows"] for shard in shards))
-    counts, texts = {**manifest["funnel"], **manifest["reasons"]}, {**manifest["versions"]}
-    return (
-        isinstance(shards, list)
-        and all(isinstance(text, str) for text in (*named, *texts.values(), *(s["file"] for s in shards)))
-        and all(isinstance(count, int) for count in (*counted, *counts.values()))
-    )
+    names = (config["task"]["name"], config["certify"]["name"], config["split"], config["sampler"])
+    texts = (*names, *dict(manifest["versions"]).values(), *(shard["file"] for shard in shards))
+    counts = {**manifest["funnel"], **manifest["reasons"]}
+    numbers = (*counts.values(), config["seed"], manifest["indices"], *(shard["rows"] for shard in shards))
+    if not (all(isinstance(text, str) for text in texts) and all(isinstance(number, int) for number in numbers)):
+        raise ValueError("a name is no text, or a count no whole number")
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -14,10 +14,10 @@ def make(folder, *overrides, **changed):
     """Generate a small pool of `domino_single`."""
     asked = {"n": 3, **changed, "pool": folder}
     given = [f"{name}={value}" for name, value in asked.items()]
-    settings, task, certify = config.read_task(
+    settings, task, certify_settings = config.read_task(
         "generate", ["task=domino_single", *given, *QUICKLY, *overrides], Settings
     )
-    return generate(task, certify, settings, lambda *_: None)
+    return generate(task, certify_settings, settings, lambda *_: None)
 
 
 def rewritten(folder, change):

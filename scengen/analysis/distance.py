@@ -1,5 +1,6 @@
 """How far scenarios and pools are from training and from each other."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -91,7 +92,7 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0) -> Ener
         alternative="greater",
         rng=np.random.default_rng(seed),
     )
-    return Energy(float(np.sqrt(round(max(0.0, tested.statistic), 12))), float(tested.pvalue))
+    return Energy(math.sqrt(round(max(0.0, float(tested.statistic)), 12)), float(tested.pvalue))
 
 
 def near_duplicates(

@@ -11,7 +11,7 @@ from . import OK, Arguments, err, out, remark, say
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify = read_task("axis", arguments, Settings)
+    settings, task, certify_settings = read_task("axis", arguments, Settings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n) as progress_bar:
@@ -19,7 +19,7 @@ def command(arguments: Arguments) -> int:
         def progress(what: str, done: int, total: int) -> None:
             progress_bar.of(min(done, total), total, what)
 
-        card, missing = make(task, certify, settings, folder, progress)
+        card, missing = make(task, certify_settings, settings, folder, progress)
     out.print(_table(card))
     if missing:
         remark(f"the card has no pictures: {missing}")

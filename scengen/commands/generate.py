@@ -10,14 +10,14 @@ from . import FAILED, OK, Arguments, err, out, say, warn
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify = read_task("generate", arguments, Settings)
+    settings, task, certify_settings = read_task("generate", arguments, Settings)
     with ProgressBar(err, f"{task.name}/{settings.split}", settings.n) as progress_bar:
 
         def progress(certified: int, finished: int, verdicts: Mapping[str, int]) -> None:
             lost = ", ".join(f"{n} {v}" for v, n in sorted(verdicts.items()) if v != "certified")
             progress_bar.show(min(certified, settings.n), f"{finished} tried" + (f", {lost}" if lost else ""))
 
-        summary = generate(task, certify, settings, progress)
+        summary = generate(task, certify_settings, settings, progress)
     out.print(funnel_table(summary.funnel, summary.reasons))
     for line in summary_lines(summary):
         say(line)

@@ -30,17 +30,19 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, wanted = read_task("shrink", arguments, Settings)
+    settings, task, certify_settings = read_task("shrink", arguments, Settings)
     at_least(settings, seed=0, index=0)
     scenario = _proposed(task, settings)
-    failed = certify(scenario, task.horizon, wanted, task.embodiment).certificate.failed
+    failed = certify(scenario, task.horizon, certify_settings, task.embodiment).certificate.failed
     where = f"{task.name}/{settings.split}/{settings.index}"
     if failed is None:
-        raise BadConfig(f"{where} passes every check of certify={wanted.name}; there is nothing to shrink")
+        raise BadConfig(f"{where} passes every check of certify={certify_settings.name}; there is nothing to shrink")
     say(f"{where} fails {failed.name}: {failed.reason}")
     scales = {name: scale(task, name) for name in task.known}
     with ProgressBar(err, f"shrink {where}", 0) as progress_bar:
-        found = shrink(values(scenario), centre(task.training), scales, _fails(task, wanted, failed, progress_bar.of))
+        found = shrink(
+            values(scenario), centre(task.training), scales, _fails(task, certify_settings, failed, progress_bar.of)
+        )
     out.print(shrunk_table(found, {name: p.unit for name, p in task.known.items()}))
     nearest = with_values(scenario, found.values)
     say(f"{len(found.causes)} of {len(task.known)} parameters matter; {found.tries} scenarios were judged")
@@ -60,7 +62,7 @@ def _proposed(task: Task, settings: Settings) -> Scenario:
 
 
 def _fails(
-    task: Task, wanted: CertifySettings, failed: Check, progress: Callable[[int, int], None]
+    task: Task, certify_settings: CertifySettings, failed: Check, progress: Callable[[int, int], None]
 ) -> Callable[[Mapping[str, Value]], bool]:
     """Whether a scenario fails the same check, and no cheaper one before it."""
     start, judged = task.family(), 0
@@ -70,7 +72,7 @@ def _fails(
         judged += 1
         progress(judged, judged + 1)
         scenario = with_values(start, candidate)
-        certificate = certify(scenario, task.horizon, wanted, task.embodiment, last=failed.name).certificate
+        certificate = certify(scenario, task.horizon, certify_settings, task.embodiment, last=failed.name).certificate
         checks = [c for c in certificate.checks if c.passed is False]
         return bool(checks) and checks[0].name == failed.name
 

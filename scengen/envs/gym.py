@@ -92,7 +92,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             name: spaces.Box(-s.bound, s.bound, s.shape, np.float32) for name, s in self.streams.items()
         }
         pictures = {name: spaces.Box(0, 255, (height, width, 3), np.uint8) for name in self.cameras}
-        self.observation_space = spaces.Dict({**boxes, **pictures})
+        self.observation_space = spaces.Dict({**boxes, **pictures})  # type: ignore[assignment]
 
     @property
     def scenarios(self) -> tuple[str, ...]:

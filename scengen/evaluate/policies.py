@@ -150,7 +150,7 @@ def find(name: str, memory: Sequence[PoolRow] = ()) -> Factory:
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
-        found = getattr(importlib.import_module(module), factory, None)
+        found: Factory | None = getattr(importlib.import_module(module), factory, None)
     except ModuleNotFoundError as error:
         if error.name and module.startswith(error.name):
             raise BadConfig(f"policy = {name}; there is no module {module!r} on the path or in this folder") from None

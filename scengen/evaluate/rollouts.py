@@ -75,7 +75,8 @@ class Line:
     split: str
     id: Rate | None
     """None where no training pool was given."""
-    ood: Rate
+    ood: Rate | None
+    """None where no other pool was given."""
     difference: Difference | None
     """OOD minus ID."""
 
@@ -96,9 +97,11 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
         about |= _chosen(pool, settings.seeds)
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     with Log(settings.folder / "episodes.jsonl", _identity(settings, pools)) as log:
-        todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `Stage`
+        todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
         progress(len(wanted) - len(todo), len(wanted))
-        for count, episode in enumerate(each(Stage(settings), todo, settings.workers), len(wanted) - len(todo) + 1):
+        for count, episode in enumerate(
+            each(PolicyPlayer(settings), todo, settings.workers), len(wanted) - len(todo) + 1
+        ):
             log.add({**about[episode["pool"], episode["scenario"]], **episode})
             progress(count, len(wanted))
         return sorted(
@@ -190,7 +193,7 @@ def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
-class Stage:
+class PolicyPlayer:
     """Plays rollouts: one environment and one policy at a time, kept as long as the task stays the same."""
 
     def __init__(self, settings: Settings):

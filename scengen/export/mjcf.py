@@ -53,5 +53,5 @@ def _add_home(spec: mujoco.MjSpec) -> None:
     joints = [*panda.Names().joints, *panda.Names().finger_joints]
     for name, angle in zip(joints, [*panda.HOME, *panda.FINGERS], strict=True):
         qpos[model.joint(name).qposadr[0]] = angle
-    spec.add_key(name="home", qpos=qpos)
+    spec.add_key(name="home", qpos=qpos.tolist())
     spec.compile()

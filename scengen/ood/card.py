@@ -81,7 +81,7 @@ class Card:
 
 def make(
     task: Task,
-    certify: CertifySettings,
+    certify_settings: CertifySettings,
     settings: Settings,
     folder: Path,
     progress: Callable[[str, int, int], None],
@@ -89,7 +89,7 @@ def make(
     """Gather all evidence and write `card.html` and `card.json`, continuing what stands in `folder`.
 
     Args:
-        certify: settings of the certificates.
+        certify_settings: of the certificates.
         progress: told what is being done, how far it is, and how much there is.
 
     Returns:
@@ -97,7 +97,7 @@ def make(
     """
     name, n, seed = settings.axis, settings.n, settings.seed
     wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
-    made = generate.generate(task, certify, wanted, lambda done, *_: progress("certify twins", done, n))
+    made = generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))
     trials = behaviour.try_twins(
         task, name, folder, n, seed, settings.workers, lambda done: progress("replay ID witnesses", done, n)
     )

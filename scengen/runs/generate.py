@@ -85,7 +85,7 @@ class Job:
     split: Split
     sampler: str
     seed: int
-    certify: CertifySettings
+    certify_settings: CertifySettings
     keep: tuple[str, ...]
     """Verdicts besides `certified` whose scenarios are kept."""
 
@@ -97,7 +97,7 @@ class Job:
             why = max(error.reasons, key=error.reasons.__getitem__)
             cpu = time.process_time() - start
             return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, cpu)
-        certified = certify(draw.scenario, self.task.horizon, self.certify, self.task.embodiment)
+        certified = certify(draw.scenario, self.task.horizon, self.certify_settings, self.task.embodiment)
         certificate = certified.certificate
         failed = certificate.failed
         return Record(
@@ -112,12 +112,12 @@ class Job:
         )
 
 
-def generate(task: Task, certify: CertifySettings, settings: Settings, progress: Progress) -> Summary:
+def generate(task: Task, certify_settings: CertifySettings, settings: Settings, progress: Progress) -> Summary:
     """Make the pool that the settings describe, continuing an earlier run of the same settings.
 
     Args:
         task: what to generate.
-        certify: settings of the certificates.
+        certify_settings: of the certificates.
         progress: told about every finished index.
 
     Raises:
@@ -126,7 +126,7 @@ def generate(task: Task, certify: CertifySettings, settings: Settings, progress:
     settings.check(task)
     split = Split.parse(settings.split)
     folder = Path(settings.pool or Path("generated", f"{task.name}-{split}"))
-    job = Job(task, split, settings.sampler, settings.seed, certify, tuple(settings.keep))
+    job = Job(task, split, settings.sampler, settings.seed, certify_settings, tuple(settings.keep))
     identity = {"config": _config(job), **_made_with(task)}
     journal = Journal(folder, identity)
     try:
@@ -192,7 +192,7 @@ def _config(job: Job) -> dict[str, Any]:
     """Everything that decides which scenarios a run makes and keeps, as plain data."""
     return {
         "task": {"name": job.task.name, **job.task.node},
-        "certify": asdict(job.certify),
+        "certify": asdict(job.certify_settings),
         "split": str(job.split),
         "sampler": job.sampler,
         "seed": job.seed,
