@@ -1,6 +1,8 @@
 """Random macros by identity: the same key gives the same macro, whoever asks and whenever."""
 
 import math
+from bisect import bisect
+from itertools import accumulate
 
 from ..samplers.keyed import spread, unit
 from .macros import Macro
@@ -36,10 +38,8 @@ def macro(arena: Arena, *key: str | int) -> Macro:
     """A random macro. It looks at the world as it is at the start."""
     arena.rewind()
     share = unit(*key, "kind")
-    for kind, weight in KINDS.items():
-        share -= weight
-        if share < 0:
-            break
+    ends = list(accumulate(KINDS.values()))
+    kind = list(KINDS)[bisect(ends[:-1], share)]
     return _DRAWS[kind](arena, key)
 
 

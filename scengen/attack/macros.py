@@ -259,7 +259,7 @@ def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
 
 
 def _down(field: Field, target: str, farthest: float, speed: float) -> Plan:
-    """Lower what the hand holds, or the closed fingers, until it touches the target's body, by `farthest` [m] at most."""
+    """Lower what the hand holds, or closed fingers, until it touches the target's body, by `farthest` [m] at most."""
     world, body = field.world, field.solids[target].body
     tool, end = held(world) or ROBOT, world.time + farthest / speed
     yield from push(world.arm, -speed * UP, lambda: world.touching(tool, body) or world.time > end, CLOSED)

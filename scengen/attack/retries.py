@@ -29,15 +29,8 @@ SHIFTS = (0.010, 0.025, -0.010, -0.025)
 
 def retries(arena: Arena) -> Iterator[Attempt]:
     """All families in turn, each with what promises most first."""
-    families = (
-        carried(arena),
-        tipped(arena),
-        dropped_again(arena),
-        shaken(arena),
-        placed(arena),
-        bare(arena),
-        shifted(arena),
-    )
+    makers = (carried, tipped, dropped_again, shaken, placed, bare, shifted)
+    families = (make(arena) for make in makers)
     for round_ in zip_longest(*families):
         yield from (attempt for attempt in round_ if attempt)
 

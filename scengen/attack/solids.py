@@ -79,7 +79,7 @@ class Solid:
 
 
 def solids(world: World) -> Mapping[str, Solid]:
-    """All solids of the scene by name, without floor and robot: bodies first, then the parts of those that have some."""
+    """All solids of the scene by name, without floor and robot: bodies first, then the parts of composed ones."""
     found, parts = {}, {}
     for body in _bodies(world):
         name, free = world.model.body(body).name, world.model.body(body).name in world.free_bodies

@@ -9,12 +9,14 @@ WITNESS, FOREIGN = "witness", "foreign"
 
 PACES = (0.4, 2.5)
 """Slowed and quickened: times the speed of the witness."""
+NOWHERE = (0.0, 0.0, 0.0)
+"""No displacement."""
 
 
 def perturbed(arena: Arena) -> Iterator[Attempt]:
-    """Every phase of the witness changed in one way, from the state at which it begins."""
+    """Every phase of the witness changed in one way, from the state at which it begins; the last phases first."""
     count = arena.phases
-    for k in range(count):
+    for k in reversed(range(count)):
         yield Attempt(WITNESS, rest(arena, k + 1), k)
         yield Attempt(WITNESS, (phase(arena, k, mirrored=True), *rest(arena, k + 1)), k)
         yield Attempt(WITNESS, (phase(arena, k), phase(arena, k), *rest(arena, k + 1)), k)
@@ -32,9 +34,7 @@ def foreign(arena: Arena) -> Iterator[Attempt]:
         yield Attempt(FOREIGN, (Macro("replay", name),))
 
 
-def phase(
-    arena: Arena, k: int, pace: float = 1.0, mirrored: bool = False, shift: tuple[float, ...] = (0.0,) * 3
-) -> Macro:
+def phase(arena: Arena, k: int, pace: float = 1.0, mirrored: bool = False, shift: tuple[float, ...] = NOWHERE) -> Macro:
     """Phase `k` of the witness once more."""
     first, last = arena.trace.phases[k]
     return Macro("follow", "", (float(first), float(last), pace, float(mirrored), *shift))

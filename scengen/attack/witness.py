@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class Trace:
     def phases(self) -> list[tuple[int, int]]:
         """First row of each phase, and the first of the next one."""
         rows = [stage.row for stage in self.stages]
-        return list(zip(rows[:-1], rows[1:], strict=True))
+        return list(pairwise(rows))
 
     @property
     def handled(self) -> tuple[str, ...]:
@@ -79,17 +80,8 @@ class Trace:
     @property
     def releases(self) -> tuple[tuple[int, str], ...]:
         """Stages at which the gripper opens, each with the body that it lets go of."""
-        found = []
-        for k, stage in enumerate(self.stages[:-1]):
-            opens = stage.row > 0 and self.actions[stage.row - 1][6] > 0 >= self.actions[stage.row][6]
-            if stage.holds and (opens or self._opens_soon(stage.row)):
-                found.append((k, stage.holds))
-        return tuple(found)
-
-    def _opens_soon(self, row: int) -> bool:
-        """Whether the gripper opens during the shortest phase that begins here."""
-        grips = self.actions[row : row + round(SHORTEST / Loop.PERIOD) + 1, 6]
-        return bool(len(grips) and grips[0] > 0 >= grips.min())
+        opens = [(k, s) for k, s in enumerate(self.stages[1:-1], 1) if self.actions[s.row][6] <= 0]
+        return tuple((k, s.holds) for k, s in opens if s.holds and self.actions[s.row - 1][6] > 0)
 
 
 def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
@@ -104,7 +96,7 @@ def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
         rots.append(world.arm.hand_rot)
         marks.append(_Mark.of(world))
         states.append((world.state(), episode.held, signature(world, start)))
-        events += [(len(marks) - 2, pair) for pair in sorted(marks[-1].pairs - marks[-2].pairs)]
+        events += [(len(marks) - 2, pair) for pair in sorted(marks[-1].touched[1] - marks[-2].touched[1])]
         if outcome is not None:
             break
     if episode.outcome != "success":
@@ -120,28 +112,27 @@ class _Mark:
     """What is compared from one period to the next to find where a phase ends."""
 
     closed: bool
-    touches: bool
-    pairs: frozenset[Pair]
+    """Whether the gripper is told to close."""
+    touched: tuple[bool, frozenset[Pair]]
+    """Whether the robot touches a free body, and all contacts since the start."""
     holds: str | None
 
     @classmethod
     def of(cls, world: World) -> "_Mark":
         touches = any(world.touching(ROBOT, body) for body in world.free_bodies)
-        return cls(world.arm.grip > 0, touches, pairs(world), held(world))
+        return cls(world.arm.grip > 0, (touches, pairs(world)), held(world))
 
 
 def _cuts(marks: list[_Mark], hands: NDArray[np.float64]) -> list[int]:
     """Rows at which phases begin, the end included: changes of gripper and contacts, and pauses of the hand."""
     end, least = len(marks) - 1, round(SHORTEST / Loop.PERIOD)
     speed = np.linalg.norm(np.diff(hands, axis=0), axis=1) / Loop.PERIOD
-    strong = [
-        i for i in range(1, end) if marks[i].closed != marks[i - 1].closed or marks[i].pairs != marks[i - 1].pairs
-    ]
-    touch = [i for i in range(1, end) if marks[i].touches != marks[i - 1].touches]
-    pause = [i for i in range(1, end) if speed[i] >= SLOW > speed[i - 1]]
+    grips = {i - 1 for i in range(2, end) if marks[i].closed != marks[i - 1].closed}
+    touches = {i for i in range(1, end) if marks[i].touched != marks[i - 1].touched}
+    pauses = {i for i in range(1, end) if speed[i] >= SLOW > speed[i - 1]}
     cuts = [0]
-    for row in sorted({*strong, *touch, *pause}):
-        if row - cuts[-1] >= least and end - row >= least:
+    for row in sorted(grips | touches | pauses):
+        if end - row >= least and (row in grips or row - cuts[-1] >= least):
             cuts.append(row)
     cuts.append(end)
     while len(cuts) > MOST + 1:
