@@ -98,10 +98,9 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     with Log(settings.folder / "episodes.jsonl", _identity(settings, pools)) as log:
         todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
-        progress(len(wanted) - len(todo), len(wanted))
-        for count, episode in enumerate(
-            each(PolicyPlayer(settings), todo, settings.workers), len(wanted) - len(todo) + 1
-        ):
+        done = len(wanted) - len(todo)
+        progress(done, len(wanted))
+        for count, episode in enumerate(each(PolicyPlayer(settings), todo, settings.workers), done + 1):
             log.add({**about[episode["pool"], episode["scenario"]], **episode})
             progress(count, len(wanted))
         return sorted(
