@@ -5,18 +5,20 @@
 Bottleneck: how far and how hard depends on a distance that differs from scene to scene.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from scengen.assets.box import Block
-from scengen.assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
+from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.geometry import UP
 from scengen.params import param
-from scengen.scenario import Plan, Planner, Refutation, Scenario
+from scengen.predicates import fallen
+from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table
 from scengen.sim.world import World
-from scengen.skills.motion import CLOSED, facing_down, go_to, push
+from scengen.skills.jaw import poke
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,45 +30,41 @@ class PushBlock(Scenario):
     """From the block to the line, along y."""
     block: Block = Block(friction=0.4, mass=0.15)
 
-    def infeasible(self) -> Refutation | None:
-        if (line := self.y + self.distance) > TABLE_HALF - 0.05:
-            return Refutation("the line lies off the table", {"line": line, "edge": TABLE_HALF})
-        return None
-
     def build(self) -> mujoco.MjSpec:
         scene = table()
         place(scene, self.block, "block", [0.0, self.y, TABLE_TOP])
         return scene
 
-    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        scene = self.build()
-        scene.body("block").pos = [0.3, self.y, TABLE_TOP]
-        return {"the block elsewhere": scene}
-
     def success(self, world: World) -> bool:
         return bool(world.com("block")[1] >= self.y + self.distance and world.tilt("block") < 0.1)
 
     def failure(self, world: World) -> str | None:
-        return "the block fell" if world.pos("block")[2] < TABLE_TOP - 0.05 else None
+        return "the block fell" if fallen(world, "block") else None
 
     def oracle(self, world: World) -> Plan:
         """Push until it is done."""
-        yield from self._approach(world)
-        yield from push(world, [0, 0.1, 0], until=lambda: self.success(world), give_up=6.0)
+        yield from self.push_to(world, self.distance)
 
-    def shortcuts(self) -> Mapping[str, Planner]:
-        return {"push halfway": self._halfway, "press from above": self._press}
+    def push_to(self, world: World, way: float) -> Plan:
+        """Push the block from half its height until it has gone so far [m]."""
+        beside = np.array([0.0, self.y - self.block.width / 2 - 0.03, TABLE_TOP + 0.03])
+        yield from poke(world.arm, beside, np.array([0.0, 0.1, 0.0]), lambda: world.com("block")[1] >= self.y + way)
 
-    def _halfway(self, world: World) -> Plan:
-        yield from self._approach(world)
-        yield from push(world, [0, 0.1, 0], until=lambda: world.com("block")[1] > self.y + self.distance / 2)
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "push_halfway": Shortcut(lambda world: self.push_to(world, self.distance / 2)),
+            "press_from_above": Shortcut(self._press),
+        }
 
     def _press(self, world: World) -> Plan:
         above = world.com("block") + (self.block.height / 2 + 0.02) * UP
-        yield from go_to(world, above, facing_down(), grip=CLOSED)
+        down = np.array([0.0, 0.0, -0.05])
+        yield from poke(world.arm, above, down, lambda: world.touching("robot", "block"), rot=world.arm.hand_rot)
 
-    def _approach(self, world: World) -> Plan:
-        """The closed finger tips on the near side of the block, at half its height."""
-        beside = np.array([0.0, self.y - self.block.width / 2 - 0.03, TABLE_TOP + 0.03])
-        yield from go_to(world, beside + 0.08 * UP, facing_down(), grip=CLOSED, within=0.01)
-        yield from go_to(world, beside, facing_down(), grip=CLOSED)
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        scene = self.build()
+        scene.body("block").pos = [0.3, self.y, TABLE_TOP]
+        return {"block_elsewhere": scene}
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        yield on_table("the line", [0.0, self.y + self.distance], margin=0.05)
