@@ -49,7 +49,6 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
     Raises:
         ImportError: robosuite's Python code does not run on this machine.
     """
-    logging.getLogger("robosuite_logs").setLevel(logging.WARNING)  # else it tells of every environment that it makes
     result = {
         "rollout_to_raw": rollout_to_raw(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
@@ -204,6 +203,8 @@ def _lift() -> Any:
     # isort: split
     import robosuite  # here, because it takes seconds and nothing else needs it
 
+    # after the import, which sets it; else robosuite tells of every environment that it makes
+    logging.getLogger("robosuite_logs").setLevel(logging.WARNING)
     return robosuite.make(
         "Lift",
         robots="Panda",

@@ -12,8 +12,12 @@ from pools import QUICKLY, make
 
 from scengen import cli, config
 from scengen.errors import BadConfig
+from scengen.evaluate import rollouts
+from scengen.export import recording
+from scengen.ood import card
 from scengen.pictures import film, render
 from scengen.pool import Pool
+from scengen.runs import generate
 from scengen.sim import scene_text
 from scengen.sim.world import World
 
@@ -193,6 +197,20 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
         first, last = picture[:, :320].astype(int), picture[:, -320:].astype(int)
         assert picture.shape == (240, 1280, 3) and picture.std() > 20
         assert np.abs(first - last).max() > 50, "the arm moves and tiles fall"
+
+
+@pytest.mark.parametrize(
+    ("verb", "kind", "given"),
+    [
+        ("generate", generate.Settings, {}),
+        ("axis", card.Settings, {"axis": "diagonal"}),
+        ("evaluate", rollouts.Settings, {"policy": "idle", "pool": "here"}),
+        ("record", recording.Settings, {"pool": "here", "to": "there"}),
+    ],
+)
+def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
+    task = ["task=domino_single"] if verb in ("generate", "axis") else []
+    assert config.read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 
 def test_it_runs_from_any_folder_as_a_module(tmp_path):
