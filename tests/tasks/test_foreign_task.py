@@ -10,6 +10,7 @@ from scengen import cli, config, conformance
 from scengen.conformance import Nonconformity
 from scengen.errors import BadConfig
 from scengen.samplers.dists import Fixed
+from scengen.scenario import Shortcut
 
 CONF = Path(__file__).parents[1] / "foreign" / "conf"
 SEARCH = conformance.search(CONF)
@@ -20,7 +21,7 @@ def test_push_block_keeps_to_the_rules(check):
     check()
 
 
-def test_a_foreign_task_and_its_levels_go_through_the_command_line(tmp_path):
+def test_a_foreign_task_and_its_severities_go_through_the_command_line(tmp_path):
     argv = ("task=push_block", "split=far@1", "n=1", f"pool={tmp_path / 'pool'}", *SEARCH)
     assert cli.run(("generate", *argv, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0
     assert cli.run(("verify", f"pool={tmp_path / 'pool'}", *SEARCH)) == 0
@@ -28,7 +29,7 @@ def test_a_foreign_task_and_its_levels_go_through_the_command_line(tmp_path):
 
 def test_a_foreign_axis_that_touches_training_is_refused_with_the_remedy():
     with pytest.raises(BadConfig, match="touches or overlaps its training range"):
-        config.read("generate", ["task=push_block", *SEARCH, "task.axes.far.replace.distance=[uniform,0.13,0.2]"])
+        config.task("push_block", (*SEARCH, "task.axes.far.replace.distance=[uniform,0.13,0.2]"))
 
 
 def broken(rule, task, split="id"):
@@ -46,9 +47,9 @@ def test_what_does_not_vary_is_caught():
 
 
 def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
-    monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {"the oracle's own plan": self.oracle})
+    monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {"the_oracle_itself": Shortcut(self.oracle)})
     told = broken(conformance._scenarios_are_certified, config.task("push_block", SEARCH))
-    assert "is refuted" in told and "the oracle's own plan" in told
+    assert "is refuted" in told and "the_oracle_itself" in told
 
 
 def test_an_instruction_that_names_its_axis_is_caught():
