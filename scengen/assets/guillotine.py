@@ -195,6 +195,29 @@ def solutions(pieces: Sequence[Ell], rect: Rect) -> int:
     return _count(0, full, kinds, poses)
 
 
+def misfit(pieces: Sequence[Ell], rect: Rect) -> tuple[int, Ell]:
+    """A piece, and an L of the same area in whose company the others tile `rect` in no arrangement.
+
+    Its mirror image, if that will do; several pieces are their own, or turn the whole tiling over. Sides are whole
+    numbers.
+    """
+    for i, piece in enumerate(pieces):
+        for other in _same_area(piece):
+            if solutions([*pieces[:i], other, *pieces[i + 1 :]], rect) == 0:
+                return i, other
+    raise ValueError("every L of the same area fits; no such rectangle is known")
+
+
+def _same_area(piece: Ell) -> Iterator[Ell]:
+    """The mirror image of an L, then every L with sides of whole length, up to two more, and the same area."""
+    yield mirrored([piece], piece.bounds)[0]
+    width, height, upright, lying = (int(side) for side in piece.sides)
+    for w, h, u, v in itertools.product(range(3, width + 3), range(3, height + 3), range(2, width), range(2, height)):
+        if u < w and v < h and w * v + u * (h - v) == piece.area and (w, h, u, v) != (width, height, upright, lying):
+            bounds = Rect.sized(w, h)
+            yield Ell(bounds, Rect(Fraction(u), Fraction(v), bounds.x1, bounds.y1))
+
+
 def _grid(pieces: Sequence[Ell], rect: Rect) -> int:
     """The least number of grid lines per unit of length on which all lengths fall."""
     lengths = [rect.width, rect.height, *(side for p in pieces for side in p.sides)]

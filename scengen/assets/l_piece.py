@@ -1,39 +1,41 @@
 """L-shaped pieces: flat slabs that lie on their broad face, for packing and fitting."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import mujoco
 import numpy as np
 
-from ..params import check_bounds, param
-from .prop import PRIORITY, STIFF, show
+from ..params import param
+from .prop import Prop, Rgba, show, solid
 
-PROUD = 0.0002
+CORNER_RELIEF = 0.0002
 """How far the five outer corners stand out below the edges [m]: a piece that lies on five points instead of twelve
 costs half the time to simulate."""
 INNER = 3
 """The corner of the outline that points inwards."""
 Point = tuple[float, float]
 """A place seen from above [m], in the axes of a piece."""
-Box = tuple[float, float, float, float]
-"""Middle x and y, half width and half height [m], in the axes of a piece."""
+Part = tuple[float, float, float, float]
+"""A rectangle seen from above: x and y of its middle, its width along x and its length along y [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class LPiece:
-    """A rectangle `width` by `height` without its upper right corner. The origin is the middle of its foot.
+class LPiece(Prop):
+    """A slab `width` along x by `length` along y without its corner towards +x and +y.
 
         +--+            y
-        |  |            |     The upright arm is `upright` wide,
-        |  +-----+      +-x   the lying arm `lying` high.
+        |  |            |     The upright arm is `upright` wide, the lying arm `lying` long.
+        |  +-----+      +-x   The origin is the middle of the foot of the whole rectangle.
         +--------+
 
     The paper gives no sizes (App. B, T33); an arm must be wide enough for a 27 mm suction cup.
     """
 
     width: float = param(0.080, "m", 0.03, 0.30)
-    height: float = param(0.080, "m", 0.03, 0.30)
+    length: float = param(0.080, "m", 0.03, 0.30)
     upright: float = param(0.038, "m", 0.01, 0.20)
     lying: float = param(0.038, "m", 0.01, 0.20)
     thickness: float = param(0.020, "m", 0.006, 0.05)
@@ -41,39 +43,65 @@ class LPiece:
     """Radius of the lower edges, as a moulded or sanded piece has them."""
     mass: float = param(0.060, "kg", 0.005, 1.0)
     friction: float = param(0.4, "1", 0.05, 1.5)
-    rgba: tuple[float, float, float, float] = (0.86, 0.55, 0.24, 1.0)
+    rgba: Rgba = (0.86, 0.55, 0.24, 1.0)
 
-    def __post_init__(self) -> None:
-        check_bounds(self)
+    @classmethod
+    def of(cls, sides: Sequence[float], thickness: float, density: float, rgba: Rgba) -> Self:
+        """A piece of a material.
+
+        Args:
+            sides: `width`, `length`, `upright` and `lying` [m].
+            density: [kg/m^3]
+        """
+        width, length, upright, lying = sides
+        mass = density * (width * lying + upright * (length - lying)) * thickness
+        return cls(width=width, length=length, upright=upright, lying=lying, thickness=thickness, mass=mass, rgba=rgba)
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        """Boxes from the height of the rounding upwards, capsules along the lower edges, spheres at the corners."""
+        half = (self.thickness - self.rounding) / 2
+        for name, (x, y, width, length) in zip(("lying", "upright"), self.parts, strict=True):
+            size, pos = [width / 2, length / 2, half], [x, y, self.rounding + half]
+            mass = self.mass * width * length / self.area
+            solid(body, name, size, pos, mass=mass, friction=self.friction, rgba=self.rgba)
+        for i, (start, end) in enumerate(self.edges):
+            edge = self._round(body, f"edge_{i}", mujoco.mjtGeom.mjGEOM_CAPSULE)
+            height = self.rounding + CORNER_RELIEF
+            edge.fromto = np.array([*start, height, *end, height])
+            if i != INNER:
+                self._round(body, f"corner_{i}", mujoco.mjtGeom.mjGEOM_SPHERE).pos = np.array([*start, self.rounding])
+
+    def _round(self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.MjsGeom:
+        """A round part of the lower edges. The boxes carry the mass."""
+        size, friction = [self.rounding], self.friction
+        return solid(body, name, size, type=type, mass=0.0, friction=friction, condim=3, rgba=self.rgba)
+
+    # --- geometry -------------------------------------------------------------------------
 
     @property
     def area(self) -> float:
         """Of the broad face [m^2]."""
-        return self.width * self.lying + self.upright * (self.height - self.lying)
+        return self.width * self.lying + self.upright * (self.length - self.lying)
 
     @property
-    def boxes(self) -> tuple[Box, Box]:
-        """The lying arm over the whole width, and the rest of the upright arm on top of it."""
-        rest = self.height - self.lying
+    def parts(self) -> tuple[Part, Part]:
+        """The lying arm over the whole width, and the rest of the upright arm beyond it."""
         return (
-            (0.0, (self.lying - self.height) / 2, self.width / 2, self.lying / 2),
-            ((self.upright - self.width) / 2, self.lying / 2, self.upright / 2, rest / 2),
+            (0.0, (self.lying - self.length) / 2, self.width, self.lying),
+            ((self.upright - self.width) / 2, self.lying / 2, self.upright, self.length - self.lying),
         )
 
     @property
-    def centroid(self) -> tuple[float, float]:
+    def centroid(self) -> Point:
         """Centre of mass, seen from above [m]."""
-        (xa, ya, *a), (xb, yb, *b) = self.boxes
+        (xa, ya, *a), (xb, yb, *b) = self.parts
         share = a[0] * a[1] / (a[0] * a[1] + b[0] * b[1])
         return share * xa + (1 - share) * xb, share * ya + (1 - share) * yb
 
-    def hold(self, cup: float) -> tuple[float, float]:
+    def hold(self, cup: float) -> Point:
         """The point [m], seen from above, nearest to the centre of mass with `cup` [m] of face to each of its sides."""
-        whole = (
-            self.boxes[0],
-            ((self.upright - self.width) / 2, 0.0, self.upright / 2, self.height / 2),
-        )
-        points = [_nearest(self.centroid, arm, cup) for arm in whole if min(arm[2:]) >= cup]
+        arms = (self.parts[0], ((self.upright - self.width) / 2, 0.0, self.upright, self.length))
+        points = [_nearest(self.centroid, arm, cup) for arm in arms if min(arm[2:]) >= 2 * cup]
         if not points:
             raise ValueError(f"no arm of the piece is {2000 * cup:.0f} mm wide; a cup of that size finds no face")
         return min(points, key=lambda p: math.dist(p, self.centroid))
@@ -81,54 +109,19 @@ class LPiece:
     @property
     def edges(self) -> list[tuple[Point, Point]]:
         """The outline of the foot, further in by the radius of the edges: six stretches, seen from above [m]."""
-        r, x, y = self.rounding, self.width / 2, self.height / 2
+        r, x, y = self.rounding, self.width / 2, self.length / 2
         left, right, beside = r - x, x - r, self.upright - x - r
-        near, far, above = r - y, y - r, self.lying - y - r
-        ring = [(left, near), (right, near), (right, above), (beside, above), (beside, far), (left, far)]
+        near, far, beyond = r - y, y - r, self.lying - y - r
+        ring = [(left, near), (right, near), (right, beyond), (beside, beyond), (beside, far), (left, far)]
         return list(zip(ring, [*ring[1:], ring[0]], strict=True))
 
-    def spec(self) -> mujoco.MjSpec:
-        """Boxes from the height of the rounding upwards, capsules along the lower edges, spheres at the corners."""
-        spec = mujoco.MjSpec()
-        body = spec.worldbody.add_body(name="body")
-        half = (self.thickness - self.rounding) / 2
-        for name, (x, y, half_width, half_height) in zip(("lying", "upright"), self.boxes, strict=True):
-            body.add_geom(
-                name=name,
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=[half_width, half_height, half],
-                pos=[x, y, self.rounding + half],
-                mass=self.mass * 4 * half_width * half_height / self.area,
-                friction=[self.friction, 0.005, 0.0001],
-                condim=4,
-                solref=STIFF,
-                priority=PRIORITY,
-                rgba=self.rgba,
-            )
-        for i, (start, end) in enumerate(self.edges):
-            edge = body.add_geom(name=f"edge_{i}", type=mujoco.mjtGeom.mjGEOM_CAPSULE)
-            edge.fromto = np.array([*start, self.rounding + PROUD, *end, self.rounding + PROUD])
-            self._finish(edge)
-            if i != INNER:
-                corner = body.add_geom(name=f"corner_{i}", type=mujoco.mjtGeom.mjGEOM_SPHERE)
-                corner.pos = np.array([*start, self.rounding])
-                self._finish(corner)
-        return spec
 
-    def _finish(self, geom: mujoco.MjsGeom) -> None:
-        """What all round parts have in common. The boxes carry the mass."""
-        geom.size = np.array([self.rounding, 0.0, 0.0])
-        geom.mass, geom.priority = 0.0, PRIORITY
-        geom.friction = np.array([self.friction, 0.005, 0.0001])
-        geom.solref, geom.rgba = np.array(STIFF), np.array(self.rgba, np.float32)
-
-
-def _nearest(point: tuple[float, float], box: Box, margin: float) -> tuple[float, float]:
-    """The point of `box`, `margin` away from its edges, that is nearest to `point`."""
-    x, y, half_width, half_height = box
+def _nearest(point: Point, part: Part, margin: float) -> Point:
+    """The point of a part, `margin` away from its edges [m], that is nearest to `point`."""
+    x, y, width, length = part
     return (
-        min(max(point[0], x - half_width + margin), x + half_width - margin),
-        min(max(point[1], y - half_height + margin), y + half_height - margin),
+        min(max(point[0], x - width / 2 + margin), x + width / 2 - margin),
+        min(max(point[1], y - length / 2 + margin), y + length / 2 - margin),
     )
 
 

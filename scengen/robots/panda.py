@@ -20,6 +20,9 @@ JOINTS = 7
 
 HOME: NDArray[np.float64] = np.array([0, np.pi / 16, 0, -np.pi / 2 - np.pi / 3, 0, np.pi - 0.2, np.pi / 4])
 """Joint angles after a reset [rad], shape (7,): robosuite Panda.init_qpos, without its noise."""
+WRIST_MIDDLE = math.pi / 4
+"""Yaw of a hand that points down in front of the robot, joint 7 in the middle of its range [rad]: after a reset the yaw
+is 0 and that joint at pi / 4, and it turns back as the yaw grows. 160 deg are left each way."""
 FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
 """Finger positions after a reset [m], shape (2,): robosuite PandaGripper.init_qpos."""
 

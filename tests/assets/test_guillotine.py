@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scengen.assets.guillotine import Ell, Rect, closes, framed, mirrored, solutions, stairs
+from scengen.assets.guillotine import Ell, Rect, closes, framed, mirrored, misfit, solutions, stairs
 
 lengths = st.fractions(min_value=Fraction(1, 7), max_value=9, max_denominator=60)
 
@@ -136,6 +136,18 @@ def test_pieces_are_not_turned_over():
     one = Ell(Rect.sized(3, 2), Rect(Fraction(1), Fraction(1), Fraction(3), Fraction(2)))
     (mirror,) = mirrored([one], one.bounds)
     assert (solutions([one, one], rect), solutions([mirror, mirror], rect), solutions([one, mirror], rect)) == (1, 1, 0)
+
+
+@given(st.integers(2, 3), st.integers(2, 4), st.integers(2, 4), st.integers(1, 2), st.booleans())
+@settings(deadline=None, max_examples=15)
+def test_with_a_misfit_of_the_same_area_there_is_no_way_to_tile_the_rectangle(frame, step, low, rise, mirror):
+    whole = Rect.sized(frame + step + 2, frame + low + rise + 2)
+    first, rest = framed(whole, frame, frame)
+    pieces = (first, *stairs(rest, step, low, low + rise))
+    pieces = mirrored(pieces, whole) if mirror else pieces
+    i, other = misfit(pieces, whole)
+    assert other.area == pieces[i].area and solutions(pieces, whole) >= 1
+    assert solutions([*pieces[:i], other, *pieces[i + 1 :]], whole) == 0
 
 
 @pytest.mark.parametrize(

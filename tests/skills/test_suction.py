@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 
 from scengen.assets.l_piece import LPiece
-from scengen.assets.prop import PRIORITY, STIFF, TABLE_TOP, UP, place, table
+from scengen.assets.prop import TABLE_TOP, place, solid, table
 from scengen.control import osc
+from scengen.errors import GaveUp
+from scengen.geometry import UP, yaw_of
 from scengen.robots import suction
 from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, SUCTION, World
-from scengen.skills.motion import CLOSED, facing_down, go_to, hold, push, release
+from scengen.skills.jaw import release
+from scengen.skills.motion import CLOSED, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
+from scengen.skills.suction import carry, let_go, suck
 
 GRAVITY = 9.81
 FRICTION = 0.4
@@ -34,15 +38,7 @@ def hangs(weight, beside=0.0, level=True, pull=1.0):
     frame.attach_body(tool.body("right_gripper"), "", "")
     plate = scene.worldbody.add_body(name="plate", pos=[beside, 0.0, 1.3 - LENGTH - 0.005 + 2e-5])
     plate.add_freejoint()
-    plate.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[0.05, 0.05, 0.005],
-        mass=weight / GRAVITY,
-        friction=[FRICTION, 0.005, 0.0001],
-        condim=4,
-        solref=STIFF,
-        priority=PRIORITY,
-    )
+    solid(plate, "plate", [0.05, 0.05, 0.005], mass=weight / GRAVITY, friction=FRICTION)
     model = scene.compile()
     data = mujoco.MjData(model)
     data.ctrl[:] = pull
@@ -60,10 +56,10 @@ def put_on(pads):
     place(scene, piece, "piece", [0.0, 0.0, TABLE_TOP])
     world = World.load(scene_text.emit(scene)[0], SUCTION)
     spot = np.array([*FACES[pads], TABLE_TOP + piece.thickness])
-    play(world, go_to(world, spot + 0.01 * UP, facing_down(), within=0.0005, grip=CLOSED))
-    play(world, push(world, -0.05 * UP, until=lambda: world.touching(ROBOT, "piece")))
-    play(world, hold(world, 0.3))
-    play(world, go_to(world, world.hand + 0.04 * UP, within=0.005))
+    play(world, go_to(world.arm, spot + 0.01 * UP, facing_down(), Pace(0.25, 0.0005), CLOSED))
+    play(world, push(world.arm, -0.05 * UP, until=lambda: world.touching(ROBOT, "piece")))
+    play(world, hold(world.arm, 0.3))
+    play(world, retreat(world.arm, 0.04, STEADY))
     return world
 
 
@@ -102,7 +98,7 @@ def test_switched_off_it_does_not_stick():
 def test_it_pulls_only_while_three_of_its_four_pads_find_a_face(pads):
     world = put_on(pads)
     lifted = world.pos("piece")[2] - TABLE_TOP
-    assert world.sealed == (pads >= osc.SEAL)
+    assert world.arm.sealed == (pads >= osc.SEAL)
     assert (lifted > 0.03) == (pads >= osc.SEAL)
     assert lifted > 0.03 or lifted < 0.001
 
@@ -110,8 +106,8 @@ def test_it_pulls_only_while_three_of_its_four_pads_find_a_face(pads):
 def test_what_it_lets_go_falls_freely():
     world = put_on(4)
     height, start = world.pos("piece")[2], world.time
-    play(world, release(world, 0.06))
-    assert not world.sealed
+    play(world, release(world.arm, 0.06))
+    assert not world.arm.sealed
     fallen, elapsed = height - world.pos("piece")[2], world.time - start
     assert fallen == pytest.approx(GRAVITY * elapsed**2 / 2, rel=0.15)
 
@@ -122,7 +118,30 @@ def test_four_pads_cover_a_square_of_27_mm_around_the_grip_site_in_the_plane_of_
     world = World.load(scene_text.emit(scene)[0], SUCTION)
     names = [f"gripper0_right_pad{i}_collision" for i in range(4)]
     middles = np.array([world.data.geom(name).xpos for name in names])
-    away = (middles - world.hand) @ world.hand_rot
+    away = (middles - world.arm.hand) @ world.arm.hand_rot
     sizes = np.array([world.model.geom(name).size for name in names])
     assert np.abs(away[:, :2]).max() + sizes[:, :2].max() == pytest.approx(REACHES) == 0.0135
     assert away[:, 2] + sizes[:, 2] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, -2.0])
+def test_a_piece_is_taken_up_and_carried_to_a_pose(turn):
+    scene, piece = table(), LPiece()
+    place(scene, piece, "piece", [0.0, 0.1, TABLE_TOP])
+    world = World.load(scene_text.emit(scene)[0], SUCTION)
+    arm, spot = world.arm, np.array([*piece.hold(REACHES), piece.thickness])
+    play(world, go_to(arm, world.pos("piece") + spot + 0.03 * UP, facing_down(), grip=OPEN))
+    play(world, suck(arm, world.pos("piece") + spot, facing_down()))
+    play(world, retreat(arm, 0.05))
+    goal = np.array([0.05, -0.1, TABLE_TOP + 0.04])
+    play(world, carry(arm, "piece", goal, turn, Pace(0.25, 0.0005)))
+    assert arm.sealed and np.linalg.norm(world.pos("piece") - goal) < 0.0015
+    assert yaw_of(world.rot("piece")) == pytest.approx(turn, abs=0.02)
+    play(world, let_go(arm))
+    assert not arm.sealed and not world.touching(ROBOT, "piece")
+
+
+def test_a_cup_that_finds_no_face_gives_up():
+    world = World.load(scene_text.emit(table())[0], SUCTION)
+    with pytest.raises(GaveUp, match="did not get hold of anything"):
+        play(world, suck(world.arm, np.array([0.0, 0.5, TABLE_TOP]), facing_down(), give_up=0.2))
