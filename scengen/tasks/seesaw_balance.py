@@ -38,14 +38,15 @@ from ..assets.box import Block
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.seesaw import Seesaw, standing
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, heading, quat
+from ..geometry import UP, Mat3, Vec3, about_z, heading, quat
 from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
+from ..robots.panda import WRIST_MIDDLE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
-from ..skills.motion import CLOSED, COARSE, STEADY, closing_along, go_to, hold, push, retreat, wait
+from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat, wait
 
 LEVEL = math.radians(5.0)
 """Tilt that counts as level [rad] (paper, App. B, T19)."""
@@ -165,9 +166,10 @@ class SeesawBalance(Scenario):
         """Put the counterweight on the deck from wherever it stands, let go, and see whether the deck stays level."""
         arm, at = world.arm, world.com("weight")
         high = TRANSIT - at[2]
+        yield from go_to(arm, at + high * UP, self.down, COARSE, OPEN)
         yield from pick(arm, at, closing=world.rot("weight")[:, 1], above=high, lift=high, pace=STEADY)
         spot = self.on_deck(along, self.tilt(world))
-        yield from go_to(arm, [*spot[:2], TRANSIT], closing_along(arm, self.across), COARSE)
+        yield from go_to(arm, [*spot[:2], TRANSIT], self.down, COARSE)
         yield from put(arm, "weight", spot + world.com("weight") - world.pos("weight"), on=BEAM, hover=0.02)
         yield from retreat(arm, 0.08)
         yield from hold(arm, 0.2)
@@ -210,7 +212,7 @@ class SeesawBalance(Scenario):
         yield on_table("the stand or the counterweight", [self.foot, self.start], margin=0.05)
         dip, under = deck.dip, deck.height - deck.thickness
         yield require(dip <= under, "the deck strikes the table before its stop", dip=dip, height=under)
-        beside, need = abs(float(self.across @ (self.start - self.foot))), PALM_ALONG + AIR + deck.width / 2
+        beside, need = abs(heading(self.heading + 90.0) @ (self.start - self.foot)), PALM_ALONG + AIR + deck.width / 2
         fits = beside >= need
         yield require(fits, "the hand cannot take the counterweight beside the seesaw", beside=beside, needed=need)
         grip, need = max(deck.friction, min(self.target.friction, self.weight.friction)), 1.5 * math.tan(deck.steepest)
@@ -263,9 +265,9 @@ class SeesawBalance(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def across(self) -> Vec3:
-        """Unit vector along the axle: fingers that close along it lie against faces that no tilt turns."""
-        return heading(self.heading + 90.0)
+    def down(self) -> Mat3:
+        """A hand that closes along the axle, on faces that no tilt turns; the last joint has room to either side."""
+        return facing_down(WRIST_MIDDLE + math.remainder(math.radians(self.heading) - WRIST_MIDDLE, math.pi))
 
     @property
     def foot(self) -> Vec3:
