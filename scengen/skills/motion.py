@@ -75,10 +75,19 @@ def closing_along(arm: Arm, direction: ArrayLike) -> Mat3:
     """
     along = np.asarray(direction, float)
     turn = math.remainder(math.atan2(-along[0], along[1]) - hand_yaw(arm), math.pi)
-    low, high = arm.wrist_range
-    if not low + WRIST_SPARE < arm.joint_pos[6] - turn < high - WRIST_SPARE:
+    if not can_turn(arm, turn):
         turn -= math.copysign(math.pi, turn)
     return facing_down(hand_yaw(arm) + turn)
+
+
+def can_turn(arm: Arm, angle: float, spare: float = WRIST_SPARE) -> bool:
+    """Whether a hand that points about down may turn by `angle` [rad] on the spot.
+
+    Args:
+        spare: how far joint 7 must stay away from its limits [rad].
+    """
+    low, high = arm.wrist_range
+    return low + spare < arm.joint_pos[6] - angle < high - spare
 
 
 def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY, grip: float | None = None) -> Plan:

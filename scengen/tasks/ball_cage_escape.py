@@ -24,21 +24,25 @@ reorient".
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
 from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage
-from ..assets.prop import TABLE_HALF, TABLE_TOP, UP, place, table
+from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
+from ..geometry import UP, Mat3, Vec3, about_z, shortest
 from ..params import param
-from ..robots.panda import REACH, SHOULDER
-from ..scenario import Plan, Planner, Refutation, Scenario
-from ..sim.world import Mat3, Vec3, World
-from ..skills.motion import CLOSED, OPEN, facing_down, go_to, grasp, hold, push, rotate, wait
+from ..predicates import fallen, inside, still
+from ..robots.jaw import FINGER
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.world import World
+from ..skills.jaw import pick, poke
+from ..skills.motion import WRIST_SPARE, Pace, can_turn, go_to, hand_yaw, hold, turn_about_vertical, turn_to, wait
 
 STILL = 0.02
 """Speed below which the ball counts as lying [m/s]: at the nominal rolling friction it stops within 1 mm."""
@@ -50,10 +54,10 @@ STEEPEST = math.radians(72.0)
 between x = -0.2 and 0 m."""
 SPARE = math.radians(13.0)
 """How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives some degrees."""
-KEEP = 0.25
+HOLD_AT_END = 0.25
 """For a hole in a side: component of gravity that keeps the ball at the hole's end meanwhile, over the other ones."""
 HANDLE = 0.030
-"""Height of the grip site above the foot of the cage [m]: the finger tips, 12 mm lower, stay 18 mm above the stool."""
+"""Height of the grip site above the foot of the cage [m]: the finger tips, 9 mm lower, stay 21 mm above the stool."""
 ROOM = 0.040
 """Free height below the lowest edge of the tilted cage [m]; the ball passes under it."""
 ASIDE = 0.19
@@ -61,20 +65,15 @@ ASIDE = 0.19
 WIDEST = math.radians(55.0)
 """The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can
 lean far, and the ball has half a metre to run out."""
-YAW_LEAST, YAW_MOST = math.radians(-100.0), math.radians(190.0)
-"""Turns of the downward hand that joint 7 allows with 10 deg and more to spare [rad]: its limits are +-2.897 rad, and
-it is at pi / 4 where the hand is not turned."""
-RUN_UP = 0.05
-"""Distance behind the cage from which it is pushed [m]: half the thickness of a closed jaw, and air."""
-LAPS = (-2 * math.pi, 0.0, 2 * math.pi)
-HALF_TURNS = (0.0, -math.pi, math.pi)
+LEVEL = Pace(0.20, 0.01)
+"""With the cage in the hand: slow enough for the sill to hold the ball."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallCageEscape(Scenario):
     """A cage on a stool, the ball behind the sill, the hole near the other end. Lengths are along the cage's axes."""
 
-    HOLD = 0.3
+    HOLD: ClassVar[float] = 0.3
 
     x: float = param(-0.08, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
@@ -90,126 +89,33 @@ class BallCageEscape(Scenario):
     ball: Ball = Ball(radius=0.015, density=1400.0, friction=0.5, rgba=(0.85, 0.20, 0.15, 1.0))
     stool: Stool = Stool()
 
-    # --- geometry -------------------------------------------------------------------------
-
-    @property
-    def axes(self) -> Mat3:
-        """The cage's axes at the start."""
-        c, s = math.cos(math.radians(self.yaw)), math.sin(math.radians(self.yaw))
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    @property
-    def foot(self) -> Vec3:
-        """Where the cage stands [m]: the centre of its foot."""
-        return np.array([self.x, self.y, TABLE_TOP + self.stool.height])
-
-    @property
-    def lip(self) -> float:
-        """Height of the hole's rim above the floor, for a hole in an upright wall [m]."""
-        return self.cage.cavity[2] / 2 - self.cage.hole
-
-    @property
-    def least_tilt(self) -> float:
-        """Tilt that lets the ball roll over the sill and, where the hole is in a wall, over its rim [rad]."""
-        over_sill = self.cage.tilt_over_sill(self.ball.radius)
-        if self.cage.face == BOTTOM:
-            return over_sill
-        return max(over_sill, math.acos(max(-1.0, 1 - self.lip / self.ball.radius)))
-
-    @property
-    def pocket(self) -> tuple[float, float]:
-        """Where the ball's centre may lie behind the sill: least and largest x [m]."""
-        r, sill = self.ball.radius, min(self.cage.sill, self.ball.radius)
-        touching = self.cage.wall / 2 + math.sqrt(2 * r * sill - sill**2)
-        return r - self.cage.cavity[0] / 2, self.cage.sill_x - touching
-
-    def infeasible(self) -> Refutation | None:
-        return self._ball_cannot_leave() or self._ball_cannot_stay() or self._cage_cannot_stand()
-
-    def _ball_cannot_leave(self) -> Refutation | None:
-        cage, r = self.cage, self.ball.radius
-        if cage.margin < 0:
-            return Refutation("the hole does not fit into its face", {"hole": cage.hole, "margin": cage.margin})
-        if r >= cage.hole:
-            return Refutation("the ball is wider than the hole", {"ball": r, "hole": cage.hole})
-        if cage.face in (BOTTOM, SIDE) and cage.offset - cage.hole < cage.sill_x + cage.wall / 2:
-            return Refutation("the hole is not beyond the sill", {"hole": cage.offset - cage.hole, "sill": cage.sill_x})
-        if cage.face == TOP:
-            return Refutation("the hole looks up, and the hand cannot turn over", {"steepest": STEEPEST})
-        if self.least_tilt + SPARE > STEEPEST:
-            numbers = {"least": self.least_tilt, "spare": SPARE, "steepest": STEEPEST}
-            return Refutation("the ball stays in at every tilt that the hand reaches", numbers)
-        return None
-
-    def _ball_cannot_stay(self) -> Refutation | None:
-        cage, r = self.cage, self.ball.radius
-        if 2 * r > cage.cavity[2] or r + abs(self.ball_y) > cage.cavity[1] / 2:
-            return Refutation("the ball does not fit between the walls", {"radius": r, "y": self.ball_y})
-        low, high = self.pocket
-        if not low <= self.ball_x <= high:
-            return Refutation("the ball does not lie behind the sill", {"x": self.ball_x, "from": low, "to": high})
-        if (held := cage.tilt_over_sill(r)) < LEAST_HELD:
-            return Refutation("the sill does not hold the ball", {"tilt": held, "least": LEAST_HELD})
-        return None
-
-    def _cage_cannot_stand(self) -> Refutation | None:
-        cage, stool = self.cage, self.stool
-        before, behind = self.stool_x - stool.length / 2, self.stool_x + stool.length / 2
-        hole = cage.offset - cage.hole, cage.offset + cage.hole
-        if cage.face == BOTTOM and not (before <= hole[0] and hole[1] <= behind and cage.hole <= stool.width / 2):
-            return Refutation(
-                "the stool does not cover the hole", {"near": before, "far": behind, "width": stool.width}
-            )
-        load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
-        if not before < load < behind:
-            return Refutation("the cage tips off the stool by itself", {"load": load, "near": before, "far": behind})
-        if (far := float(np.abs(self.foot[:2]).max()) + cage.length) > TABLE_HALF:
-            return Refutation("the cage stands too near the edge of the table", {"farthest": far, "edge": TABLE_HALF})
-        if (away := float(np.linalg.norm(self.foot + HANDLE * UP - SHOULDER))) > REACH:
-            return Refutation("the cage is out of reach", {"distance": away, "reach": REACH})
-        return None
-
     # --- scene ----------------------------------------------------------------------------
 
     def build(self) -> mujoco.MjSpec:
-        return self._scene(self.cage)
-
-    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        return {"no hole": self._scene(dataclasses.replace(self.cage, closed=True))}
-
-    def _scene(self, cage: HoledCage) -> mujoco.MjSpec:
         scene, yaw = table(), math.radians(self.yaw)
-        place(
-            scene, self.stool, "stool", self.foot + self.axes @ [self.stool_x, 0, -self.stool.height], yaw, free=False
-        )
-        place(scene, cage, "cage", self.foot, yaw)
-        inside = [self.ball_x, self.ball_y, cage.wall + self.ball.radius]
-        place(scene, self.ball, "ball", self.foot + self.axes @ inside)
-        felt = scene.geom("ball/ball")
-        felt.condim, felt.friction[2] = 6, self.rolling * self.ball.radius  # MuJoCo's coefficient is a length
+        stool = self.foot + self.axes @ [self.stool_x, 0.0, -self.stool.height]
+        ball = self.foot + self.axes @ [self.ball_x, self.ball_y, self.cage.wall + self.ball.radius]
+        place(scene, self.stool, "stool", stool, yaw, free=False)
+        place(scene, self.cage, "cage", self.foot, yaw)
+        place(scene, dataclasses.replace(self.ball, rolling=self.rolling), "ball", ball)
         return scene
 
     # --- goal -----------------------------------------------------------------------------
 
-    def out(self, world: World) -> bool:
-        """Whether the whole ball is outside the cuboid that the cage fills."""
-        beyond = np.abs(self.ball_in_cage(world) - self.cage.middle) - self.cage.size / 2
-        return bool(beyond.max() > self.ball.radius)
-
-    def ball_in_cage(self, world: World) -> Vec3:
-        """The ball's centre in the cage's axes [m]."""
-        return world.rot("cage").T @ (world.com("ball") - world.pos("cage"))
-
     def success(self, world: World) -> bool:
-        velocity = world.velocity("ball")[3:]
-        return world.touching("ball", "table") and math.sqrt(velocity @ velocity) < STILL and self.out(world)
+        return world.touching("ball", "table") and still(world, "ball", STILL) and self.out(world)
 
     def failure(self, world: World) -> str | None:
-        if world.com("ball")[2] < TABLE_TOP:
+        if fallen(world, "ball", below=0.0):
             return "the ball fell off the table"
-        if world.touched("cage", "table") or world.com("cage")[2] < TABLE_TOP:
+        if world.touched("cage", "table") or fallen(world, "cage", below=0.0):
             return "the cage was dropped or set down"
         return None
+
+    def out(self, world: World) -> bool:
+        """Whether the whole ball is outside the cuboid that the cage fills."""
+        middle, reach = self.cage.middle, self.cage.size / 2 + self.ball.radius
+        return not inside(world, "ball", "cage", middle - reach, middle + reach)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -225,118 +131,148 @@ class BallCageEscape(Scenario):
                 break
             yield from self.tip(world, _towards_end(math.radians(shallow)))
             yield from self.watch(world)
-        yield from wait(world, lambda: self.success(world), give_up=4.0)
+        yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def tilts(self) -> list[Vec3]:
-        """Where down must be, in the cage's axes, one after the other: unit vectors, shape (3,)."""
+        """Where down must be, in the cage's axes, one after the other: unit vectors."""
         steep = self.least_tilt + SPARE
         if self.cage.face != SIDE:
             return [_towards_end(steep)]
-        aside = np.array([KEEP, math.sin(steep), -math.cos(steep)])
+        aside = np.array([HOLD_AT_END, math.sin(steep), -math.cos(steep)])
         return [_towards_end(self.cage.tilt_over_sill(self.ball.radius) + SPARE), aside / np.linalg.norm(aside)]
 
     def pick_up(self, world: World) -> Plan:
-        """Take the cage by its width and lift it clear of the stool."""
-        handle, yaw = self.foot + HANDLE * UP, self._grip_yaw()
-        halfway = facing_down(yaw / 2)  # from there on the shorter way round is the one that joint 7 can go
-        yield from go_to(world, handle + 0.10 * UP, halfway, grip=OPEN, within=0.03)
-        yield from go_to(world, handle + 0.06 * UP, facing_down(yaw), within=0.015)
-        yield from go_to(world, handle, speed=0.15, within=0.005)
-        yield from grasp(world, 0.3)
-        yield from go_to(world, handle + 0.05 * UP, speed=0.10, within=0.01)
+        """Take the cage by its width and lift it clear of the stool.
 
-    def _grip_yaw(self) -> float:
-        """Turn of the hand that spans the cage's width and leaves joint 7 room [rad]."""
-        return next(y for y in (math.radians(self.yaw) + half for half in HALF_TURNS) if YAW_LEAST <= y <= YAW_MOST)
+        If joint 7 allows, the hand turns as the cage is turned: then it turns back in `present`.
+        """
+        turn = math.radians(self.yaw) - hand_yaw(world.arm)
+        turn = next(t for t in (turn, turn - math.pi, turn + math.pi) if can_turn(world.arm, t))
+        yield from turn_about_vertical(world.arm, turn)
+        yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=0.05)
 
     def present(self, world: World, down: Vec3) -> Plan:
-        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down."""
-        steep = math.acos(-down[2])
-        low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
-        side = -1.0 if self.y > 0 else 1.0
-        spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
-        yield from go_to(world, [spot[0], spot[1], max(world.hand[2], spot[2])], speed=0.2, within=0.01)
-        yield from go_to(world, spot, speed=0.2, within=0.01)
-        turn = self._turn_to_middle(world, world.rot("cage") @ down, -side)
-        for _ in range(2):  # each half is the shorter way
-            yield from rotate(world, _about_z(turn / 2) @ world.hand_rot, rate=2.0)
+        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
 
-    @staticmethod
-    def _turn_to_middle(world: World, leaning: Vec3, side: float) -> float:
-        """The smallest turn of the hand that takes a direction to the front, and to the table's middle [rad].
-
-        Out of its 360 deg more or less, one that joint 7 can go.
+        The hand turns the least that takes the leaning cage to the front, or to the middle of the table from there. It
+        may come nearer to the limit of joint 7 than elsewhere: leaning takes the joint away from it.
         """
-        heading, yaw = math.atan2(leaning[1], leaning[0]), hand_yaw(world)
-        turns = [side * front - heading + lap for front in np.linspace(0.0, WIDEST, 12) for lap in LAPS]
-        return min((t for t in turns if YAW_LEAST <= yaw + t <= YAW_MOST), key=abs)
+        arm, side, steep = world.arm, -1.0 if self.y > 0 else 1.0, math.acos(-down[2])
+        low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
+        spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
+        yield from go_to(arm, [spot[0], spot[1], max(arm.hand[2], spot[2])], pace=LEVEL)
+        yield from go_to(arm, spot, pace=LEVEL)
+        leaning, laps = world.rot("cage") @ down, (-2 * math.pi, 0.0, 2 * math.pi)
+        heading = math.atan2(leaning[1], leaning[0])
+        turns = [lap - side * front - heading for front in np.linspace(0.0, WIDEST, 12) for lap in laps]
+        yield from turn_about_vertical(arm, min((t for t in turns if can_turn(arm, t, WRIST_SPARE / 2)), key=abs))
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
-        turn = _shortest(world.rot("cage") @ down, -UP)
-        yield from rotate(world, turn @ world.hand_rot, rate, until=lambda: self.out(world))
+        rot = shortest(world.rot("cage") @ down, -UP) @ world.arm.hand_rot
+        yield from turn_to(world.arm, rot, rate, until=lambda: self.out(world))
 
     def watch(self, world: World) -> Plan:
         """Wait until the ball has come to rest in the cage, or is out."""
 
         def quiet() -> bool:
-            relative = world.velocity("ball")[3:] - world.velocity("cage")[3:]
-            return math.sqrt(relative @ relative) < STILL
+            return float(np.linalg.norm((world.velocity("ball") - world.velocity("cage"))[3:])) < STILL
 
-        yield from hold(world, 0.3)
-        yield from wait(world, lambda: self.out(world) or quiet(), give_up=3.0)
+        yield from hold(world.arm, 0.3)
+        yield from wait(world.arm, lambda: self.out(world) or quiet(), give_up=3.0)
 
-    # --- shortcuts ------------------------------------------------------------------------
+    # --- shortcuts and ablations ------------------------------------------------------------
 
-    def shortcuts(self) -> Mapping[str, Planner]:
+    def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "lift it off the stool": lambda world: self._tip_only(world, 0.0),
-            "tip it half as far": lambda world: self._tip_only(world, self.least_tilt / 2),
-            "tip it to the wrong end": lambda world: self._tip_only(world, -self.least_tilt - SPARE),
-            "knock it off the stool": self._knock_off,
+            "lift_it_off_the_stool": Shortcut(lambda world: self.tip_only(world, 0.0)),
+            "tip_it_half_as_far": Shortcut(lambda world: self.tip_only(world, self.least_tilt / 2)),
+            "tip_it_to_the_wrong_end": Shortcut(lambda world: self.tip_only(world, -self.least_tilt - SPARE)),
+            "knock_it_off_the_stool": Shortcut(self._knock_off),
         }
 
-    def _tip_only(self, world: World, tilt: float) -> Plan:
-        """As the oracle, with another tilt and nothing after it."""
+    def tip_only(self, world: World, tilt: float) -> Plan:
+        """As the oracle, with another tilt [rad] and nothing after it."""
         yield from self.pick_up(world)
         yield from self.present(world, _towards_end(tilt))
         yield from self.tip(world, _towards_end(tilt), rate=0.5)
-        yield from hold(world, 1.0)
+        yield from hold(world.arm, 1.0)
 
     def _knock_off(self, world: World) -> Plan:
         """Push the cage over the end of the stool with closed fingers, the holed end first."""
         u = self.axes[:, 0]
-        behind = self.foot + HANDLE * UP - (self.cage.length / 2 + RUN_UP) * u
-        across = facing_down(math.radians((self.yaw + 90.0) % 180.0))
-        yield from go_to(world, behind + 0.08 * UP, across, grip=CLOSED, within=0.01)
-        yield from go_to(world, behind, within=0.01)
-        yield from push(world, 0.15 * u, until=lambda: world.touched("cage", "table"))
+        behind = self.handle - (self.cage.length / 2 + FINGER + 0.04) * u
+        yield from poke(world.arm, behind, 0.15 * u, until=lambda: world.touched("cage", "table"))
 
-    # --- features -------------------------------------------------------------------------
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        closed = dataclasses.replace(self.cage, closed=True)
+        return {"no_hole": dataclasses.replace(self, cage=closed).build()}
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        yield from self._ball_can_leave()
+        yield from self._ball_stays()
+        yield from self._cage_stands()
+
+    def _ball_can_leave(self) -> Iterator[Refutation | None]:
+        cage, r, near = self.cage, self.ball.radius, self.cage.offset - self.cage.hole
+        yield require(cage.margin >= 0, "the hole does not fit into its face", hole=cage.hole, margin=cage.margin)
+        yield require(r < cage.hole, "the ball is wider than the hole", ball=r, hole=cage.hole)
+        beyond = cage.face not in (BOTTOM, SIDE) or near >= cage.sill_x + cage.wall / 2
+        yield require(beyond, "the hole is not beyond the sill", hole=near, sill=cage.sill_x)
+        yield require(cage.face != TOP, "the hole looks up, and the hand cannot turn over", steepest=STEEPEST)
+        reached, numbers = self.least_tilt + SPARE <= STEEPEST, {"least": self.least_tilt, "steepest": STEEPEST}
+        yield require(reached, "the ball stays in at every tilt that the hand reaches", **numbers, spare=SPARE)
+
+    def _ball_stays(self) -> Iterator[Refutation | None]:
+        cage, r = self.cage, self.ball.radius
+        fits = 2 * r <= cage.cavity[2] and r + abs(self.ball_y) <= cage.cavity[1] / 2
+        yield require(fits, "the ball does not fit between the walls", radius=r, y=self.ball_y)
+        low, high = cage.pocket(r)
+        behind = low <= self.ball_x <= high
+        yield require(behind, "the ball does not lie behind the sill", x=self.ball_x, least=low, largest=high)
+        tilt = cage.tilt_over_sill(r)
+        yield require(tilt >= LEAST_HELD, "the sill does not hold the ball", tilt=tilt, least=LEAST_HELD)
+
+    def _cage_stands(self) -> Iterator[Refutation | None]:
+        cage, stool, half = self.cage, self.stool, self.stool.length / 2
+        covered = abs(cage.offset - self.stool_x) + cage.hole <= half and cage.hole <= stool.width / 2
+        covered, sides = covered or cage.face != BOTTOM, {"length": stool.length, "width": stool.width}
+        yield require(covered, "the stool does not cover the hole", **sides)
+        load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
+        lever = abs(load - self.stool_x)
+        yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
+        yield on_table("the cage", self.foot, margin=cage.length)
+        yield within_reach("the cage", self.handle)
 
     def features(self) -> Mapping[str, float]:
         """How far the cage must be tilted [rad], and the air that the hole leaves round the ball."""
-        return {"least tilt": self.least_tilt, "air over radius": self.cage.hole / self.ball.radius - 1}
+        return {"least_tilt": self.least_tilt, "air_over_radius": self.cage.hole / self.ball.radius - 1}
+
+    # --- geometry ---------------------------------------------------------------------------
+
+    @property
+    def axes(self) -> Mat3:
+        """The cage's axes at the start."""
+        return about_z(math.radians(self.yaw))
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the cage stands [m]: the centre of its foot."""
+        return np.array([self.x, self.y, TABLE_TOP + self.stool.height])
+
+    @property
+    def handle(self) -> Vec3:
+        """Where the hand takes the cage [m]."""
+        return self.foot + HANDLE * UP
+
+    @property
+    def least_tilt(self) -> float:
+        """Tilt that lets the ball out [rad]."""
+        return self.cage.least_tilt(self.ball.radius)
 
 
 def _towards_end(tilt: float) -> Vec3:
     """Where down is in a cage whose holed end is lowered by `tilt` [rad]."""
     return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
-
-
-def hand_yaw(world: World) -> float:
-    """The `yaw` of `facing_down` for a hand that points about down, counted from -125 deg up [rad]."""
-    x = world.hand_rot[:, 0]
-    return (math.atan2(-x[0], x[1]) + math.radians(125.0)) % (2 * math.pi) - math.radians(125.0)
-
-
-def _about_z(angle: float) -> Mat3:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _shortest(here: Vec3, there: Vec3) -> Mat3:
-    """The smallest rotation that takes one unit vector, not opposite to the other, to the other."""
-    v, c = np.cross(here, there), float(here @ there)
-    k = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + k + k @ k / (1.0 + c)
