@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Self
@@ -48,7 +49,8 @@ class Arm:
 
     def __init__(self, world: "World", number: int):
         model, names = world.model, Names(number)
-        self.world, self.number, self.data = world, number, world.data
+        self.world: World = weakref.proxy(world)  # no circle: a world that nobody holds must free its memory at once
+        self.number, self.data = number, world.data
         self.grip = -1.0
         """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
         joints = [model.joint(name) for name in names.joints]
