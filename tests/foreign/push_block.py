@@ -17,7 +17,7 @@ from scengen.geometry import UP
 from scengen.params import param
 from scengen.predicates import fallen
 from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table
-from scengen.sim.world import World
+from scengen.sim.world import ROBOT, World
 from scengen.skills.jaw import poke
 
 
@@ -59,7 +59,7 @@ class PushBlock(Scenario):
     def _press(self, world: World) -> Plan:
         above = world.com("block") + (self.block.height / 2 + 0.02) * UP
         down = np.array([0.0, 0.0, -0.05])
-        yield from poke(world.arm, above, down, lambda: world.touching("robot", "block"), rot=world.arm.hand_rot)
+        yield from poke(world.arm, above, down, lambda: world.touching(ROBOT, "block"), rot=world.arm.hand_rot)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         scene = self.build()
