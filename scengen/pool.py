@@ -1,4 +1,8 @@
-"""Pools on disk: a folder with a manifest and Parquet shards. Data only: nothing in it is ever executed."""
+"""Pools on disk: a folder with a manifest and Parquet shards.
+
+Data only: nothing in a pool is executed, imported or opened by its name, whoever made it. What is read has passed the
+rules of `scengen.schema`.
+"""
 
 import hashlib
 import json
@@ -14,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from . import schema
 from .certificate import StoredCertificate, as_json, from_json
 from .errors import PoolError, UnknownName
 from .params import Value
@@ -21,7 +26,12 @@ from .params import Value
 MANIFEST = "manifest.json"
 FORMAT = 2
 SHARD_ROWS = 100_000
+REJECTED = "rejected.parquet"
 GROUP_ROWS = 1000
+BATCH_ROWS = 20
+"""Rows that are read at a time; each may have a scene of some MB."""
+LARGEST_GROUP = 2_000_000_000
+"""Bytes of a group of rows, unpacked; a thousand scenarios have 50 MB."""
 
 CHECK = pa.struct(
     [
@@ -159,16 +169,21 @@ class Pool:
             )
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
-            manifest = json.loads(path.read_text())
+            if why := schema.why_no_plain_file(path):
+                raise ValueError(f"it {why}")
+            if (size := path.stat().st_size) > schema.LARGEST_MANIFEST:
+                raise ValueError(f"it has {size} bytes")
+            manifest = schema.read_json(path.read_text(), schema.LARGEST_MANIFEST)
             version = manifest["format"]
             if version == FORMAT:
-                _check(manifest)
-        except (ValueError, KeyError, TypeError, UnicodeDecodeError):
-            raise PoolError(f"{path} is damaged; restore it or generate the pool again") from None
+                schema.check_manifest(manifest)
+        except (ValueError, KeyError, TypeError, OSError) as error:
+            why = " ".join(str(error).split())[:160]
+            raise PoolError(f"{path} is damaged; restore it or generate the pool again ({why})") from None
         if version != FORMAT:
             raise PoolError(
-                f"{folder} has pool format {version}, this scengen reads {FORMAT}; generate the pool again, or use the "
-                "scengen that wrote it"
+                f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}; generate the pool "
+                "again, or use the scengen that wrote it"
             )
         return cls(folder, manifest)
 
@@ -245,12 +260,11 @@ class Pool:
     def damaged(self) -> dict[str, str]:
         """What is wrong with the files, by shard; empty for a sound pool."""
         wrong = {}
-        for shard in self.manifest["shards"]:
+        rejected = [self.manifest["rejected"]] if "rejected" in self.manifest else []
+        for shard in [*self.manifest["shards"], *rejected]:
             path = self.folder / shard["file"]
-            if Path(shard["file"]).name != shard["file"]:
-                wrong[shard["file"]] = "lies outside the pool"
-            elif not path.is_file():
-                wrong[shard["file"]] = "is missing"
+            if why := schema.why_no_plain_file(path):
+                wrong[shard["file"]] = why
             elif path.stat().st_size != shard["bytes"]:
                 wrong[shard["file"]] = f"has {path.stat().st_size} bytes instead of {shard['bytes']}: truncated"
             elif _sha(path) != shard["sha256"]:
@@ -305,8 +319,7 @@ class Pool:
     @cached_property
     def rejected(self) -> list[PoolRow]:
         """Scenarios that were kept although they were not certified (`keep=`)."""
-        path = self.folder / "rejected.parquet"
-        return list(_read_rows(path, witness=True)) if path.is_file() else []
+        return list(_read_rows(self.folder / REJECTED, witness=True)) if "rejected" in self.manifest else []
 
 
 def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept: Sequence[PoolRow] = ()) -> Pool:
@@ -326,7 +339,7 @@ def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept:
             batch = []
     if batch or not shards:
         shards.append(_write_shard(folder, f"scenarios-{len(shards):05d}.parquet", batch))
-    extra = {"rejected": _write_shard(folder, "rejected.parquet", kept)} if kept else {}
+    extra = {"rejected": _write_shard(folder, REJECTED, kept)} if kept else {}
     text = json.dumps({"format": FORMAT, **about, "shards": shards, **extra}, indent=1, sort_keys=True) + "\n"
     _replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)
@@ -379,16 +392,45 @@ def _read(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """
     count = 0
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        if why := schema.why_no_plain_file(path):
+            raise ValueError(f"it {why}")
+        with pq.ParquetFile(
+            path,
+            page_checksum_verification=True,
+            thrift_string_size_limit=schema.LARGEST_MANIFEST,
+            thrift_container_size_limit=1_000_000,
+        ) as file:
             if not file.schema_arrow.equals(SCHEMA):
                 raise ValueError(f"its columns are not those of pool format {FORMAT}")
-            for group in range(file.num_row_groups):
-                for values in _values(file.read_row_group(group, columns=list(names))):
+            _check_groups(file.metadata)
+            for table in _batches(file, names):
+                for values in _values(table):
                     yield values
                     count += 1
-    except (OSError, pa.ArrowException, ValueError, TypeError) as error:
-        why = " ".join(str(error).split())[:120]
+    except (OSError, pa.ArrowException, ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:
+        why = " ".join(str(error).split())[:120] or type(error).__name__
         raise PoolError(f"{path} cannot be read from row {count} on ({why}); restore it") from None
+
+
+def _check_groups(metadata: pq.FileMetaData) -> None:
+    """Refuse groups of rows that would not fit into memory, before any is unpacked."""
+    for group in map(metadata.row_group, range(metadata.num_row_groups)):
+        size = max(
+            group.total_byte_size, sum(group.column(i).total_uncompressed_size for i in range(group.num_columns))
+        )
+        if size > LARGEST_GROUP:
+            raise ValueError(f"a group of rows has {size} bytes when it is unpacked, at most {LARGEST_GROUP} are read")
+
+
+def _batches(file: pq.ParquetFile, names: Sequence[str]) -> Iterator[pa.Table]:
+    """A few rows at a time, each read with a bound on memory: what a file says about its sizes may be false."""
+    batches = file.iter_batches(BATCH_ROWS, columns=list(names), use_threads=False)
+    while True:
+        with schema.memory_bounded():
+            batch = next(batches, None)
+        if batch is None:
+            return
+        yield pa.Table.from_batches([batch])
 
 
 def _values(table: pa.Table) -> Iterator[dict[str, Any]]:
@@ -404,21 +446,11 @@ def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
     """Values one by one. A witness becomes an array at once: a list of numbers would need fifty times the memory."""
     if name == "witness":
         for actions in column:
-            numbers = actions.values.flatten().to_numpy(zero_copy_only=False)
-            yield np.asarray(numbers, np.float32).reshape(-1, 7)
+            yield schema.column_witness(actions.values.flatten().to_numpy(zero_copy_only=False))
     else:
-        yield from map(_PARSE.get(name, _same), column.to_pylist())
-
-
-def _check(manifest: Mapping[str, Any]) -> None:
-    """Raise `KeyError`, `TypeError` or `ValueError` unless a manifest has what every pool of this format has."""
-    config, shards = manifest["config"], manifest["shards"]
-    names = (config["task"]["name"], config["certify"]["name"], config["split"], config["sampler"])
-    texts = (*names, *dict(manifest["versions"]).values(), *(shard["file"] for shard in shards))
-    counts = {**manifest["funnel"], **manifest["reasons"]}
-    numbers = (*counts.values(), config["seed"], manifest["indices"], *(shard["rows"] for shard in shards))
-    if not (all(isinstance(text, str) for text in texts) and all(isinstance(number, int) for number in numbers)):
-        raise ValueError("a name is no text, or a count no whole number")
+        check = schema.COLUMNS[name]
+        for scalar in column:
+            yield check(name, scalar.as_py())
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -10,13 +10,13 @@ import pytest
 import scengen
 
 LAYERS = (
-    ("errors", "statistics", "geometry", "certificate"),
-    ("params", "symmetry"),
+    ("errors", "statistics", "geometry", "certificate", "printed"),
+    ("params", "symmetry", "targets"),
     ("robots",),
     ("control",),
     ("parallel", "sim"),
     ("assets",),
-    ("scenario", "predicates"),
+    ("scenario", "predicates", "schema"),
     ("episode",),
     ("skills",),
     ("tasks",),

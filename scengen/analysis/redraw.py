@@ -1,12 +1,14 @@
 """What a pool was chosen from: its manifest and seed are enough to draw every proposal again."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from .. import config
 from ..errors import BadConfig, Infeasible, PoolError
 from ..pool import Pool
-from ..samplers.task import Task, load
+from ..samplers.task import Task
 from ..scenario import Scenario
+from ..validate.stored import task_of_manifest
 
 
 @dataclass(frozen=True)
@@ -22,20 +24,26 @@ class Redrawn:
     certified: bool
 
 
-def task_of(pool: Pool) -> Task:
-    """The task as it was when the pool was made: from the manifest, not from conf/.
+def task_of(pool: Pool, search: Sequence[str] = ()) -> Task:
+    """The task as it was when the pool was made: its numbers from the manifest, its family from the installed file.
+
+    Args:
+        search: overrides that add folders of other packages, see `config.search_path`.
 
     Raises:
-        ScengenError: the family has changed so that the task does not fit it any more.
+        ScengenError: there is no such task, or the family is another one or has changed so that the task does not fit.
     """
-    return load(pool.task, pool.task_node)
+    return task_of_manifest(pool, config.task(pool.task, search))
 
 
-def redrawn(pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None) -> list[Redrawn]:
+def redrawn(
+    pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None, search: Sequence[str] = ()
+) -> list[Redrawn]:
     """Draw everything again that the pool's run has drawn, infeasible tries included.
 
     Args:
         progress: told how many of how many indices are done.
+        search: see `task_of`.
 
     Raises:
         BadConfig: the pool is a chosen subset, for which there are no proposals.
@@ -43,7 +51,7 @@ def redrawn(pool: Pool, progress: Callable[[int, int], None] = lambda done, tota
     """
     if pool.chosen:
         raise BadConfig(f"{pool.folder} is a subset of another pool, chosen and not drawn; give the pool it came from")
-    task = task_of(pool)
+    task = task_of(pool, search)
     design = task.design(pool.sampler)
     ids = dict(pool.columns("index", "id"))
     found: list[Redrawn] = []
