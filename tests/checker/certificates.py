@@ -1,0 +1,297 @@
+"""False claims about the checks and the witness: settings, numbers and verdicts that the certificate does not bear out."""
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from forgery import Case, Draft
+from labels import Change, _both, _config
+
+OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
+
+# --- checks ---------------------------------------------------------------------------------------
+
+
+def _only(*names: str) -> Change:
+    def change(draft: Draft) -> None:
+        draft.certificate["checks"] = [check for check in draft.certificate["checks"] if check["name"] in names]
+
+    return change
+
+
+def _without(name: str) -> Change:
+    def change(draft: Draft) -> None:
+        draft.certificate["checks"] = [check for check in draft.certificate["checks"] if check["name"] != name]
+
+    return change
+
+
+def _check(which: str, /, **columns: Any) -> Change:
+    return lambda draft: draft.check(which).update(copy.deepcopy(columns))
+
+
+def _numbers(name: str, **numbers: Any) -> Change:
+    return lambda draft: draft.check(name)["numbers"].update(copy.deepcopy(numbers))
+
+
+def _settings(name: str, **settings: Any) -> Change:
+    return lambda draft: draft.check(name)["settings"].update(settings)
+
+
+def _certificate(**columns: Any) -> Change:
+    return lambda draft: draft.certificate.update(columns)
+
+
+def _drop_number(name: str, which: int = 0) -> Change:
+    def change(draft: Draft) -> None:
+        numbers = draft.check(name)["numbers"]
+        del numbers[sorted(numbers)[which]]
+
+    return change
+
+
+def _first_number(name: str, **numbers: Any) -> Change:
+    def change(draft: Draft) -> None:
+        found = draft.check(name)["numbers"]
+        found[sorted(found)[0]].update(numbers)
+
+    return change
+
+
+def _swapped(draft: Draft) -> None:
+    checks = draft.certificate["checks"]
+    checks[4], checks[5] = checks[5], checks[4]
+
+
+def _doubled(draft: Draft) -> None:
+    draft.certificate["checks"].append(copy.deepcopy(draft.certificate["checks"][3]))
+
+
+def _invented(draft: Draft) -> None:
+    draft.certificate["checks"].append(
+        {"name": "peer_reviewed", "passed": True, "reason": "", "settings": {}, "numbers": {}}
+    )
+
+
+def _all_certify(**settings: Any) -> Change:
+    """The manifest's settings, and nothing else, say something better."""
+    return lambda draft: draft.config["certify"].update(settings)
+
+
+def _tighter_rest(draft: Draft) -> None:
+    """Limits of one's own that the scenario does not keep, and numbers that would."""
+    draft.config["certify"]["rest"]["drift"] = 1e-8
+    for row in draft.rows:
+        rest = next(check for check in row["certificate"]["checks"] if check["name"] == "rest")
+        rest["settings"]["drift"], rest["numbers"]["drift"] = 1e-8, 5e-9
+
+
+def _tighter_overlap(draft: Draft) -> None:
+    draft.config["certify"]["overlap"] = 1e-20
+    for row in draft.rows:
+        overlap = next(check for check in row["certificate"]["checks"] if check["name"] == "overlap")
+        overlap["settings"]["overlap"], overlap["numbers"]["deepest"] = 1e-20, 0.0
+
+
+def _promoted(draft: Draft) -> None:
+    """A scenario that failed a check stands among the certified ones, every check edited to passed."""
+    row, sound = copy.deepcopy(draft.rejected[0]), copy.deepcopy(draft.row["certificate"]["checks"])
+    for mine, theirs in zip(row["certificate"]["checks"], sound, strict=True):
+        if not mine["passed"]:
+            mine.update(passed=True, reason="", settings=theirs["settings"], numbers=theirs["numbers"])
+    row["certificate"].update(verdict="certified", reason="")
+    draft.rows, draft.rejected = [row, *draft.rows], []
+    draft.timed(len(row["witness"]), draft.check("solved")["numbers"]["seconds"])
+    counts = dict.fromkeys(draft.manifest["funnel"], 2)
+    draft.manifest.update(n=2, indices=2, first_draws=2, reasons={}, funnel=counts)
+    draft.config["keep"] = []
+
+
+CHECKS: dict[str, tuple[str, Change]] = {
+    "one_check_listed": (r"checks|complete", _only("witness")),
+    "no_check_listed": (r"checks|complete|settle", _only()),
+    "idle_not_listed": (r"checks|complete", _without("idle")),
+    "shortcuts_not_listed": (r"checks|complete", _without("shortcuts")),
+    "checks_exchanged": (r"checks|complete|order", _swapped),
+    "check_twice": (r"checks|complete", _doubled),
+    "check_invented": (r"checks|complete", _invented),
+    "check_renamed": (r"checks|complete", _check("robust", name="sturdy")),
+    "check_failed": (r"complete|robust|passed", _check("robust", passed=False, reason="0 of 4 jittered runs succeed")),
+    "check_skipped": (r"complete|idle|passed", _check("idle", passed=None, reason="not asked for")),
+    "passed_with_a_reason": (r"reason|robust", _check("robust", reason="2 of 4 jittered runs succeed")),
+    "verdict_refuted": (r"complete|verdict", _certificate(verdict="refuted")),
+    "verdict_proved": (r"complete|verdict", _certificate(verdict="proved")),
+    "verdict_with_a_reason": (r"reason|verdict|complete", _certificate(reason="robust: 1 of 4")),
+    "called_full": (r"settings|full", _certificate(settings="full")),
+    "called_full_everywhere": (
+        r"settings|full|runs|bound",
+        _both(
+            _certificate(settings="full"),
+            lambda d: d.rows[1]["certificate"].update(settings="full"),
+            _all_certify(name="full"),
+        ),
+    ),
+    "called_strict": (r"settings|strict", _both(_certificate(settings="strict"), _all_certify(name="strict"))),
+    "manifest_asks_for_more": (
+        r"settings|runs|robust",
+        lambda d: d.config["certify"]["robust"].update(runs=14, bound=0.8),
+    ),
+    "rest_was_lenient": (r"settings|rest", _settings("rest", drift=0.5)),
+    "rest_was_short": (r"settings|rest", _settings("rest", seconds=0.1)),
+    "overlap_was_lenient": (r"settings|overlap", _settings("overlap", overlap=0.02)),
+    "jitter_was_small": (r"settings|robust", _settings("robust", position=0.0, noise=0.0)),
+    "bound_was_low": (r"settings|robust|bound", _settings("robust", bound=0.01)),
+    "runs_were_few": (r"settings|robust|runs", _settings("robust", runs=1)),
+    "settle_was_short": (r"settle|settings", _settings("witness", settle=0.01)),
+    "idle_was_short": (r"settings|idle|horizon", _settings("idle", horizon=0.1)),
+    "solved_had_longer": (r"settings|solved|horizon", _settings("solved", horizon=120.0)),
+    "settings_added": (r"settings", _settings("rest", patience=3)),
+    "overlap_beyond_its_limit": (r"overlap", _numbers("overlap", deepest=0.004)),
+    "rest_beyond_its_limit": (r"rest|drift", _numbers("rest", drift=0.02)),
+    "turn_beyond_its_limit": (r"rest|turn", _numbers("rest", turn=3.0)),
+    "drift_is_nan": (r"rest|drift|finite|NaN|JSON|canonical", _numbers("rest", drift=float("nan"))),
+    "idle_reached_the_goal": (r"idle", _numbers("idle", outcome="success", reason="")),
+    "shortcut_reached_the_goal": (r"shortcut", _first_number("shortcuts", outcome="success", reason="")),
+    "shortcut_not_told": (r"shortcut", _drop_number("shortcuts")),
+    "ablation_reached_the_goal": (r"ablation", _first_number("ablations", outcome="success", reason="")),
+    "ablation_not_told": (r"ablation", _drop_number("ablations")),
+    "robust_one_of_four": (r"robust|bound", _numbers("robust", solved=1)),
+    "robust_bound_too_good": (r"robust|bound", _numbers("robust", bound=0.99)),
+    "robust_more_runs": (r"robust|runs", _numbers("robust", runs=100, solved=100, bound=0.97)),
+    "robust_failures_and_none": (r"robust|failures", _numbers("robust", failures=["run 0: dropped", "run 2: dropped"])),
+    "oracle_timed_out": (r"solved", _numbers("solved", outcome="timeout")),
+    "solved_after_the_horizon": (r"solved|horizon|seconds", _numbers("solved", seconds=99.0)),
+    "solved_sooner": (r"solved|witness|seconds", _numbers("solved", seconds=0.5)),
+    "witness_sooner": (r"witness|seconds", _numbers("witness", seconds=0.5)),
+    "witness_shorter": (r"witness|periods", _numbers("witness", periods=10)),
+    "numerics_flipped": (r"numerics", _numbers("numerics", half_time_step={"witness": "failure"})),
+    "numerics_half_told": (r"numerics", _drop_number("numerics")),
+    "features": (r"feasible|features", _drop_number("feasible")),
+    "feature_invented": (r"feasible|features", _numbers("feasible", gap_over_height=0.1)),
+    "counts": (r"compiles|bodies", _numbers("compiles", bodies=3)),
+}
+"""Refuted without simulating anything but the witness."""
+
+RECHECKED: dict[str, tuple[str, str, Change]] = {
+    "stiller_than_it_is": ("single_quick", r"rest|drift", _tighter_rest),
+    "overlaps_less": ("single_quick", r"overlap", _tighter_overlap),
+    "overlap_is_zero": ("select_id", r"overlap", _numbers("overlap", deepest=9e-4)),
+    "drifts_less": ("single_quick", r"rest|drift", _numbers("rest", drift=9e-4)),
+    "idle_fails_early": ("single_quick", r"idle", _numbers("idle", outcome="failure", seconds=0.3)),
+    "ablation_fails_early": ("single_quick", r"ablation", _first_number("ablations", outcome="failure", seconds=0.1)),
+    "tool_ablation_fails_early": ("tool_id", r"ablation", _first_number("ablations", outcome="unstable", seconds=0.1)),
+    "numerics_hold_by_oracle": (
+        "single_quick", r"numerics", _numbers("numerics", half_time_step={"witness": "timeout", "oracle": "success"})),
+}  # fmt: skip
+"""Refuted by repeating the checks that need no oracle."""
+
+CERTIFIED_AGAIN: dict[str, tuple[str, str, Change]] = {
+    "failed_check_edited": ("single_kept", r"robust", _promoted),
+    "shortcut_fails_early": ("single_quick", r"shortcut", _first_number("shortcuts", seconds=0.01, reason="gave up")),
+}
+"""Refuted by certifying again with the oracle, and by nothing less."""
+
+# --- witnesses --------------------------------------------------------------------------------------
+
+
+def _witness(change: Callable[[np.ndarray], np.ndarray], played: bool = True) -> Change:
+    """Other actions in the first scenario; the final state is right where they still reach the goal."""
+
+    def forge(draft: Draft) -> None:
+        actions = change(draft.row["witness"].copy())
+        draft.row["witness"] = actions
+        if played:
+            draft.played()
+            draft.row["witness"] = actions
+            draft.timed(len(actions), draft.check("witness")["numbers"]["seconds"])
+
+    return forge
+
+
+def _jerk(actions: np.ndarray) -> np.ndarray:
+    """In the settling time the arm is told to go from one extreme to the other in one period."""
+    actions[-20:, 2] = np.where(np.arange(20) % 2, 1.0, -1.0)
+    return actions
+
+
+def _beyond(actions: np.ndarray) -> np.ndarray:
+    actions[-10:, 2] = np.linspace(0.1, 1.5, 10)
+    return actions
+
+
+def _tail(actions: np.ndarray) -> np.ndarray:
+    """A hundred rows that nobody ever plays."""
+    return np.vstack([actions, np.tile(np.float32([0, 0, 0, 0, 0, 0, -1]), (100, 1))]).astype(np.float32)
+
+
+def _spoiled(value: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(actions: np.ndarray) -> np.ndarray:
+        actions[40, 1] = value
+        return actions
+
+    return change
+
+
+def _unfiltered(draft: Draft) -> None:
+    """The oracle without the filter of the interface: another, quicker robot."""
+    from scengen import config
+    from scengen.sim.world import World
+
+    row = draft.row
+    scenario = config.task(row["task"]).scenario(row["params"])
+    world = World.load(row["scene_xml"], row["embodiment"])
+    world.reset()
+    actions = []
+    for action in scenario.oracle(world):
+        actions.append(np.asarray(action, np.float32))
+        world.apply(actions[-1])
+        if scenario.success(world):
+            break
+    draft.played(np.array(actions, np.float32))
+
+
+def _of_the_second(draft: Draft) -> None:
+    draft.row["witness"] = draft.rows[1]["witness"].copy()
+
+
+WITNESS: dict[str, tuple[str, Change]] = {
+    "nothing": (r"witness", _witness(lambda a: a[:0], played=False)),
+    "half_of_it": (r"witness", _witness(lambda a: a[: len(a) // 3], played=False)),
+    "of_the_second": (r"witness", _of_the_second),
+    "mirrored": (r"witness", _witness(lambda a: a * np.float32([-1, -1, 1, 1, 1, 1, 1]), played=False)),
+    "nan": (r"witness|finite", _witness(_spoiled(float("nan")), played=False)),
+    "infinite": (r"witness|finite", _witness(_spoiled(float("inf")), played=False)),
+    "jerk": (r"witness|filter", _witness(_jerk)),
+    "beyond_one": (r"witness|filter", _witness(_beyond)),
+    "tail": (r"witness", _witness(_tail)),
+    "unfiltered_oracle": (r"witness|filter", _unfiltered),
+}
+
+QUICK = {
+    "one_check_listed", "check_failed", "called_full_everywhere", "settle_was_short", "rest_beyond_its_limit",
+    "robust_one_of_four", "ablation_not_told", "jerk", "tail", "half_of_it",
+}  # fmt: skip
+
+EVERY = ("idle_not_listed", "shortcut_not_told", "rest_was_lenient", "ablation_not_told")
+
+
+def _cases() -> list[Case]:
+    found = []
+    for name, (says, change) in CHECKS.items():
+        found.append(Case(f"single_quick__{name}", "single_quick", "reject", says, change, quick=name in QUICK))
+    for base in OTHERS:
+        for name in EVERY:
+            says, change = CHECKS[name]
+            found.append(Case(f"{base}__{name}", base, "reject", says, change))
+        found.append(Case(f"{base}__witness_half_of_it", base, "reject", *WITNESS["half_of_it"]))
+    for name, (says, change) in WITNESS.items():
+        found.append(Case(f"single_quick__witness_{name}", "single_quick", "reject", says, change, quick=name in QUICK))
+    for level, cases in (("recheck", RECHECKED), ("full", CERTIFIED_AGAIN)):
+        for name, (base, says, change) in cases.items():
+            quick = name == "stiller_than_it_is"
+            found.append(Case(f"{base}__{name}", base, "reject", says, change, level=level, quick=quick))
+    return found
+
+
+CASES = _cases()

@@ -1,0 +1,111 @@
+"""What the corpus is put to: scengen's own verification, and controls that must do badly.
+
+A checker is given the folder of a pool and a level, and returns an exit status: 0 sound, 1 refuted, 2 declined. It says
+why on standard output.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+Checker = Callable[[Path, str, tuple[str, ...]], int]
+SOUND, REFUTED, DECLINED = 0, 1, 2
+
+
+def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """`scengen verify`, as on the command line."""
+    from scengen import cli
+
+    return cli.run(["verify", f"pool={folder}", f"level={level}", *arguments])
+
+
+def robosuite(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """`scengen robosuite`, a second checker with another simulation loop and robosuite's own controller.
+
+    It judges what the witness does in the scene of the file, and nothing else.
+    """
+    from scengen import cli
+
+    return cli.run(["robosuite", f"pool={folder}", "limit=1"])
+
+
+def always(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """Accepts everything."""
+    return SOUND
+
+
+def parse(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """Accepts what can be read."""
+    try:
+        _rows(folder, json.loads((folder / "manifest.json").read_text()))
+    except Exception as error:  # whatever a parser has to say
+        return _no(repr(error))
+    return SOUND
+
+
+def hashes(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """Accepts what can be read and has the hashes that it says it has."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text())
+        for shard in manifest["shards"]:
+            if hashlib.sha256((folder / shard["file"]).read_bytes()).hexdigest() != shard["sha256"]:
+                return _no(f"{shard['file']} has another sha256")
+        for row in _rows(folder, manifest):
+            if hashlib.sha256(row["scene_xml"].encode()).hexdigest() != row["scene_sha256"]:
+                return _no(f"{row['id']}: the scene has another sha256")
+    except Exception as error:
+        return _no(repr(error))
+    return SOUND
+
+
+def replay(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+    """Accepts what has right hashes, belongs to its parameters and is solved by its witness, as the file says.
+
+    This was all that `scengen verify` did once. It believes every label, and the scene that stands in the file.
+    """
+    import numpy as np
+
+    from scengen import config
+    from scengen.sim.world import World
+    from scengen.validate.rollout import replay as play
+
+    if hashes(folder, level, arguments):
+        return REFUTED
+    try:
+        for row in _rows(folder, json.loads((folder / "manifest.json").read_text())):
+            scenario = config.task(row["task"]).scenario(json.loads(row["params"]))
+            certificate = row["certificate"]
+            settle = json.loads(certificate["checks"][-1]["settings"])["settle"]
+            if row["id"] != scenario.id or not all(check["passed"] for check in certificate["checks"]):
+                return _no("the id does not belong to the parameters, or a check has failed")
+            world = World.load(row["scene_xml"], row["embodiment"])
+            actions = np.array(row["witness"], np.float32).reshape(-1, 7)
+            if not play(scenario, world, actions, row["horizon"], settle).solved:
+                return _no("the witness fails")
+    except Exception as error:
+        return _no(repr(error))
+    return SOUND
+
+
+def _rows(folder: Path, manifest: dict) -> list[dict]:
+    import pyarrow.parquet as pq
+
+    rows = []
+    for shard in manifest["shards"]:
+        rows += pq.read_table(folder / shard["file"]).to_pylist()
+    for row in rows:
+        json.loads(row["params"])
+    return rows
+
+
+def _no(why: str) -> int:
+    print(" ".join(why.split())[:300])
+    return REFUTED
+
+
+CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)}
+CONTROLS = ("always", "parse", "hashes")
+"""Checkers that know nothing of the claims: if one of them does well, the corpus is too easy."""
+EASY = 0.30
+"""Soundness that no control may reach."""

@@ -1,0 +1,108 @@
+"""Make the pools that the corpus of the checker is forged from: `python tests/checker/make_base.py`.
+
+Each is made by the command line, as a user would, with one or two scenarios. All seven tasks are there, with training
+splits, axes, severities, composed splits, an axis of the command line's own, overridden ranges and settings, other
+samplers, and scenarios that were kept although they failed. Most have one jittered run instead of four, and so settings
+of their own: what the corpus tests does not depend on that, and they are made in seconds.
+
+Those of `KEPT` lie in the repository, so that the small corpus is there at once; they are made anew when a family changes
+what its scenarios are. The others are made when the whole corpus is, in two minutes, and stay until the code that their
+certificates depend on changes.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+BASE = Path(__file__).parent / "base"
+
+QUICKLY = ("certify.robust.runs=1", "certify.robust.bound=0.04")
+"""Settings that keep every check, with one jittered run."""
+EDGE = (
+    "+task.axes.edge={why: the gap is as wide as a falling tile is high, replace: {gap_ratio: [uniform, 1.80, 1.95]}}"
+)
+"""An axis on which the oracle of `domino_single` fails now and then."""
+HEAVY = "+task.axes.heavy={why: tiles weigh more than in training, replace: {tile: {mass: [uniform, 0.065, 0.075]}}}"
+
+POOLS: dict[str, tuple[str, ...]] = {
+    # at the known settings
+    "single_quick": ("task=domino_single", "n=2"),
+    "single_full": ("task=domino_single", "n=1", "certify=full"),
+    # splits
+    "single_axis": ("task=domino_single", "split=diagonal", "n=1", *QUICKLY),
+    "single_severity": ("task=domino_single", "split=wide_gaps@2", "n=1", *QUICKLY),
+    "single_composed": ("task=domino_single", "split=diagonal+wide_gaps@1", "n=1", *QUICKLY),
+    "single_composed_of_three": ("task=domino_single", "split=turned_slab+light_tiles+wide_gaps@3", "n=1", *QUICKLY),
+    # what a command line may change
+    "single_own_axis": ("task=domino_single", "split=heavy", "n=1", HEAVY, *QUICKLY),
+    "single_own_range": ("task=domino_single", "n=1", "task.id.gap_ratio=[uniform,0.7,1.0]", *QUICKLY),
+    "single_own_horizon": ("task=domino_single", "n=1", "task.horizon=9", *QUICKLY),
+    "single_own_instruction": ("task=domino_single", "n=1", "task.instruction='Knock it over.'", *QUICKLY),
+    "single_own_settings": ("task=domino_single", "n=1", "certify.rest.seconds=1", "certify.settle=0.5", *QUICKLY),
+    # samplers and runs
+    "single_sobol": ("task=domino_single", "n=1", "sampler=sobol", *QUICKLY),
+    "single_hypercube": ("task=domino_single", "n=1", "sampler=lhs:4", *QUICKLY),
+    "single_grid": ("task=domino_single", "n=1", "sampler=grid:2", "split=turned_slab", *QUICKLY),
+    "single_workers": ("task=domino_single", "n=2", "seed=9", "workers=2", *QUICKLY),
+    "single_kept": ("task=domino_single", "split=edge", "n=1", "keep=unknown,refuted", "certify=full", EDGE),
+    # the other tasks
+    "select_id": ("task=domino_select", "n=1", *QUICKLY),
+    "select_composed": ("task=domino_select", "split=diagonal+narrow_lanes@2", "n=1", *QUICKLY),
+    "galileo_id": ("task=galileo_ramp_drop", "n=1", *QUICKLY),
+    "galileo_severity": ("task=galileo_ramp_drop", "split=high_patch@2", "n=1", *QUICKLY),
+    "cage_id": ("task=ball_cage_escape", "n=1", *QUICKLY),
+    "cage_severity": ("task=ball_cage_escape", "split=low_stool@1", "n=1", *QUICKLY),
+    "seesaw_id": ("task=seesaw_balance", "n=1", *QUICKLY),
+    "seesaw_axis": ("task=seesaw_balance", "split=other_arm", "n=1", *QUICKLY),
+    "tool_id": ("task=tool_retrieve", "n=1", *QUICKLY),
+    "tool_composed": ("task=tool_retrieve", "split=long_handle@1+turned_hook@1", "n=1", *QUICKLY),
+    "packing_id": ("task=packing", "n=1", *QUICKLY),
+    "packing_axis": ("task=packing", "split=thin_heavy", "n=1", *QUICKLY),
+}
+"""Arguments of `scengen generate`, by the name of the pool."""
+
+
+KEPT = ("single_quick", "single_severity", "select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
+"""Those in the repository."""
+
+
+def found(name: str, others: Path) -> Path:
+    """The folder of a base pool, in the repository or among the others, which are made as they are needed."""
+    return (BASE if name in KEPT else others) / name
+
+
+def make(name: str, folder: Path) -> None:
+    """Make one pool.
+
+    Raises:
+        SystemExit: it could not be made; the text says why.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        made = Path(scratch, name)
+        command = [sys.executable, "-m", "scengen", "generate", *POOLS[name], f"pool={made}"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"{name}: {done.stderr.strip()}")
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(made, folder)
+
+
+def expired(folder: Path) -> bool:
+    """Whether a pool is not there, or its certificates rest on other code than there is now."""
+    from scengen import config
+    from scengen.validate.identity import source_sha256
+
+    path = folder / "manifest.json"
+    if not path.is_file():
+        return True
+    manifest = json.loads(path.read_text())
+    return manifest["source_sha256"] != source_sha256(config.task(manifest["config"]["task"]["name"]).family)
+
+
+if __name__ == "__main__":
+    for name in KEPT:
+        make(name, BASE / name)
+        print(f"{name}: {sum(path.stat().st_size for path in (BASE / name).iterdir()) // 1000} kB", flush=True)

@@ -1,0 +1,86 @@
+"""Make the corpus of pools that a checker must accept or refuse: `python tests/checker/make_corpus.py FOLDER`.
+
+A pool is made from a sound one by changing what it claims and writing every hash anew, so that nothing is false but the
+claim. What is expected of each stands beside it, in `corpus.json`.
+"""
+
+import json
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import accepted
+import certificates
+import hostile
+import labels
+import make_base
+import scenes
+from forgery import Case, Draft
+
+
+def cases() -> list[Case]:
+    """The whole corpus."""
+    found = []
+    for module in (accepted, scenes, labels, certificates, hostile):
+        found += [replace(case, kind=module.__name__) for case in module.CASES]
+    names = [case.name for case in found]
+    twice = {name for name in names if names.count(name) > 1}
+    assert not twice, f"two pools are called {twice}"
+    return found
+
+
+def write(chosen: Sequence[Case], folder: Path, others: Path) -> None:
+    """Write some pools of the corpus.
+
+    Args:
+        others: where those base pools are kept that do not lie in the repository; what is missing there is made.
+    """
+    folder.mkdir(parents=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        bases = Path(scratch)
+        for name in sorted({case.base for case in chosen}):
+            _base(name, others, bases / name)
+        for case in chosen:
+            case.make(bases, folder / case.name)
+    (folder / "corpus.json").write_text(json.dumps(list(map(_told, chosen)), indent=1) + "\n")
+
+
+def _base(name: str, others: Path, target: Path) -> None:
+    """Put a base pool in its place.
+
+    The pools of the repository say that they were made with the code of today: what is tested is the checker, and not
+    whether a family has changed in a way that matters. If it has, sound pools are refused, and `make_base.py` helps.
+    """
+    source = make_base.found(name, others)
+    if name not in make_base.KEPT and make_base.expired(source):
+        make_base.make(name, source)
+    if make_base.expired(source):
+        from scengen import config
+        from scengen.validate.identity import source_sha256
+
+        draft = Draft.of(source)
+        draft.everywhere(source_sha256=source_sha256(config.task(draft.task["name"]).family))
+        draft.write(target)
+    else:
+        shutil.copytree(source, target)
+
+
+def _told(case: Case) -> dict[str, object]:
+    return {name: getattr(case, name) for name in ("name", "kind", "base", "expect", "says", "level", "arguments")}
+
+
+def counts(chosen: Iterable[Case]) -> str:
+    """How many pools of each expectation there are."""
+    expected = [case.expect for case in chosen]
+    return ", ".join(f"{expected.count(what)} to {what}" for what in ("accept", "reject", "refuse"))
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1])
+    write(cases(), target, target.parent / "base")
+    print(f"{target}: {counts(cases())}")

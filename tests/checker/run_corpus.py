@@ -1,0 +1,283 @@
+"""Put checkers to the corpus: `python tests/checker/run_corpus.py [--quick] [--checker scengen ...] [--only REGEX]`.
+
+Every pool is checked in a child process with an empty working folder, which is ended when it takes too long. Whatever
+does not end with exit status 0, 1 or 2, in time, without a traceback, within its memory, without a file left behind or
+a process left running, is a crash of the checker and counts against it.
+"""
+
+import argparse
+import json
+import os
+import re
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import make_base
+from checkers import CHECKERS, CONTROLS, EASY
+from forgery import Case
+from make_corpus import cases, write
+
+LIMIT = 60.0
+"""How long a checker may take for one pool [s]; at level full, which certifies again, three times that."""
+MEMORY = 1500
+"""How much memory it may use [MB]."""
+VERDICTS = {0: "accept", 1: "reject", 2: "decline"}
+FOLDER = Path(__file__).parents[2] / "generated" / "checker"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a checker made of one pool."""
+
+    name: str
+    kind: str
+    expect: str
+    verdict: str
+    """`accept`, `reject`, `decline` or `crash`."""
+    why: str
+    """What a crash was; or what is wrong with the verdict or its reason; empty if all is well."""
+    text: str
+    """What the checker said."""
+    wall: float
+    cpu: float
+    """[s]"""
+    memory: float
+    """Largest memory of a process [MB]."""
+
+    @property
+    def right(self) -> bool:
+        """Whether the verdict is one of those that are expected."""
+        if self.expect == "refuse":
+            return self.verdict in ("reject", "decline")
+        return self.verdict == self.expect
+
+    @property
+    def noticed(self) -> bool:
+        """Of a pool that is not sound: whether it was kept out, for whatever reason."""
+        return self.verdict in ("reject", "decline")
+
+
+def attempt(case: Case, pool: Path, checker: str) -> Outcome:
+    """Let a checker judge one pool in a process of its own."""
+    before = _listing(pool)
+    with tempfile.TemporaryDirectory() as scratch:
+        here, told = Path(scratch, "here"), Path(scratch, "told")
+        here.mkdir()
+        start = time.monotonic()
+        child = os.fork()
+        if child == 0:
+            _judge(case, pool, checker, here, told)
+        limit = 3 * LIMIT if case.level == "full" or checker == "robosuite" else LIMIT
+        status, usage = _ended(child, start + limit)
+        wall = time.monotonic() - start
+        text = told.read_text(errors="replace") if told.exists() else ""
+        verdict, why = _verdict(status, text)
+        memory = usage.ru_maxrss / 1000 if usage else 0.0
+        if left := _survivors(child):
+            verdict, why = "crash", f"{len(left)} processes were left running"
+        elif files := sorted(path.name for path in here.iterdir()):
+            verdict, why = "crash", f"wrote {', '.join(files)}"
+        elif _listing(pool) != before:
+            verdict, why = "crash", "changed the pool"
+        elif memory > MEMORY:
+            verdict, why = "crash", f"used {memory:.0f} MB"
+        cpu = usage.ru_utime + usage.ru_stime if usage else wall
+    outcome = Outcome(case.name, case.kind, case.expect, verdict, why, text[:4000], wall, cpu, memory)
+    return outcome if why else _compared(outcome, case)
+
+
+def _compared(outcome: Outcome, case: Case) -> Outcome:
+    if not outcome.right:
+        return Outcome(**{**asdict(outcome), "why": f"{outcome.verdict} instead of {case.expect}"})
+    if not re.search(case.says, outcome.text, re.I | re.S):
+        return Outcome(**{**asdict(outcome), "why": f"does not say {case.says}"})
+    return outcome
+
+
+def _judge(case: Case, pool: Path, checker: str, here: Path, told: Path) -> None:
+    """In the child: never returns."""
+    status = 99
+    try:
+        os.setsid()
+        os.chdir(here)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        out = os.open(told, os.O_WRONLY | os.O_CREAT)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        sys.path[:0] = [str(here), str(pool)]  # as after `python -m`: who imports what a pool names, finds it
+        status = CHECKERS[checker](pool, case.level, case.arguments)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except BaseException:
+        os.write(2, traceback.format_exc().encode())
+    finally:
+        os._exit(status if isinstance(status, int) and 0 <= status < 99 else 99)
+
+
+def _ended(child: int, deadline: float) -> tuple[int | None, resource.struct_rusage | None]:
+    """Exit status and use of a child; None if it had to be ended."""
+    while True:
+        done, status, usage = os.wait4(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status), usage
+        if time.monotonic() > deadline:
+            os.killpg(child, signal.SIGKILL)
+            os.wait4(child, 0)
+            return None, None
+        time.sleep(0.005)
+
+
+def _verdict(status: int | None, text: str) -> tuple[str, str]:
+    if status is None:
+        return "crash", "did not end in time"
+    if "Traceback (most recent call last)" in text:
+        return "crash", text.strip().splitlines()[-1][:200]
+    if "\x1b" in text or "\x07" in text:
+        return "crash", "lets control characters through"
+    if status not in VERDICTS:
+        return "crash", f"ended with status {status}"
+    return VERDICTS[status], ""
+
+
+def _survivors(session: int) -> list[int]:
+    """Processes of a child's session that still run; they are ended."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                state, _, _, its = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
+            except OSError:
+                continue
+            if int(its) == session and state != "Z":
+                found.append(int(entry.name))
+                os.kill(int(entry.name), signal.SIGKILL)
+    return found
+
+
+def _listing(pool: Path) -> list[tuple[str, int, int]]:
+    return sorted((path.name, path.lstat().st_size, path.lstat().st_mtime_ns) for path in pool.iterdir())
+
+
+@dataclass(frozen=True)
+class Score:
+    """How well a checker did."""
+
+    checker: str
+    accepts: int
+    accepted: int
+    rejects: int
+    noticed: int
+    crashes: int
+    wrong: int
+    """Neither a crash nor a wrong acceptance, but another verdict or reason than expected."""
+    wall: float
+    cpu: float
+    memory: float
+
+    @classmethod
+    def of(cls, checker: str, outcomes: Sequence[Outcome]) -> "Score":
+        sound = [o for o in outcomes if o.expect == "accept"]
+        false = [o for o in outcomes if o.expect != "accept"]
+        return cls(
+            checker,
+            len(sound),
+            sum(o.verdict == "accept" for o in sound),
+            len(false),
+            sum(o.noticed for o in false),
+            sum(o.verdict == "crash" for o in outcomes),
+            sum(
+                bool(o.why) and o.verdict != "crash" and (o.noticed if o.expect != "accept" else o.right)
+                for o in outcomes
+            ),
+            sum(o.wall for o in outcomes),
+            sum(o.cpu for o in outcomes),
+            max((o.memory for o in outcomes), default=0.0),
+        )
+
+    @property
+    def soundness(self) -> float:
+        """Share of the pools that are not sound, and were refuted or declined."""
+        return self.noticed / max(1, self.rejects)
+
+    @property
+    def completeness(self) -> float:
+        """Share of the sound pools that were accepted."""
+        return self.accepted / max(1, self.accepts)
+
+    def __str__(self) -> str:
+        return (
+            f"{self.checker:<10}accepts {self.accepted} of {self.accepts}, refuses {self.noticed} of {self.rejects} "
+            f"({self.soundness:.0%}), crashes {self.crashes}, other reasons {self.wrong}, "
+            f"{self.cpu:.0f} s of processor time, at most {self.memory:.0f} MB"
+        )
+
+
+def put(checker: str, chosen: Iterable[Case], pools: Path, progress: Callable[[Outcome], None]) -> list[Outcome]:
+    """Let one checker judge some pools of the corpus, one after the other."""
+    outcomes = []
+    for case in chosen:
+        outcomes.append(attempt(case, pools / case.name, checker))
+        progress(outcomes[-1])
+    return outcomes
+
+
+def _tables(scores: Sequence[Score], outcomes: Sequence[Outcome]) -> Iterable[str]:
+    for kind in sorted({o.kind for o in outcomes}):
+        those = [o for o in outcomes if o.kind == kind]
+        good = sum(not o.why for o in those)
+        yield f"  {kind:<14}{good} of {len(those)} as expected"
+    for outcome in outcomes:
+        if outcome.why:
+            told = " ".join(outcome.text.split())[:160]
+            yield f"{outcome.verdict.upper():<8}{outcome.name}: {outcome.why}; it said: {told}"
+    yield from map(str, scores)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--checker", nargs="*", default=["scengen", *CONTROLS], choices=CHECKERS)
+    parser.add_argument("--quick", action="store_true", help="the small corpus, made from pools in the repository")
+    parser.add_argument("--only", default="", help="regular expression of names")
+    parser.add_argument("--json", type=Path, help="write every outcome to this file")
+    parser.add_argument("--pools", type=Path, default=FOLDER / "pools", help="where the corpus is written")
+    asked = parser.parse_args()
+    chosen = [c for c in cases() if (c.quick or not asked.quick) and re.search(asked.only, c.name)]
+    if "robosuite" in asked.checker and asked.checker != ["robosuite"]:
+        parser.error("robosuite judges accepted pools only; run it alone")
+    if asked.checker == ["robosuite"]:
+        chosen = [c for c in chosen if c.expect == "accept"]
+    shutil.rmtree(asked.pools, ignore_errors=True)
+    write(chosen, asked.pools, FOLDER / "base")
+    from scengen import cli  # imported once, here, and not in every child  # noqa: F401
+    from scengen.validate import verify  # noqa: F401
+
+    scores, results, judged = [], {}, []
+    for checker in asked.checker:
+        outcomes = put(checker, chosen, asked.pools, lambda o: None)
+        results[checker] = [asdict(o) for o in outcomes]
+        scores.append(Score.of(checker, outcomes))
+        judged = judged or outcomes
+    for line in _tables(scores, judged):
+        print(line)
+    if asked.json:
+        plain = [{**asdict(s), "soundness": s.soundness, "completeness": s.completeness} for s in scores]
+        asked.json.parent.mkdir(parents=True, exist_ok=True)
+        asked.json.write_text(json.dumps({"scores": plain, "outcomes": results}, indent=1) + "\n")
+    easy = [s.checker for s in scores if s.checker in CONTROLS and s.soundness >= EASY]
+    if easy:
+        print(f"the corpus is too easy: {', '.join(easy)} refuse {EASY:.0%} and more")
+    return int(bool(easy) or any(o.why for o in judged))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
