@@ -1,14 +1,21 @@
 """The command line: a verb, then Hydra overrides. `scengen generate task=domino_single split=diagonal n=100`."""
 
 import inspect
+import os
+import re
+import signal
 import sys
+import tempfile
+import threading
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
+from types import FrameType
+from typing import NoReturn
 
-from .commands import BAD_INPUT, INTERRUPTED, OK, out, say, warn
-from .config import conf_dir
-from .control import native
-from .errors import BadConfig, ScengenError, nearest
+from .errors import BadConfig, ForeignCode, ScengenError, cut, nearest
+
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
 VERBS = (
     "generate",
@@ -32,46 +39,135 @@ VERBS = (
     "bench",
 )
 
+GRACE = 1.5
+"""How long an interrupted command may take to put things in order before it is ended [s]."""
+LONGEST = 3000
+"""Letters of an error line: more than any list of known names takes."""
 
-def main() -> None:
+
+def main() -> NoReturn:
     """Run one verb and leave with its exit status."""
-    sys.exit(run(sys.argv[1:]))
+    signals = Signals()
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a name need not be Unicode
+    status = run(sys.argv[1:], signals)
+    sys.exit(signals.status if status == INTERRUPTED else status)
 
 
-def run(argv: Sequence[str]) -> int:
-    """Run one verb: 0 all well, 1 something did not hold, 2 bad input."""
-    native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
+class Signals:
+    """What Ctrl-C and SIGTERM do: the first ends the command in order, within `GRACE`, the second one at once."""
+
+    def __init__(self) -> None:
+        self.status = INTERRUPTED
+        self.working = False
+        """Whether the command has begun; before, while modules are imported, nothing has to be put in order."""
+        self._came = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._receive)
+
+    def _receive(self, number: int, frame: FrameType | None) -> None:
+        self.status = 128 + number
+        if self._came or not self.working:
+            self._end()
+        self._came = True
+        timer = threading.Timer(GRACE, self._end)
+        timer.daemon = True
+        timer.start()
+        raise KeyboardInterrupt
+
+    def _end(self) -> NoReturn:
+        """Leave without a further step of Python's; workers notice it and end as well."""
+        if not (self._came and self.working):
+            _line("scengen: interrupted")
+        os._exit(self.status)
+
+
+def run(argv: Sequence[str], signals: Signals | None = None) -> int:
+    """Run one verb: 0 all well, 1 something did not hold, 2 bad input or a fault of the machine."""
     try:
-        if not argv or argv[0] in ("-h", "--help", "help"):
-            say(_help())
-            return OK
-        verb, *arguments = argv
-        if verb == "--version":
-            from .validate.identity import versions
-
-            say(" ".join(f"{k} {v}" for k, v in versions().items()))
-            return OK
-        if verb not in VERBS:
-            raise BadConfig(f"no command named {verb!r}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
-        if {"-h", "--help"} & set(arguments):
-            out.print(_settings(verb), highlight=False, markup=False, end="")
-            return OK
-        if flags := [a for a in arguments if a.startswith("-")]:
-            raise BadConfig(f"{flags[0]!r} is no option; settings are key=value, see scengen {verb} --help")
-        return import_module(f".commands.{verb}", __package__).command(arguments)
+        return _run(argv, signals)
     except ScengenError as error:
-        warn(f"scengen: {error}")
-        return BAD_INPUT
+        return _told(str(error), _kept(error) if isinstance(error, ForeignCode) else "")
     except KeyboardInterrupt:
-        warn("scengen: interrupted; what is finished is kept, the same command continues")
+        _line("scengen: interrupted; what is finished is kept, the same command continues")
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return OK
+    except MemoryError as error:
+        return _told("the memory is used up; ask for less at once, or use fewer workers", _kept(error))
+    except OSError as error:
+        from .targets import remedy
+
+        if told := remedy(error):
+            return _told(f"{cut(str(error.filename or 'a file'))}: {told}")
+        return _unforeseen(error)
+    except Exception as error:
+        return _unforeseen(error)
+
+
+def _run(argv: Sequence[str], signals: Signals | None) -> int:
+    from .commands import out, say
+    from .control import native
+
+    native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
+    if not argv or argv[0] in ("-h", "--help", "help"):
+        out.print(_help())
+        return OK
+    verb, *arguments = argv
+    if verb == "--version":
+        from .validate.identity import versions
+
+        say(" ".join(f"{k} {v}" for k, v in versions().items()))
+        return OK
+    if verb not in VERBS:
+        raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
+    if {"-h", "--help"} & set(arguments):
+        out.print(_settings(verb), end="")
+        return OK
+    if flags := [a for a in arguments if a.startswith("-")]:
+        raise BadConfig(f"{cut(repr(flags[0]))} is no option; settings are key=value, see scengen {verb} --help")
+    command = import_module(f".commands.{verb}", __package__).command
+    if signals:
+        signals.working = True
+    return command(arguments)
+
+
+def _line(text: str) -> None:
+    """One line on standard error, whatever stands in the text."""
+    from .printed import printable
+
+    words = re.sub(r"\S{1000,}", lambda found: cut(found[0]), printable(text))
+    print(cut(words, LONGEST), file=sys.stderr, flush=True)
+
+
+def _told(text: str, file: str = "") -> int:
+    _line(f"scengen: {text}{f'; the traceback is in {file}' if file else ''}")
+    return BAD_INPUT
+
+
+def _unforeseen(error: Exception) -> int:
+    """The last net: whatever nobody thought of is one line too."""
+    what = cut(" ".join(str(error).split()))
+    return _told(f"unforeseen {type(error).__name__}: {what}; please report it", _kept(error) or "(no file: no room)")
+
+
+def _kept(error: BaseException) -> str:
+    """The file that a traceback was written to; empty if there is no room for one."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="scengen-", suffix=".txt", delete=False, errors="backslashreplace"
+        ) as file:
+            traceback.print_exception(error, file=file)
+            return file.name
+    except OSError:
+        return ""
 
 
 def _settings(verb: str) -> str:
     """The settings of a command as its file tells them, without what only Hydra reads."""
+    from .config import conf_dir
+
     lines = (conf_dir() / "command" / f"{verb}.yaml").read_text().splitlines(keepends=True)
     return "".join(line for line in lines if not line.startswith("# @package") and "optional /limits" not in line)
 

@@ -11,11 +11,12 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from .errors import BadConfig, UnknownName
+from .errors import BadConfig, UnknownName, cut
 from .samplers.task import Task, load
 from .validate.settings import CertifySettings
 
@@ -53,8 +54,9 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
     plain, choices = _composed(verb, overrides)
     settings = typed("", kind, _settings(verb, plain))
     found = load(choices["task"], plain["task"])
-    certify_settings = _settled(plain["certify"], found, choices["certify"])
-    return settings, found, typed("certify", CertifySettings, certify_settings)
+    certify_settings = typed("certify", CertifySettings, _settled(plain["certify"], found, choices["certify"]))
+    certify_settings.check()
+    return settings, found, certify_settings
 
 
 def chosen(verb: str, overrides: Sequence[str]) -> str | None:
@@ -82,12 +84,14 @@ def task(name: str, search: Sequence[str] = ()) -> Task:
     """The task of that name.
 
     Args:
-        name: of its file.
+        name: of its file, a plain word: it never leads out of the folders of tasks.
         search: further overrides, such as folders of other packages (`search_path`) or `task.horizon=20`.
 
     Raises:
         UnknownName: there is no such file.
     """
+    if name not in (known := tasks(search_path(search))):  # a name from a pool must not leave the folders of task files
+        raise UnknownName("task", name, known)
     plain, choices = _composed("one_task", [f"task={name}", *search])
     return load(choices["task"], plain["task"])
 
@@ -114,7 +118,7 @@ def typed(where: str, cls: type[T], node: Mapping[str, Any]) -> T:
 def _value(where: str, kind: Any, value: Any) -> Any:
     if is_dataclass(kind):
         if not isinstance(value, (Mapping, kind)):  # type: ignore[arg-type]
-            raise BadConfig(f"{where} = {value!r}; it must be a group of settings")
+            raise BadConfig(f"{where} = {cut(repr(value))}; it must be a group of settings")
         return value if isinstance(value, kind) else typed(where, kind, value)  # type: ignore[arg-type]
     spelled = {int: "a whole number", float: "a number", str: "a word", bool: "true or false"}
     options = kind.__args__ if hasattr(kind, "__args__") and not hasattr(kind, "__origin__") else (kind,)
@@ -127,9 +131,12 @@ def _value(where: str, kind: Any, value: Any) -> Any:
     for option in options:
         plain = getattr(option, "__origin__", option)
         if isinstance(value, plain) and not (isinstance(value, bool) and plain is not bool):
-            return value
-    wanted = " or ".join(spelled.get(o, "a list") for o in options if o is not type(None))
-    raise BadConfig(f"{where} = {value!r}; it must be {wanted}")
+            if plain is list:
+                return [_value(f"{where}[{i}]", option.__args__[0], each) for i, each in enumerate(value)]
+            if plain is not str or "\0" not in value:
+                return value
+    wanted = " or ".join(spelled.get(o, "a list of words") for o in options if o is not type(None))
+    raise BadConfig(f"{where} = {cut(repr(value))}; it must be {wanted}")
 
 
 def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
@@ -137,15 +144,74 @@ def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         try:
             asked = [_listed(o) for o in overrides]
+            for override in asked:
+                _check_override(verb, override)
             node = compose(f"command/{verb}", overrides=asked, return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
             del node["hydra"]
-            return OmegaConf.to_container(node, resolve=True), choices  # type: ignore[return-value]
+            plain = OmegaConf.to_container(node, resolve=True)
+            return plain, choices  # type: ignore[return-value]
         except (HydraException, OmegaConfBaseException) as error:
             raise _explain(verb, overrides, error) from None
         except yaml.YAMLError as error:
-            raise BadConfig(f"a configuration file is no YAML: {' '.join(str(error).split())}") from None
+            raise BadConfig(f"a configuration file is no YAML: {_first_lines(str(error))}; correct it") from None
+        except (ValueError, TypeError, AssertionError, RecursionError) as error:  # Hydra checks little of what it gets
+            raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
+
+
+DEEPEST = 20
+"""How deeply lists and groups may be nested in an override: more than any file of conf/ needs."""
+
+
+def _check_override(verb: str, text: str) -> None:
+    """Refuse what Hydra takes for something that scengen does not do, or what it cannot digest.
+
+    Raises:
+        BadConfig: one line with the remedy.
+    """
+    told = cut(repr(text))
+    if _depth(text) > DEEPEST:
+        raise BadConfig(f"{told} is nested too deeply; quote it if the brackets are part of a name")
+    override = _parsed(text)
+    if override is None or not override.key_or_group:
+        raise BadConfig(f"{told} is no override; expected key=value, quoted if the value holds spaces or commas")
+    key = override.key_or_group
+    if override.package is not None:
+        raise BadConfig(f"{told}: settings have no package after @; see scengen {verb} --help")
+    if override.is_sweep_override():
+        raise BadConfig(f"{told} names several values; give one, or quote what is meant as a word: {key}='...'")
+    if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
+        raise BadConfig(f"{told}: of Hydra's own settings only hydra.searchpath=[file:///folder] can be given")
+    if override.is_delete() and "." not in key:
+        raise BadConfig(f"{told}: {key} cannot be deleted; leave it out for its default, or give another value")
+    if key == "hydra.searchpath":
+        folders = override.value()
+        for folder in folders if isinstance(folders, list) else [folders]:
+            if not re.match(r"(file|pkg)://.", str(folder)):
+                raise BadConfig(f"{told}: a folder of configuration is given as file:///folder or pkg://package")
+    if key in ("task", "certify") and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
+        names = _groups(verb)
+        if key in names:
+            raise BadConfig(f"{told}: expected the name of a file of conf/{key} without .yaml; see scengen tasks")
+    if key in ("task", "certify") and override.value() is None:
+        raise BadConfig(f"{told}: leave it out, or name a file of conf/{key}")
+
+
+def _parsed(text: str) -> Override | None:
+    try:
+        return OverridesParser.create().parse_overrides([text])[0]
+    except (HydraException, RecursionError, ValueError, TypeError):  # numbers of 5000 digits are a ValueError
+        return None
+
+
+def _depth(text: str) -> int:
+    """How deeply brackets are nested, quoted ones included."""
+    deepest = depth = 0
+    for letter in text:
+        depth += (letter in "[{(") - (letter in "]})")
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
@@ -160,7 +226,7 @@ def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
 def _listed(override: str) -> str:
     """`keep=refuted,unknown`, `pool=a,b` and `cameras=a,b` mean lists here, not sweeps; `keep` always is one."""
     key, _, value = override.partition("=")
-    many = key == "keep" or (key in ("pool", "cameras") and "," in value)
+    many = key == "keep" or (key in ("pool", "cameras") and "," in value and value[:1] not in ("'", '"'))
     return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 
@@ -193,14 +259,10 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
         return BadConfig(f"which {match[1]}? say {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
         return _unknown_key(verb, overrides, match[1]) or BadConfig(_first_lines(text))
-    for override in overrides:
-        try:
-            OverridesParser.create().parse_overrides([override])
-        except HydraException:
-            return BadConfig(
-                f"{override!r} is no override; expected key=value, quoted if the value holds spaces or commas"
-            )
-    return BadConfig(_first_lines(text))
+    if isinstance(error, OmegaConfBaseException):
+        what = f"{error.full_key}: " if error.full_key else ""
+        return BadConfig(f"{what}{_first_lines(text.splitlines()[0])}; give the value itself")
+    return BadConfig(f"{_first_lines(text)}; see scengen {verb} --help")
 
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | None:

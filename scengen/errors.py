@@ -24,7 +24,8 @@ class UnknownName(ScengenError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
         names = sorted(known)
-        super().__init__(f"no {kind} named {name!r}{nearest(name, names)}; known: {', '.join(names) or '(none)'}")
+        close, told = nearest(name, names), ", ".join(names) or "(none)"
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {told}")
 
 
 class Infeasible(ScengenError):
@@ -55,15 +56,56 @@ class GaveUp(ScengenError):
     """A move did not reach its end condition in time."""
 
 
+class ForeignCode(ScengenError):
+    """Code that is not scengen's, such as a policy, raised an exception, which is the cause of this one."""
+
+
+SHOWN = 200
+"""How many letters of a value that somebody gave are repeated in an error."""
+
+
+def cut(text: str, most: int = SHOWN) -> str:
+    """The beginning of a text that may be long."""
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """The clause ` (did you mean 'x'?)`, or nothing when no known name is close."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6) if len(name) <= SHOWN else []
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
+MOST = {
+    "budget": 10_000_000,
+    "comparisons": 1_000_000,
+    "first": 1_000_000_000,
+    "fps": 100,  # control periods in a second
+    "frames": 200,  # a strip of them is a picture of some 100 000 pixels' width
+    "height": 4096,  # what OpenGL draws everywhere [pixels]
+    "images": 100_000,
+    "index": 1_000_000_000,
+    "limit": 1_000_000_000,
+    "n": 1_000_000,
+    "permutations": 1_000_000,
+    "repeats": 1000,
+    "rollouts": 1_000_000,
+    "rounds": 10_000,
+    "seed": 2**63 - 1,  # a column of a pool holds it
+    "seeds": 1_000_000,
+    "width": 4096,
+    "workers": 256,
+}
+"""Largest values of settings that count or measure something: far beyond use, and within what can be computed."""
+
+
 def at_least(settings: object, **lowest: float) -> None:
-    """Raise `BadConfig` for the first of the named settings that is less than its lowest value; None passes."""
+    """Raise `BadConfig` for the first of the named settings that is less than its lowest value, or beyond `MOST`.
+
+    None passes.
+    """
     for name, low in lowest.items():
         value = getattr(settings, name)
-        if value is not None and value < low:
-            raise BadConfig(f"{name} = {value}; it must be at least {low:g}")
+        if value is not None and not value >= low:
+            raise BadConfig(f"{name} = {cut(str(value))}; it must be at least {low:g}")
+        if value is not None and value > MOST[name]:
+            raise BadConfig(f"{name} = {cut(str(value))}; it must be at most {MOST[name]}")

@@ -16,6 +16,7 @@ from ..pool import Pool
 from ..runs.generate import STAGES
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..targets import write
 from .bias import Bias, Marginal, bias
 from .coverage import Evenness, evenness
 from .distance import CLOSE, Energy, Pair, energy, near_duplicates, per_parameter
@@ -86,8 +87,7 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
         remark=remark,
         close=CLOSE,
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
+    write(path, text)
     return remark
 
 

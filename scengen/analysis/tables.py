@@ -21,15 +21,15 @@ def bias_table(found: Bias, title: str) -> Table:
     table = Table("parameter", "KS", "energy", "p", "accepted by part of the range", "effective n", title=title)
     table.title_justify = "left"
     for m in found.marginals:
-        mark = "[red]" if m.name in found.flagged else ""
+        style = "red" if m.name in found.flagged else None
         rates = "  ".join(f"{c.rate:.0%}" for c in m.cells)
         lost = f", {m.lost:.0%} of the range lost" if m.lost else ""
-        table.add_row(
-            f"{mark}{m.name}", f"{m.ks:.2f}", f"{m.energy:.2f}", _chance(m.pvalue), rates, f"{m.effective:.1f}{lost}"
-        )
-    mark = "[red]" if "(joint)" in found.flagged else ""
+        numbers = (f"{m.ks:.2f}", f"{m.energy:.2f}", _chance(m.pvalue), rates, f"{m.effective:.1f}{lost}")
+        table.add_row(m.name, *numbers, style=style)
+    style = "red" if "(joint)" in found.flagged else None
     table.add_section()
-    table.add_row(f"{mark}all together", "", f"{found.joint.distance:.2f}", _chance(found.joint.pvalue), "", "")
+    joint = (f"{found.joint.distance:.2f}", _chance(found.joint.pvalue))
+    table.add_row("all together", "", *joint, "", "", style=style)
     return table
 
 

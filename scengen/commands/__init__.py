@@ -6,25 +6,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
-from ..errors import BadConfig
+from ..errors import BadConfig, cut
+from ..printed import PlainConsole, printable
+from ..targets import write as write  # for the commands
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-out = Console(width=None if sys.stdout.isatty() else 160)
-err = Console(stderr=True, soft_wrap=True)
+out = PlainConsole(width=None if sys.stdout.isatty() else 160)
+err = PlainConsole(stderr=True, soft_wrap=True)
 
 Arguments = Sequence[str]
 
 
 def say(text: str) -> None:
-    """Print a line as it is: no markup, no colours."""
-    out.print(text, highlight=False, markup=False)
+    """Print one line as it is: no markup, no colours, no control characters."""
+    out.print(printable(text))
 
 
 def warn(text: str, style: str = "red") -> None:
     """Print a line on standard error as it is."""
-    err.print(text, style=style, highlight=False, markup=False)
+    err.print(printable(text), style=style)
 
 
 def remark(text: str) -> None:
@@ -35,26 +35,15 @@ def remark(text: str) -> None:
 def one(pool: str | list[str]) -> str:
     """The only pool named, for a command that takes one."""
     if isinstance(pool, list):
-        raise BadConfig(f"pool = {','.join(map(str, pool))}; this command takes one pool")
+        raise BadConfig(f"pool = {cut(','.join(pool))}; this command takes one pool")
     return pool
 
 
 def several(pool: str | list[str]) -> list[str]:
     """The pools named, one or more."""
+    if not pool:
+        raise BadConfig("pool = ''; name the folder of a pool")
     return pool if isinstance(pool, list) else [pool]
-
-
-def write(path: Path, content: str | bytes) -> None:
-    """Write a file, its folder made if need be.
-
-    Raises:
-        BadConfig: it cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as error:
-        raise BadConfig(f"{path} cannot be written: {error.strerror}") from None
 
 
 def write_json(path: str, result: Any) -> None:

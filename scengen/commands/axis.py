@@ -7,6 +7,7 @@ from rich.table import Table
 from ..config import read_task
 from ..ood.card import Card, Settings, make
 from ..runs.progress import ProgressBar
+from ..targets import try_folder
 from . import OK, Arguments, err, out, remark, say
 
 
@@ -14,6 +15,7 @@ def command(arguments: Arguments) -> int:
     settings, task, certify_settings = read_task("axis", arguments, Settings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
+    try_folder(folder)
     with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from ..bench import bench
 from ..config import read
 from ..errors import at_least
+from ..targets import try_file
 from . import OK, Arguments, out, write_json
 
 
@@ -19,6 +20,7 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings = read("bench", arguments, Settings)
     at_least(settings, repeats=1)
+    try_file(settings.json)
     tables, result = bench(settings.repeats)
     for table in tables:
         out.print(table)

@@ -12,6 +12,7 @@ from ..analysis.tables import bias_table, map_table
 from ..config import read
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..targets import try_file
 from . import OK, Arguments, err, one, out, say, write_json
 
 
@@ -25,6 +26,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("bias", arguments, Settings)
+    try_file(settings.json)
     pool = Pool.open(one(settings.pool)).check()
     with ProgressBar(err, f"draw {pool.folder} again", pool.indices) as progress_bar:
         drawn = redrawn(pool, lambda done, total: progress_bar.show(done))

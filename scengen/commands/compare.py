@@ -12,10 +12,11 @@ from ..analysis.redraw import redrawn, scenarios_of, task_of
 from ..analysis.space import of_features
 from ..analysis.tables import pairs_table
 from ..config import read
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..targets import try_file
 from . import FAILED, OK, Arguments, out, say, several, write_json
 
 
@@ -31,12 +32,14 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("compare", arguments, Settings)
+    try_file(settings.json)
+    at_least(settings, permutations=1)
+    if not 0 < settings.within <= 1000:
+        raise BadConfig(f"within = {settings.within:g}; it must lie above 0 and at most at 1000 training widths")
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     task, names = task_of(pools[0]), {task_of(pool).name for pool in pools}
     if len(names) > 1:
         raise BadConfig(f"pool = {','.join(several(settings.pool))}; these are pools of {', '.join(sorted(names))}")
-    if settings.within <= 0 or settings.permutations < 1:
-        raise BadConfig(f"within = {settings.within:g}, permutations = {settings.permutations}; both must be positive")
     first, *others = ((pool, scenarios_of(task, pool)) for pool in pools)
     result = [_alone(task, *first, settings)]
     for pool, scenarios in others:

@@ -11,13 +11,16 @@ from . import OK, Arguments, err, out, say, write, write_json
 def command(arguments: Arguments) -> int:
     settings = read("evaluate", arguments, Settings)
     with ProgressBar(err, f"evaluate {settings.policy}", 1) as progress_bar:
-        episodes = evaluate(settings, progress_bar.of)
-    lines = table(episodes)
+        found = evaluate(settings, progress_bar.of)
+    lines = table(found.episodes)
     shown = Table("", "split", "ID", "OOD", "difference", title=f"{settings.policy}: success [%]", title_justify="left")
     for line in lines:
         shown.add_row(*cells(line))
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
+    if found.earlier:
+        what = "the pools, the settings and the policy are the same; fresh=true plays them anew"
+        say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl")
     return OK

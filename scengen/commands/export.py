@@ -7,6 +7,7 @@ from ..config import read
 from ..export.mjcf import export
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..targets import try_folder
 from . import OK, Arguments, err, one, say
 
 
@@ -22,6 +23,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("export", arguments, Settings)
+    try_folder(settings.to)
     pool = Pool.open(one(settings.pool)).check()
     rows = [pool.row(settings.id)] if settings.id else list(pool.rows(witness=False))
     with ProgressBar(err, f"export to {settings.to}", len(rows)) as progress_bar:

@@ -10,7 +10,11 @@ from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
+from ..targets import try_file
 from . import OK, Arguments, one, say, write
+
+STRIP = 100_000_000
+"""Largest size of a film strip [pixels]: it takes three bytes of memory for each, several times over."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,16 @@ class Settings:
         """Raise `BadConfig` for settings that make no sense."""
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; a film strip is a .png file, a video an .mp4 file")
-        at_least(self, frames=1, width=1, height=1)
+        at_least(self, frames=1, fps=1, width=1, height=1)
+        if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > STRIP:
+            size = f"{self.frames} frames of {self.width} x {self.height} pixels"
+            raise BadConfig(f"{size} are more than {STRIP / 1e6:g} million pixels; ask for fewer or smaller ones")
 
 
 def command(arguments: Arguments) -> int:
     settings = read("film", arguments, Settings)
     settings.check()
+    try_file(settings.to)
     row = Pool.open(one(settings.pool)).check().row(settings.id)
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     take = Take.witness(row, scenario)

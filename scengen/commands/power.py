@@ -6,6 +6,7 @@ from ..analysis.tables import power_table
 from ..config import read
 from ..errors import BadConfig
 from ..evaluate.power import PowerAnalysis, seeds_for
+from ..targets import try_file
 from . import OK, Arguments, out, say, write_json
 
 
@@ -31,6 +32,7 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(f"success = {settings.success:g}; it must lie above 0 and at most at 1")
     if settings.drop is not None and not 0 < settings.drop <= settings.success:
         raise BadConfig(f"drop = {settings.drop:g}; it must lie above 0 and at most at success = {settings.success:g}")
+    try_file(settings.json)
     asked = {k: v for k, v in asdict(settings).items() if k not in ("success", "drop", "json")}
     analysis = PowerAnalysis(**asked)
     smallest = analysis.smallest_drop(settings.success)

@@ -7,6 +7,7 @@ from ..analysis.overview import gather, page, plain
 from ..config import read
 from ..errors import BadConfig
 from ..pool import Pool
+from ..targets import try_file
 from . import OK, Arguments, remark, say, several, write_json
 
 
@@ -23,6 +24,8 @@ def command(arguments: Arguments) -> int:
     settings = read("report", arguments, Settings)
     if Path(settings.to).suffix != ".html":
         raise BadConfig(f"to = {settings.to}; a report is an .html file")
+    try_file(settings.to)
+    try_file(settings.json)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     overviews, contrasts = gather(pools)
     if missing := page(pools, overviews, contrasts, Path(settings.to)):

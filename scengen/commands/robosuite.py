@@ -9,6 +9,7 @@ from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..targets import try_file
 from . import FAILED, OK, Arguments, err, out, say, several, warn, write_json
 
 
@@ -32,6 +33,7 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings = read("robosuite", arguments, Settings)
     settings.check()
+    try_file(settings.json)
     pools = [Pool.open(folder) for folder in several(settings.pool)]
     total = sum(min(len(pool), settings.first or len(pool)) for pool in pools)
     if not total:

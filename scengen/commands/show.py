@@ -5,9 +5,10 @@ from pathlib import Path
 
 from .. import config
 from ..config import read, search_path
-from ..errors import BadConfig
+from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
 from ..pool import Pool
+from ..targets import try_file
 from . import OK, Arguments, out, remark, say, several, write
 
 
@@ -27,8 +28,10 @@ def command(arguments: Arguments) -> int:
     pools = [Pool.open(folder).check() for folder in folders]
     target = Path(settings.to) if settings.to else None
     if settings.id is None:
+        at_least(settings, images=0)
         if target and target.suffix != ".html":
             raise BadConfig(f"to = {target}; a contact sheet is an .html file (a single scenario, id=, gives a .png)")
+        try_file(target)
         for pool in pools:
             out.print(report.pool_table(pool))
             out.print(report.funnel_table(pool.funnel, pool.reasons))
@@ -36,12 +39,13 @@ def command(arguments: Arguments) -> int:
         if target and (missing := report.contact_sheet(pools, target, settings.images)):
             remark(f"{target} has no pictures: {missing}")
     else:
+        if target and target.suffix != ".png":
+            raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
+        try_file(target)
         row = pools[0].row(settings.id)
         for table in report.scenario_tables(row):
             out.print(table)
         if target:
-            if target.suffix != ".png":
-                raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
             scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
             write(target, render.encode(film.strip(film.Take.witness(row, scenario)), "png"))
     if target:

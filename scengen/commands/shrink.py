@@ -13,6 +13,7 @@ from ..params import Value, values, with_values
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..targets import try_file
 from ..validate.certify import certify
 from ..validate.settings import CertifySettings
 from . import OK, Arguments, err, out, say, write_json
@@ -32,6 +33,7 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings, task, certify_settings = read_task("shrink", arguments, Settings)
     at_least(settings, seed=0, index=0)
+    try_file(settings.json)
     scenario = _proposed(task, settings)
     failed = certify(scenario, task.horizon, certify_settings, task.embodiment).certificate.failed
     where = f"{task.name}/{settings.split}/{settings.index}"

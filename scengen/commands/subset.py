@@ -9,6 +9,7 @@ from ..analysis.space import of_parameters
 from ..config import read
 from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
+from ..targets import try_folder
 from . import OK, Arguments, one, say
 
 
@@ -24,10 +25,13 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings = read("subset", arguments, Settings)
     pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
+    if not target.name:
+        raise BadConfig(f"to = {settings.to}; name a folder of its own for the new pool")
     if not 1 <= settings.n <= len(pool):
         raise BadConfig(f"n = {settings.n}; it must lie in [1, {len(pool)}], the size of {pool.folder}")
     if (target / MANIFEST).exists():
         raise PoolError(f"{target} holds a pool already; choose another to=")
+    try_folder(target)
     task = task_of(pool)
     scenarios = scenarios_of(task, pool)
     space = of_parameters(task, list(scenarios.values()))

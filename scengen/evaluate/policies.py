@@ -4,9 +4,12 @@ A policy is whatever `factory(env)` returns, as long as it has the two methods o
 `module:factory` and called once in every process and for every task.
 """
 
+import hashlib
 import importlib
+import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..control.teleop import Filter
 from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
-from ..errors import BadConfig, GaveUp, UnknownName
+from ..errors import BadConfig, ForeignCode, GaveUp, ScengenError, UnknownName, cut
 from ..params import Value
 from ..pool import PoolRow
 from ..samplers.task import Task
@@ -72,6 +75,7 @@ class Oracle:
 
     def __init__(self, env: PoolEnv):
         self.env, self.filter = env, Filter()
+        self.identity = inspect.getsource(env.task.family)
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Begin the plan anew."""
@@ -145,7 +149,7 @@ def find(name: str, memory: Sequence[PoolRow] = ()) -> Factory:
     if name in BUILT_IN:
         return BUILT_IN[name]
     module, colon, factory = name.partition(":")
-    if not colon:
+    if not (colon and all(map(str.isidentifier, module.split(".")))):
         raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory"])
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
@@ -154,7 +158,75 @@ def find(name: str, memory: Sequence[PoolRow] = ()) -> Factory:
     except ModuleNotFoundError as error:
         if error.name and module.startswith(error.name):
             raise BadConfig(f"policy = {name}; there is no module {module!r} on the path or in this folder") from None
-        raise
+        raise _at_fault(name, "its module cannot be imported", error) from error
+    except Exception as error:
+        raise _at_fault(name, "its module cannot be imported", error) from error
     if not callable(found):
         raise BadConfig(f"policy = {name}; {module} has no function or class named {factory!r}")
     return found
+
+
+def made(name: str, factory: Factory, env: PoolEnv) -> Policy:
+    """What a factory returns.
+
+    Raises:
+        ForeignCode: it raises something.
+        BadConfig: it returns no policy.
+    """
+    with blamed(name, "its factory"):
+        policy = factory(env)
+    if missing := [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]:
+        what = f"returned {type(policy).__name__}, which has no method {' and no '.join(missing)}"
+        raise BadConfig(f"policy = {cut(name)}; its factory {what}; see the class Policy in scengen.evaluate.policies")
+    return policy
+
+
+@contextmanager
+def blamed(name: str, part: str) -> Iterator[None]:
+    """Tell a fault of a policy from one of scengen's.
+
+    Raises:
+        ForeignCode: something was raised that scengen does not raise on purpose.
+    """
+    try:
+        yield
+    except ScengenError:
+        raise
+    except Exception as error:
+        raise _at_fault(name, f"{part} fails", error) from error
+
+
+def identity(name: str, factory: Factory, policy: Policy) -> str:
+    """Hash of what a policy says it is (its attribute or method `identity`, or `version`), or else of its source.
+
+    The source of a policy is the file of its factory and those of its class and bases, each with all Python files of
+    its package. Weights in other files do not count: a policy that loads some says their version.
+    """
+    for attribute in ("identity", "version"):
+        if (said := getattr(policy, attribute, None)) is not None:
+            with blamed(name, f"its {attribute}"):
+                said = said() if callable(said) else said
+            return _sha(f"{attribute} {said!r}".encode())
+    files: set[Path] = set()
+    for code in (factory, *type(policy).__mro__):
+        module = sys.modules.get(getattr(code, "__module__", ""))
+        file = getattr(module, "__file__", None)
+        if module is None or file is None or module.__name__.partition(".")[0] in sys.stdlib_module_names:
+            continue
+        package, dot, _ = module.__name__.partition(".")
+        if module.__name__.startswith("scengen."):
+            files.add(Path(file))
+        elif dot and (top := getattr(sys.modules.get(package), "__file__", None)):
+            files.update(Path(top).parent.rglob("*.py"))
+        else:
+            files.add(Path(file))
+    return _sha("\n".join(_sha(path.read_bytes()) for path in sorted(files)).encode())
+
+
+def _sha(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _at_fault(name: str, what: str, error: Exception) -> ForeignCode:
+    told = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
+    return ForeignCode(f"policy = {cut(name)}; {what} ({told}); the fault is the policy's")

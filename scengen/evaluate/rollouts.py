@@ -20,7 +20,8 @@ from ..runs.log import Log
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, rate
-from .policies import REPLAY, Policy, find
+from ..targets import refused, try_folder
+from .policies import REPLAY, Policy, blamed, find, identity, made
 
 
 class BadPolicy(ScengenError):
@@ -40,6 +41,8 @@ class Settings:
     height: int = 256
     workers: int = 1
     to: str | None = None
+    version: str | None = None
+    fresh: bool = False
 
     @property
     def folders(self) -> list[str]:
@@ -81,8 +84,20 @@ class Line:
     """OOD minus ID."""
 
 
-def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Evaluation:
+    """What an evaluation came to."""
+
+    episodes: list[dict[str, Any]]
+    earlier: int
+    """How many of them an earlier run of the same command had played."""
+
+
+def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evaluation:
     """Run every rollout that is still to do and return all episodes.
+
+    Episodes are bound to the pools, the settings and the policy (see `policies.identity`): those of a policy that has
+    changed since are never mixed with new ones.
 
     Args:
         progress: told how many rollouts are done and how many there are.
@@ -91,22 +106,31 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> list[d
         ScengenError: a pool, a policy or a setting is not as it must be.
     """
     settings.check()
+    try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     about: dict[tuple[str, str], dict[str, Any]] = {}
     for pool in pools:
         about |= _chosen(pool, settings.seeds)
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
-    with Log(settings.folder / "episodes.jsonl", _identity(settings, pools)) as log:
+    path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings)
+    depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
+    if settings.workers > 1:
+        player = PolicyPlayer(settings)  # each worker makes its own policy
+    if settings.fresh:
+        _move_aside(path)
+    remedy = "say fresh=true to begin anew (they are moved aside), or choose another to="
+    with Log(path, depends, remedy) as log:
         todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
         done = len(wanted) - len(todo)
         progress(done, len(wanted))
-        for count, episode in enumerate(each(PolicyPlayer(settings), todo, settings.workers), done + 1):
+        for count, episode in enumerate(each(player, todo, settings.workers), done + 1):
             log.add({**about[episode["pool"], episode["scenario"]], **episode})
             progress(count, len(wanted))
-        return sorted(
+        episodes = sorted(
             (e for e in log.records if _id(e) in wanted),
             key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
         )
+        return Evaluation(episodes, done)
 
 
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[Line]:
@@ -188,8 +212,19 @@ def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
 
 def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     """What the outcome of a rollout depends on. More seeds or rollouts continue the same run."""
-    chosen = {name: getattr(settings, name) for name in ("policy", "observations", "width", "height")}
+    chosen = {name: getattr(settings, name) for name in ("policy", "version", "observations", "width", "height")}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
+
+
+def _move_aside(path: Path) -> None:
+    """Give the episodes of earlier runs another name; nothing is deleted."""
+    if not path.exists():
+        return
+    free = next(p for k in itertools.count(1) if not (p := path.with_name(f"{path.stem}-{k}{path.suffix}")).exists())
+    try:
+        path.rename(free)
+    except OSError as error:
+        raise refused(path, error) from None
 
 
 class PolicyPlayer:
@@ -206,14 +241,17 @@ class PolicyPlayer:
             BadPolicy: the policy gave something that is no action.
         """
         env, policy = self._prepared(which.task)
+        name, where = self.settings.policy, f"on scenario {which.scenario}"
         observation, info = env.reset(options={"scenario": which.scenario})
-        policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
+        with blamed(name, f"its reset {where}"):
+            policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
         over = False
         while not over:
-            action = np.asarray(policy.act(observation))
+            with blamed(name, f"its act {where}"):
+                action = np.asarray(policy.act(observation))
             try:
                 observation, _, terminated, truncated, info = env.step(action)
-            except ValueError as error:
+            except (ValueError, TypeError) as error:
                 raise BadPolicy(f"policy {self.settings.policy} on scenario {which.scenario}: {error}") from None
             over = terminated or truncated
         return {
@@ -225,6 +263,14 @@ class PolicyPlayer:
             "seconds": round(info["time"], 3),
         }
 
+    def identities(self, tasks: set[str]) -> dict[str, str]:
+        """What the policy is, by task: see `policies.identity`."""
+        return {task: self._identity(task) for task in sorted(tasks)}
+
+    def _identity(self, task: str) -> str:
+        _, policy = self._prepared(task)
+        return identity(self.settings.policy, find(self.settings.policy), policy)
+
     def _prepared(self, task: str) -> tuple[PoolEnv, Policy]:
         if self._running and self._running[0].task.name != task:
             self._running[0].close()
@@ -234,7 +280,7 @@ class PolicyPlayer:
             folders = [f for f in settings.folders if (task,) in Pool.open(f).columns("task")]
             env = PoolEnv(task, folders, settings.observations, width=settings.width, height=settings.height)
             memory = list(_training(folders)) if settings.policy == REPLAY else []
-            self._running = env, find(settings.policy, memory)(env)
+            self._running = env, made(settings.policy, find(settings.policy, memory), env)
         return self._running
 
 

@@ -24,6 +24,7 @@ from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
+from ..targets import try_folder
 from ..validate.identity import check_versions, versions
 from .cameras import calibration
 from .lerobot import DataSet, Feature
@@ -99,6 +100,7 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
         ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.
     """
     settings.check()
+    try_folder(settings.to)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     robot, count = _robot(pools), sum(map(len, pools))
     count = min(count, settings.n or count)

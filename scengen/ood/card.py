@@ -22,6 +22,7 @@ from ..samplers.split import ID
 from ..samplers.support import Support
 from ..samplers.task import Task
 from ..sim import scene_text
+from ..targets import write
 from ..validate.settings import CertifySettings
 from . import behaviour, boundary, features
 
@@ -127,7 +128,7 @@ def make(
         why_no_path,
         distance.energy(space.points(training), space.points(here)),
     )
-    (folder / "card.json").write_text(json.dumps(card.plain(), indent=1) + "\n")
+    write(folder / "card.json", json.dumps(card.plain(), indent=1) + "\n")
     return card, _page(task, card, made.pool, seed, folder / "card.html")
 
 
@@ -167,7 +168,7 @@ def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
         strips=strips,
         remark=remark,
     )
-    path.write_text(page)
+    write(path, page)
     return remark
 
 

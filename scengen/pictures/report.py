@@ -14,6 +14,7 @@ from ..runs.generate import STAGES, Summary
 from ..samplers.axis import spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task
+from ..targets import write
 from . import render
 
 
@@ -29,7 +30,7 @@ def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table
     if reasons:
         table.add_section()
         for reason, count in sorted(reasons.items(), key=lambda item: -item[1])[:8]:
-            table.add_row(f"[dim]{reason[:90]}[/]", "", str(count), "")
+            table.add_row(reason[:90], "", str(count), "", style="dim")
     return table
 
 
@@ -98,9 +99,7 @@ def task_tables(task: Task) -> list[Table]:
             relative = f" = {proof.relative:.2g} training widths" if proof.relative else ""
             gap = f"{proof.gap:.3g} {task.known[proof.parameter].unit}{relative}"
             goes = spell(axis.replace[proof.parameter])
-            axes.add_row(
-                name, proof.parameter, goes, gap, proof.kind, f"{axis.why} [dim]({axis.source or 'no source'})[/]"
-            )
+            axes.add_row(name, proof.parameter, goes, gap, proof.kind, f"{axis.why} ({axis.source or 'no source'})")
     params.title_justify = axes.title_justify = "left"
     return [params, axes]
 
@@ -124,8 +123,7 @@ def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
         sections.append((pool, cards))
     steps = ("proposed", *STAGES)
     page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page)
+    write(path, page)
     return remark
 
 

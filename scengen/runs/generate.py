@@ -12,11 +12,12 @@ from typing import Any
 
 from .. import pool
 from ..certificate import CHECKS, StoredCertificate
-from ..errors import BadConfig, Infeasible, at_least
+from ..errors import BadConfig, Infeasible, PoolError, at_least
 from ..parallel import each
 from ..params import values
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
+from ..targets import refused
 from ..validate.certify import Certified, certify
 from ..validate.identity import fingerprint, source_sha256, versions
 from ..validate.settings import CertifySettings
@@ -132,7 +133,11 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
     try:
         records = journal.records()
         _extend(job, settings, records, journal, progress)
-        return _finish(folder, identity, settings, records, journal)
+        try:
+            return _finish(folder, identity, settings, records, journal)
+        except OSError as error:
+            why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"
+            raise PoolError(why) from None
     finally:
         journal.close()
 

@@ -1,8 +1,10 @@
 """The memory of a run: what became of every index, kept safe against being killed at any moment."""
 
 import json
+import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,9 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..errors import PoolError
-from ..pool import PoolRow
+from ..pool import MANIFEST, PoolRow
+from ..targets import refused, try_folder
+from .log import different
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,16 @@ class Journal:
             identity: everything that the scenarios depend on.
 
         Raises:
-            PoolError: another run holds the pool, or a run with another identity was begun there.
+            ScengenError: the pool cannot be written, another run holds it, or one with another identity was begun.
         """
+        if not pool.name or pool.name == "..":
+            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with pool=")
+        try_folder(pool)
         self.folder = pool.with_name(pool.name + ".run")
+        self._path = self.folder / "journal.sqlite"
+        if (pool / MANIFEST).exists() and not self._path.exists():
+            raise PoolError(f"{pool} is finished and its run's journal is gone; choose another pool=")
+        new = not self.folder.exists()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._lock = FileLock(self.folder / "lock")
@@ -53,18 +64,19 @@ class Journal:
         except Timeout:
             raise PoolError(f"another run is writing {pool}; wait for it or choose another pool=") from None
         except OSError as error:
-            raise PoolError(f"{pool} cannot be written: {error.strerror}; choose another pool=") from None
+            raise refused(self.folder, error) from None
         try:
             self._open(pool, identity)
         except BaseException:
             self._lock.release()
+            if new:
+                shutil.rmtree(self.folder, ignore_errors=True)
             raise
 
     def _open(self, pool: Path, identity: Mapping[str, Any]) -> None:
-        path = self.folder / "journal.sqlite"
         text = json.dumps(identity, sort_keys=True)
-        try:
-            self._db = sqlite3.connect(path)
+        with self._told():
+            self._db = sqlite3.connect(self._path)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("CREATE TABLE IF NOT EXISTS run (identity TEXT)")
             self._db.execute(
@@ -72,29 +84,30 @@ class Journal:
                 " (idx INTEGER PRIMARY KEY, body TEXT, scene TEXT, actions BLOB, cpu REAL)"
             )
             begun = self._db.execute("SELECT identity FROM run").fetchone()
-        except sqlite3.DatabaseError:
-            raise PoolError(f"{path} is damaged; remove {self.folder} to begin again") from None
-        if begun is None:
-            if (pool / "manifest.json").exists():
-                raise PoolError(f"{pool} is finished and its run's journal is gone; choose another pool=")
-            with self._db:
-                self._db.execute("INSERT INTO run VALUES (?)", (text,))
-        elif begun[0] != text:
-            differs = ", ".join(_different(json.loads(begun[0]), dict(identity)))
+            before = json.loads(begun[0]) if begun else None
+            if before is None:
+                with self._db:
+                    self._db.execute("INSERT INTO run VALUES (?)", (text,))
+        if before is not None and begun[0] != text:
+            differs = ", ".join(different(before, dict(identity)))
             raise PoolError(
                 f"{pool} was begun with other settings ({differs}); choose another pool= or remove it and {self.folder}"
             )
 
     def records(self) -> dict[int, Record]:
         """All records so far by index, without their rows: those of a large run do not fit into memory."""
-        found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
-        return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu) for body, cpu in found)}
+        with self._told():
+            found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
+            return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu) for body, cpu in found)}
 
     def rows(self, indices: Iterable[int]) -> Iterator[PoolRow]:
         """The stored scenarios of these indices, one after the other."""
         for index in indices:
-            scene, actions = self._db.execute("SELECT scene, actions FROM record WHERE idx = ?", (index,)).fetchone()
-            yield PoolRow.of(json.loads(scene), np.frombuffer(actions, np.float32).reshape(-1, 7))
+            with self._told():
+                query = "SELECT scene, actions FROM record WHERE idx = ?"
+                scene, actions = self._db.execute(query, (index,)).fetchone()
+                row = PoolRow.of(json.loads(scene), np.frombuffer(actions, np.float32).reshape(-1, 7))
+            yield row
 
     def add(self, record: Record) -> None:
         """Store one record; once this returns it survives a kill."""
@@ -103,20 +116,45 @@ class Journal:
         if record.row is not None:
             scene = json.dumps(record.row.plain())
             actions = np.asarray(record.row.witness, np.float32).tobytes()
-        with self._db:
+        with self._told(), self._db:
             self._db.execute(
                 "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",
                 (record.index, json.dumps(body), scene, actions, record.cpu),
             )
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Tell a journal that is damaged from one that cannot be reached: only the former is worth nothing.
+
+        Raises:
+            PoolError: one line with the remedy.
+        """
+        try:
+            yield
+        except sqlite3.Error as error:
+            code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says where in SQLite
+            raise PoolError(f"{self._path} {_FAULT.get(code) or f'gives an error ({error}); {_KEPT}'}") from None
+        except (ValueError, TypeError, KeyError):
+            raise PoolError(f"{self._path} {_DAMAGED}") from None
 
     def close(self) -> None:
         self._db.close()
         self._lock.release()
 
 
-def _different(a: Any, b: Any, path: str = "") -> list[str]:
-    """Dotted names of the settings in which two configurations differ."""
-    if isinstance(a, dict) and isinstance(b, dict):
-        keys = sorted(a.keys() | b.keys())
-        return [d for k in keys for d in _different(a.get(k), b.get(k), f"{path}.{k}".strip("."))]
-    return [] if a == b else [path]
+_KEPT = "what is finished is kept, repeat the command to continue"
+_DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to begin again"
+_READ_ONLY = f"can only be read; make it and its folder writable, {_KEPT}"
+_IN_USE = f"is in use by another program; wait for that, {_KEPT}"
+_FAULT = {
+    sqlite3.SQLITE_FULL: f"cannot grow, the disk is full; make room, {_KEPT}",
+    sqlite3.SQLITE_IOERR: f"cannot be read or written, the disk is full or at fault; make room or mend it, {_KEPT}",
+    sqlite3.SQLITE_READONLY: _READ_ONLY,
+    sqlite3.SQLITE_PERM: _READ_ONLY,
+    sqlite3.SQLITE_CANTOPEN: f"cannot be opened; see that its folder is writable and the disk has room, {_KEPT}",
+    sqlite3.SQLITE_BUSY: _IN_USE,
+    sqlite3.SQLITE_LOCKED: _IN_USE,
+    sqlite3.SQLITE_CORRUPT: _DAMAGED,
+    sqlite3.SQLITE_NOTADB: _DAMAGED,
+}
+"""What is wrong with a journal and what helps, by SQLite's primary result code."""

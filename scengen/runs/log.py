@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -9,13 +10,19 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from ..errors import BadConfig
+from ..targets import refused
 
 
 class Log:
     """Plain records in `path`, after a first line that says what they depend on. One writer at a time."""
 
-    def __init__(self, path: Path, identity: Mapping[str, Any]):
-        self.path, self.identity = path, dict(identity)
+    def __init__(self, path: Path, identity: Mapping[str, Any], remedy: str = "choose another to="):
+        """
+        Args:
+            identity: what the records depend on; those of another identity are left alone.
+            remedy: what to do where such records are found.
+        """
+        self.path, self.identity, self.remedy = path, dict(identity), remedy
         self.records: list[dict[str, Any]] = []
         self._lock = FileLock(path.with_suffix(".lock"))
 
@@ -32,9 +39,12 @@ class Log:
         except Timeout:
             raise BadConfig(f"another run is writing {folder}; wait for it or choose another to=") from None
         except OSError as error:
-            raise BadConfig(f"{folder} cannot be written: {error.strerror}; choose another to=") from None
+            raise refused(folder, error) from None
         try:
             self._file = self._opened()
+        except OSError as error:
+            self._lock.release()
+            raise refused(self.path, error) from None
         except BaseException:
             self._lock.release()
             raise
@@ -43,25 +53,45 @@ class Log:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        with suppress(OSError):  # what a full disk did not take was told when it was added
+            self._file.close()
         self._lock.release()
 
     def add(self, record: dict[str, Any]) -> None:
         """Store one; once this returns it survives a kill."""
-        self._file.write(json.dumps(record) + "\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(record) + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise refused(self.path, error) from None
         self.records.append(record)
 
     def _opened(self) -> Any:
         """The file, ready for more; a line that a kill cut short is dropped."""
-        lines = self.path.read_text().splitlines(keepends=True) if self.path.exists() else []
+        content = self.path.read_bytes() if self.path.exists() else b""
+        size = content.rfind(b"\n") + 1
         try:
-            whole = [json.loads(line) for line in lines if line.endswith("\n")]
+            whole = [json.loads(line) for line in content[:size].splitlines()]
+            if not all(isinstance(record, dict) for record in whole):
+                raise ValueError("a record is no mapping")
         except ValueError:
-            raise BadConfig(f"{self.path} is damaged; remove it to begin again, or choose another to=") from None
+            why = "is damaged; move it aside (do not delete it) to begin again, or choose another to="
+            raise BadConfig(f"{self.path} {why}") from None
         if whole and whole[0] != self.identity:
-            raise BadConfig(f"{self.path.parent} holds results of other pools or settings; choose another to=")
+            names = ", ".join(different(whole[0], self.identity))
+            raise BadConfig(f"{self.path.parent} holds results of other pools or settings ({names}); {self.remedy}")
         self.records = whole[1:]
-        kept = [line for line in lines if line.endswith("\n")] or [json.dumps(self.identity) + "\n"]
-        self.path.write_text("".join(kept))
-        return open(self.path, "a")
+        file = open(self.path, "a")
+        file.truncate(size)
+        if not whole:
+            file.write(json.dumps(self.identity) + "\n")
+            file.flush()
+        return file
+
+
+def different(a: Any, b: Any, path: str = "") -> list[str]:
+    """Dotted names of the settings in which two configurations differ."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        keys = sorted(a.keys() | b.keys())
+        return [d for k in keys for d in different(a.get(k), b.get(k), f"{path}.{k}".strip("."))]
+    return [] if a == b else [path]

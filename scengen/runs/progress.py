@@ -3,8 +3,9 @@
 import time
 from types import TracebackType
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ..printed import PlainConsole, printable
 
 EVERY = 15.0
 """Seconds between two lines where there is no terminal."""
@@ -13,14 +14,15 @@ EVERY = 15.0
 class ProgressBar:
     """Shows how far some work has come."""
 
-    def __init__(self, console: Console, title: str, total: int):
+    def __init__(self, console: PlainConsole, title: str, total: int):
+        title = printable(title)
         self.console, self.title, self.total = console, title, total
         self._last, self._said = time.monotonic(), 0
         columns = (
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[note]}"),
+            TextColumn("{task.fields[note]}", markup=False),
         )
         self._progress = Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True)
         self._task = self._progress.add_task(title, total=total, note="")
@@ -48,4 +50,4 @@ class ProgressBar:
         due = time.monotonic() - self._last > EVERY or (done == self.total and self._said != done)
         if due and not self.console.is_terminal:
             self._last, self._said = time.monotonic(), done
-            self.console.print(f"{self.title}: {done} of {self.total} {note}".rstrip(), highlight=False)
+            self.console.print(f"{self.title}: {done} of {self.total} {note}".rstrip())

@@ -1,14 +1,14 @@
 """Task: a scenario family plus the distributions that we test it on. One file each in conf/task/."""
 
+import importlib
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from hydra.utils import get_class
-
-from ..errors import BadConfig, Infeasible, UnknownName, nearest
+from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
 from ..sim.world import EMBODIMENTS, JAW
@@ -253,13 +253,17 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     return task
 
 
-def _family(name: str, path: str) -> type[Scenario]:
+def _family(name: str, path: Any) -> type[Scenario]:
+    if not isinstance(path, str) or not re.fullmatch(r"\w+(\.\w+)+", path):
+        raise BadConfig(f"{name}.family = {cut(repr(path))}; expected package.module.Class")
+    module, _, inner = path.rpartition(".")
     try:
-        family = get_class(path)
+        family = getattr(importlib.import_module(module), inner)
     except Exception as error:
-        raise BadConfig(f"{name}.family = {path!r} cannot be imported: {' '.join(str(error).split())}") from None
-    if not issubclass(family, Scenario):
-        raise BadConfig(f"{name}.family = {path!r} is no Scenario")
+        why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
+        raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
+    if not (isinstance(family, type) and issubclass(family, Scenario)):
+        raise BadConfig(f"{name}.family = {cut(repr(path))} is no Scenario")
     return family
 
 

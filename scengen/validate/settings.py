@@ -1,6 +1,10 @@
 """Settings of a certificate: the numbers of conf/certify/*.yaml, with their types."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from ..errors import BadConfig, cut
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,42 @@ class CertifySettings:
     rest: Rest = field(default_factory=Rest)
     settle: float = 1.0
     robust: Robust = field(default_factory=Robust)
+
+    def check(self) -> None:
+        """Raise `BadConfig` for a number with which a check would mean nothing or never end."""
+        for name, value in _leaves(asdict(self)):
+            low, high, unit = BOUNDS[name]
+            if not low <= value <= high:
+                raise BadConfig(f"certify.{name} = {cut(str(value))}; it must lie in [{low:g}, {high:g}]{unit}")
+
+
+BOUNDS: dict[str, tuple[float, float, str]] = {
+    "overlap": (0.0, 0.01, " m"),
+    "rest.seconds": (0.1, 60.0, " s"),
+    "rest.drift": (0.0, 0.1, " m"),
+    "rest.turn": (0.0, 90.0, " deg"),
+    "settle": (0.01, 10.0, " s"),  # one control period at least
+    "robust.runs": (1, 1000, ""),
+    "robust.bound": (0.0, 1.0, ""),
+    "robust.position": (0.0, 0.1, " m"),
+    "robust.turn": (0.0, 180.0, " deg"),
+    "robust.mass": (0.0, 0.9, ""),  # relative: a body keeps a tenth of its mass
+    "robust.friction": (0.0, 0.9, ""),
+    "robust.noise": (0.0, 1.0, ""),  # the whole range of a channel on one side
+    "robust.latency": (0, 100, " control periods"),  # one second
+}
+"""Least and largest value of every setting, and its unit."""
+
+
+def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
+    """The numbers of nested settings by dotted name."""
+    found = []
+    for key, value in node.items():
+        if isinstance(value, Mapping):
+            found += _leaves(value, f"{prefix}{key}.")
+        elif f"{prefix}{key}" != "name":
+            found.append((f"{prefix}{key}", value))
+    return found
 
 
 QUICK = CertifySettings()

@@ -13,7 +13,7 @@ REFERENCE = str(helpers.REFERENCE)
 
 def run(folder, policy, **changes):
     said = {"pool": REFERENCE, "seeds": 3, "rollouts": 1, "to": str(folder), **changes}
-    return evaluate(Settings(policy=policy, **said), lambda *_: None)
+    return evaluate(Settings(policy=policy, **said), lambda *_: None).episodes
 
 
 def test_the_oracle_succeeds_and_idleness_fails(tmp_path):
