@@ -1,4 +1,4 @@
-"""False claims about the checks and the witness: settings, numbers and verdicts that the certificate does not bear out."""
+"""False claims about checks and witness: settings, numbers and verdicts that the certificate does not bear out."""
 
 import copy
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from forgery import Case, Draft
-from labels import Change, _both, _config
+from labels import Change, _both
 
 OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
 

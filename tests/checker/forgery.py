@@ -1,7 +1,7 @@
 """Pools that are changed and written again with right hashes, so that nothing is false but the claim.
 
-Pools are read and written with pyarrow and json alone: what is to be tested has no part in it. Only a forger who changes
-the physics asks scengen for the state in which the witness ends, as a forger would.
+Pools are read and written with pyarrow and json alone: what is to be tested has no part in it. Only who changes the
+physics asks scengen for the state in which the witness ends, as a forger would.
 """
 
 import copy

@@ -5,9 +5,9 @@ splits, axes, severities, composed splits, an axis of the command line's own, ov
 samplers, and scenarios that were kept although they failed. Most have one jittered run instead of four, and so settings
 of their own: what the corpus tests does not depend on that, and they are made in seconds.
 
-Those of `KEPT` lie in the repository, so that the small corpus is there at once; they are made anew when a family changes
-what its scenarios are. The others are made when the whole corpus is, in two minutes, and stay until the code that their
-certificates depend on changes.
+Those of `KEPT` lie in the repository, so that the small corpus is there at once; they are made anew when a family
+changes what its scenarios are. The others are made when the whole corpus is, in two minutes, and stay until the code
+that their certificates depend on changes.
 """
 
 import json

@@ -16,7 +16,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import accepted
 import certificates
-import hostile
+import hostile_data
+import hostile_files
 import labels
 import make_base
 import scenes
@@ -26,7 +27,7 @@ from forgery import Case, Draft
 def cases() -> list[Case]:
     """The whole corpus."""
     found = []
-    for module in (accepted, scenes, labels, certificates, hostile):
+    for module in (accepted, scenes, labels, certificates, hostile_data, hostile_files):
         found += [replace(case, kind=module.__name__) for case in module.CASES]
     names = [case.name for case in found]
     twice = {name for name in names if names.count(name) > 1}
