@@ -1,13 +1,16 @@
-"""Work in several processes: a bounded number of items in flight, results as they get ready."""
+"""Work in several processes, each of which can be ended: results as they get ready, limits on time and memory."""
 
+import ctypes
 import multiprocessing
-import multiprocessing.connection
 import os
+import pickle
+import resource
 import signal
-import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any, TypeVar
 
 from .control import native
@@ -16,65 +19,222 @@ from .errors import ScengenError
 A = TypeVar("A")
 B = TypeVar("B")
 
+PATIENCE = 1.0
+"""How long an idle worker that is told to end may take to do so before it is killed [s]."""
+
 
 class WorkerDied(ScengenError):
     """A worker process ended in the middle of its work."""
 
 
-def each(function: Callable[[A], B], items: Iterable[A], workers: int) -> Iterator[B]:
-    """Apply `function` to every item, in this process if there is one worker only.
+@dataclass(frozen=True)
+class Limits:
+    """What one item may take."""
 
-    Items are taken from the iterable only when a worker is about to be free, so that it may depend on the results
-    so far. Workers die with this process, whatever kills it.
+    seconds: float
+    """Wall-clock time [s]."""
+    megabytes: int
+    """Memory beyond what a worker has when it starts [MB]."""
+
+
+def each(
+    function: Callable[[A], B],
+    items: Iterable[A],
+    workers: int,
+    limits: Limits | None = None,
+    lost: Callable[[A, str], B] | None = None,
+) -> Iterator[B]:
+    """Apply `function` to every item; in this process if there is one worker only, and no limits are asked for.
+
+    Items are taken from the iterable only when a worker is free, so that it may depend on the results so far. Workers
+    die with this process, whatever kills it, and at once when the iteration is left early. One that has died is
+    replaced; what it worked on is tried once more, so that a process killed from outside changes no result.
 
     Args:
         function: can be pickled, like items and results. It is sent once to each worker: it may be large, and what it
             keeps between items stays in its process.
+        limits: of every item. Workers are then copies of this process, which start in milliseconds.
+        lost: makes the result of an item that has crashed its worker, or has reached a limit, from the reason.
 
     Raises:
-        WorkerDied: a worker crashed.
+        WorkerDied: a worker crashed, or reached a limit, and there is no `lost`.
     """
-    if workers == 1:
+    if workers == 1 and limits is None:
         yield from map(function, items)
         return
-    todo, flying = iter(items), set[Future[B]]()
-    executor = ProcessPoolExecutor(
-        workers, multiprocessing.get_context("spawn"), initializer=_prepare, initargs=(function,)
-    )
+    todo, crew = iter(items), [_Worker(function, limits) for _ in range(max(1, workers))]
+    more = True
     try:
         while True:
-            while len(flying) <= workers and (item := next(todo, None)) is not None:
-                flying.add(executor.submit(_apply, item))
-            if not flying:
+            for worker in crew:
+                if more and not worker.busy:
+                    item = next(todo, _NOTHING)
+                    more = item is not _NOTHING
+                    if more:
+                        worker.give(item)
+            busy = [worker for worker in crew if worker.busy]
+            if not busy:
                 return
-            for future in wait(flying, return_when=FIRST_COMPLETED).done:
-                flying.remove(future)
-                yield future.result()
-    except BrokenProcessPool:
-        raise WorkerDied("a worker process died; run again to continue, with workers=1 to see why") from None
+            patience = max(0.0, min(worker.deadline for worker in busy) - time.monotonic())
+            ready = wait([worker.connection for worker in busy], None if limits is None else patience)
+            for worker in busy:
+                found = worker.answer(worker.connection in ready)
+                if isinstance(found, _Lost):
+                    if lost is None:
+                        why = f"a worker process {found.reason}; run again to continue, with workers=1 to see why"
+                        raise WorkerDied(why)
+                    yield lost(found.item, found.reason)
+                elif found is not None:
+                    yield found[0]
     finally:
-        executor.shutdown(wait=True, cancel_futures=True)
+        for worker in crew:
+            worker.end()
 
 
-_function: Callable[[Any], Any]
-"""What this worker process applies to every item that it is sent."""
+_NOTHING: Any = object()
 
 
-def _prepare(function: Callable[[Any], Any]) -> None:
-    """Leave interrupts to the parent, and die with it."""
-    global _function
-    _function = function
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    native.silence()
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+@dataclass(frozen=True)
+class _Lost:
+    item: Any
+    reason: str
 
 
-def _apply(item: Any) -> Any:
-    return _function(item)
+class _Worker:
+    """One process that works on one item at a time."""
+
+    def __init__(self, function: Callable[[Any], Any], limits: Limits | None):
+        self._function, self._limits = function, limits
+        self._context = multiprocessing.get_context("spawn" if limits is None else "fork")
+        self._process: Any = None
+        self._item, self._tries, self.busy, self.deadline = None, 0, False, float("inf")
+        self.connection: Connection
+
+    def give(self, item: Any) -> None:
+        """Let it work on an item."""
+        self._item, self._tries, self.busy = item, 0, True
+        self._begin()
+
+    def answer(self, ready: bool) -> tuple[Any] | _Lost | None:
+        """Its result in a tuple, if it has one; None if it needs more time.
+
+        Raises:
+            Exception: what the function has raised.
+        """
+        if ready:
+            try:
+                kind, value = self.connection.recv()
+            except (EOFError, OSError):
+                return self._died()
+            self.busy = False
+            if kind == "result":
+                return (value,)
+            if kind == "lost":
+                return _Lost(self._item, value)
+            raise value
+        if time.monotonic() < self.deadline or self._limits is None:
+            return None
+        self._kill()
+        self.busy = False
+        return _Lost(self._item, f"took longer than {self._limits.seconds:g} s")
+
+    def end(self) -> None:
+        """End it, in the middle of its work if need be."""
+        if self._process is None:
+            return
+        if not self.busy:
+            self.connection.close()  # an idle worker reads the end of its orders and leaves
+            self._process.join(PATIENCE)
+        self._kill()
+
+    def _begin(self) -> None:
+        if self._process is None:
+            self.connection, theirs = self._context.Pipe()
+            arguments = (theirs, self._function, self._limits, os.getpid())
+            self._process = self._context.Process(target=_serve, args=arguments, daemon=True)
+            self._process.start()
+            theirs.close()
+        try:
+            self.connection.send(self._item)
+        except OSError:
+            pass  # it has died: the answer tells
+        self.deadline = time.monotonic() + (self._limits.seconds if self._limits else float("inf"))
+
+    def _died(self) -> _Lost | None:
+        self._process.join(PATIENCE)
+        code = self._process.exitcode
+        self._kill()
+        self._tries += 1
+        if self._limits is not None and self._tries == 1:
+            self._begin()
+            return None
+        self.busy = False
+        how = f"was ended by {signal.Signals(-code).name}" if code is not None and code < 0 else f"ended with {code}"
+        return _Lost(self._item, f"died: it {how}")
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self.connection.close()
+        self._process = None
 
 
-def _die_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        multiprocessing.connection.wait([parent.sentinel])
+def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | None, parent: int) -> None:
+    """What a worker process does: items in, results out, until the parent closes the connection or dies."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
         os._exit(1)
+    if limits is not None:
+        _close_all_but(orders.fileno())
+        _bound_memory(limits.megabytes)
+    native.silence()
+    while True:
+        try:
+            item = orders.recv()
+        except (EOFError, OSError):
+            os._exit(0)
+        orders.send_bytes(_reply(function, item, limits))
+
+
+def _reply(function: Callable[[Any], Any], item: Any, limits: Limits | None) -> bytes:
+    try:
+        return pickle.dumps(("result", function(item)))
+    except MemoryError as error:
+        if limits is not None:
+            return pickle.dumps(("lost", f"needs more than {limits.megabytes} MB"))
+        return _portable(error)
+    except Exception as error:
+        return _portable(error)
+
+
+def _portable(error: Exception) -> bytes:
+    """An exception as bytes; one that does not survive the way becomes one of the same meaning that does."""
+    try:
+        pickle.loads(written := pickle.dumps(("error", error)))
+        return written
+    except Exception:
+        kind = ScengenError if isinstance(error, ScengenError) else RuntimeError
+        return pickle.dumps(("error", kind(str(error))))
+
+
+_PR_SET_PDEATHSIG = 1
+"""Option of prctl: the signal that a process gets when its parent dies (linux/prctl.h)."""
+
+
+def _close_all_but(kept: int) -> None:
+    """Close the files that a copied process has from its parent: its locks, its journal, the ends of other pipes."""
+    for name in os.listdir("/proc/self/fd"):
+        if int(name) > 2 and int(name) != kept:
+            try:
+                os.close(int(name))
+            except OSError:
+                pass
+
+
+def _bound_memory(megabytes: int) -> None:
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    bound = pages * resource.getpagesize() + megabytes * 1_000_000
+    resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -1,0 +1,70 @@
+"""Workers end when they must, and what they worked on is named."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from scengen.errors import UnknownName
+from scengen.parallel import Limits, WorkerDied, each
+
+LIMITS = Limits(0.5, 200)
+
+
+def work(item):
+    if item == "hang":
+        time.sleep(60)
+    if item == "crash":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if item == "memory":
+        np.ones(100_000_000)
+    if item == "error":
+        raise UnknownName("letter", "x", "ab")
+    return item
+
+
+def lost(item, reason):
+    return f"{item} {reason}"
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_what_hangs_crashes_or_takes_all_memory_is_named_and_the_rest_goes_on(workers):
+    items = ["a", "hang", "b", "crash", "c", "memory", "d"]
+    assert sorted(each(work, items, workers, LIMITS, lost)) == [
+        "a", "b", "c", "crash died: it was ended by SIGSEGV", "d", "hang took longer than 0.5 s",
+        "memory needs more than 200 MB",
+    ]  # fmt: skip
+
+
+def test_without_limits_one_worker_is_this_process_and_two_are_others():
+    assert list(each(os.getpid().__add__, [0], 1)) == [os.getpid()]
+    assert sorted(each(abs, [-1, -2, -3], 2)) == [1, 2, 3]
+
+
+def test_an_error_comes_through_and_a_death_without_a_name_for_it_is_an_error():
+    with pytest.raises(Exception, match="no letter named 'x'"):
+        list(each(work, ["error"], 1, LIMITS))
+    with pytest.raises(WorkerDied, match="SIGSEGV"):
+        list(each(work, ["crash"], 1, LIMITS))
+
+
+def test_a_worker_killed_from_outside_changes_no_result(tmp_path):
+    mark = tmp_path / "mark"
+
+    def once(item):
+        if not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return item
+
+    assert list(each(once, [7], 1, LIMITS, lost)) == [7]
+
+
+def test_whoever_leaves_early_waits_for_nobody():
+    begun = time.monotonic()
+    results = each(work, ["a", *["hang"] * 4], 3, Limits(60, 200))
+    assert next(results) == "a"
+    results.close()
+    assert time.monotonic() - begun < 2
