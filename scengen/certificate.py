@@ -27,6 +27,17 @@ CHECKS: dict[str, Verdict] = {
 A failed check refutes the scenario where it shows, by itself, that the scenario is invalid: it cannot be, it does not
 stand still, it solves itself, or a shortcut solves it. Where only the oracle failed the verdict is unknown."""
 
+STAGES: dict[str, tuple[str, ...]] = {
+    "feasible": ("feasible",),
+    "compiled": ("compiles", "overlap"),
+    "rested": ("rest",),
+    "not trivial": ("unsolved", "idle", "shortcuts"),
+    "solved": ("solved",),
+    "robust": ("robust", "numerics", "ablations"),
+    "certified": ("witness",),
+}
+"""Steps of the funnel, and the checks that a scenario must pass to get through each."""
+
 
 @dataclass(frozen=True)
 class Check:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..certificate import STAGES
 from ..pictures import render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
 from ..pool import Pool
-from ..runs.generate import STAGES
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..targets import write

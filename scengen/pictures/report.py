@@ -9,8 +9,9 @@ from typing import Any
 import jinja2
 from rich.table import Table
 
+from ..certificate import STAGES
 from ..pool import Pool, PoolRow
-from ..runs.generate import STAGES, Summary
+from ..runs.generate import Summary
 from ..samplers.axis import spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task

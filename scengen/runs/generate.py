@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import pool
-from ..certificate import CHECKS, StoredCertificate
+from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
 from ..parallel import each
 from ..params import values
@@ -22,18 +22,6 @@ from ..validate.certify import Certified, certify
 from ..validate.identity import fingerprint, source_sha256, versions
 from ..validate.settings import CertifySettings
 from .journal import Journal, Record
-
-STAGES: dict[str, tuple[str, ...]] = {
-    "feasible": ("feasible",),
-    "compiled": ("compiles", "overlap"),
-    "rested": ("rest",),
-    "not trivial": ("unsolved", "idle", "shortcuts"),
-    "solved": ("solved",),
-    "robust": ("robust", "numerics", "ablations"),
-    "certified": ("witness",),
-}
-"""Steps of the funnel, and the checks that a scenario must pass to get through each."""
-
 
 @dataclass(frozen=True)
 class Settings:

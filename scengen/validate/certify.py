@@ -49,7 +49,7 @@ def certify(
         embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
         last: the check after which to stop, for those who want to know about it only; nothing is certified then.
     """
-    trial = _Trial(scenario, horizon, settings, embodiment)
+    trial = Trial(scenario, horizon, settings, embodiment)
     checks: list[Check] = []
     for name in CHECKS:
         if checks and (not checks[-1].passed or checks[-1].name == last):
@@ -67,8 +67,11 @@ def certify(
     )
 
 
-class _Trial:
-    """What the checks of one scenario share: its text, its world, its witness."""
+class Trial:
+    """What the checks of one scenario share: its text, its world, its witness.
+
+    Whoever has a witness already may set it, and run the checks that only replay it.
+    """
 
     def __init__(self, scenario: Scenario, horizon: float, settings: CertifySettings, embodiment: str):
         self.scenario, self.horizon, self.settings, self.embodiment = scenario, horizon, settings, embodiment
