@@ -42,6 +42,9 @@ ABOVE = 0.08
 """Height over the highest thing in question at which the hand travels [m]."""
 AIR = 0.015
 """Between a tool and the thing it is going to push [m]."""
+GONE, CATCH = 0.06, 0.05
+"""Distance from the hand of a body that has gone, and at which the hand begins to close on its way back [m]. On an
+incline of 25 deg it then comes to its turn in 0.15 s, which is what the fingers need."""
 DEEPEST = PALM_ABOVE - 0.004
 """How far the top of a thing may be above the grip site of a hand that takes it [m]."""
 
@@ -130,17 +133,15 @@ def _release(field: Field, macro: Macro) -> Plan:
 
 
 def _catch(field: Field, macro: Macro) -> Plan:
-    """Wait with the open hand until a body that went away is back between the fingers, and close."""
+    """Keep the hand open until a body that went away is coming back, then close it: fingers need time."""
     (longest,) = macro.numbers
     world, body = field.world, macro.target
-    end, gone = world.time + longest, False
-
-    def back() -> bool:
+    end, gone, last = world.time + longest, False, 0.0
+    while world.time < end:
         away = float(np.linalg.norm(world.com(body) - world.arm.hand))
-        return gone and away < 0.012
-
-    while world.time < end and not back():
-        gone = gone or float(np.linalg.norm(world.com(body) - world.arm.hand)) > 0.03
+        if gone and away < min(last, CATCH):
+            break
+        gone, last = gone or away > GONE, away
         yield np.append(np.zeros(6), OPEN)
     yield from grasp(world.arm)
 

@@ -1,0 +1,270 @@
+"""Weakened families: one clause of a goal, a failure or the constraints left out or made wide.
+
+Clauses are found in the source, so that mutants follow the families: every `if` of `failure`, every operand of
+`success`. Limits are constants of the modules. Values are scenarios that the constraints refute.
+"""
+
+import ast
+import inspect
+import math
+import sys
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+from unittest import mock
+
+from scengen import config
+from scengen.attack.campaign import Subject
+from scengen.attack.evidence import Hit
+from scengen.geometry import UP
+from scengen.scenario import Scenario
+from scengen.sim import scene_text
+from scengen.sim.world import ROBOT, World
+from scengen.validate.rollout import replay, run
+
+TASKS = (
+    "domino_single",
+    "domino_select",
+    "galileo_ramp_drop",
+    "ball_cage_escape",
+    "seesaw_balance",
+    "tool_retrieve",
+    "packing",
+)
+BLIND = ("shortcut", "prior_1", "prior_2", "prior_3", "random")
+"""Tiers that know nothing of the witness: their hits count where the scenario itself is wrong."""
+
+Change = Callable[[Scenario], Scenario]
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One task, weakened in one place."""
+
+    task: str
+    name: str
+    patch: Mapping[str, Any] = field(default_factory=dict)
+    """Attributes of the family that are replaced."""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """Constants of its module that are replaced."""
+    change: Change | None = None
+    """Makes of a scenario one that the constraints refute."""
+    mended: Mapping[str, Any] = field(default_factory=dict)
+    """Attributes of the family that is not weakened, where it differs from the one that there is."""
+
+    @contextmanager
+    def weakened(self) -> Iterator[None]:
+        """The family as it is attacked."""
+        with patched(self.task, self.patch, self.limits):
+            yield
+
+    def kills(self, hit: Hit, scenario: Scenario, scene_xml: str) -> bool:
+        """Whether a hit is one because of the weakness: the family as it should be refuses the same actions."""
+        if self.change is not None:
+            return hit.refutes or hit.tier in BLIND
+        task = config.task(self.task)
+        with strict(self):
+            world = World.load(scene_xml, task.embodiment)
+            return not replay(scenario, world, hit.actions, task.horizon, until_settled=True).solved
+
+    def subjects(self, n: int, seed: int = 0) -> list[Subject]:
+        """The first scenarios of training, changed as they must be, that the oracle solves."""
+        task, found = config.task(self.task), list[Subject]()
+        for index in range(4 * n):
+            with strict(self):
+                scenario = task.draw("id", seed, index).scenario
+            scenario = self.change(scenario) if self.change else scenario
+            text, _ = scene_text.emit(scenario.build())
+            rollout = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
+            if rollout.solved:
+                found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions))
+            if len(found) == n:
+                break
+        return found
+
+
+@contextmanager
+def patched(task: str, patch: Mapping[str, Any], limits: Mapping[str, float]) -> Iterator[None]:
+    """A family with attributes and constants replaced."""
+    family = config.task(task).family
+    with ExitStack() as stack:
+        for name, value in patch.items():
+            stack.enter_context(mock.patch.object(family, name, value))
+        for name, value in limits.items():
+            stack.enter_context(mock.patch.object(sys.modules[family.__module__], name, value))
+        yield
+
+
+@contextmanager
+def strict(mutant: Mutant) -> Iterator[None]:
+    """The family as it should be, also where a mutant is in force."""
+    family = config.task(mutant.task).family
+    with patched(
+        mutant.task, {n: SOUND[family, n] for n in mutant.patch}, {n: SOUND[family, n] for n in mutant.limits}
+    ):
+        with patched(mutant.task, mutant.mended, {}):
+            yield
+
+
+SOUND: dict[tuple[type, str], Any] = {}
+"""Attributes of families and constants of their modules as they were when the mutants were made."""
+
+
+def mutants() -> list[Mutant]:
+    """All of them."""
+    found = [mutant for task in TASKS for mutant in (*clauses(task), *limits(task), *values(task), *holes(task))]
+    for mutant in found:
+        family = config.task(mutant.task).family
+        module = sys.modules[family.__module__]
+        SOUND.update({(family, name): getattr(family, name) for name in mutant.patch})
+        SOUND.update({(family, name): getattr(module, name) for name in mutant.limits})
+    return found
+
+
+# --- clauses, from the source ------------------------------------------------------------------
+
+
+def clauses(task: str) -> Iterator[Mutant]:
+    """The family without one clause of its failure or of its goal."""
+    family = config.task(task).family
+    if family.failure is not Scenario.failure:
+        tree = _parsed(family.failure)
+        for statement in list(tree.body):
+            if isinstance(statement, ast.If):
+                kept, statement.body = statement.body, [ast.Pass()]
+                yield Mutant(
+                    task, f"no failure: {ast.unparse(statement.test)}", {"failure": _made(family.failure, tree)}
+                )
+                statement.body = kept
+            elif isinstance(statement, ast.Return) and isinstance(one := statement.value, ast.IfExp):
+                told, one.body = one.body, ast.Constant(None)
+                yield Mutant(task, f"no failure: {ast.unparse(one.test)}", {"failure": _made(family.failure, tree)})
+                one.body = told
+        if len(tree.body) > 1:
+            yield Mutant(task, "no failure at all", {"failure": Scenario.failure})
+    tree = _parsed(family.success)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+            for gone in list(node.values):
+                kept = list(node.values)
+                others = [value for value in kept if value is not gone]
+                node.values = others if len(others) > 1 else others * 2
+                yield Mutant(task, f"no goal: {ast.unparse(gone)}", {"success": _made(family.success, tree)})
+                node.values = kept
+            break
+    if family.HOLD:
+        yield Mutant(task, "no hold", {"HOLD": 0.0})
+
+
+def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
+    module = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    (tree,) = module.body
+    assert isinstance(tree, ast.FunctionDef)
+    tree.body = [s for s in tree.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
+    return tree
+
+
+def _made(function: Callable[..., Any], tree: ast.FunctionDef) -> Any:
+    module = ast.fix_missing_locations(ast.Module([tree], []))
+    space: dict[str, Any] = {}
+    exec(compile(module, f"<mutant of {function.__qualname__}>", "exec"), function.__globals__, space)
+    return space[tree.name]
+
+
+# --- limits: constants made wide ----------------------------------------------------------------
+
+WIDE: Mapping[str, Mapping[str, float]] = {
+    "domino_single": {"SLAB_MOVES": 0.004},
+    "domino_select": {"SLAB_MOVES": 0.004, "CARRIED": 0.30},
+    "ball_cage_escape": {"STILL": 5.0},
+    "seesaw_balance": {"LEVEL": math.radians(10.5), "STAYS": 0.40},
+    "tool_retrieve": {"LIFTED": -0.001},
+    "packing": {"FLAT": math.radians(60.0), "DOWN": 0.03},
+}
+
+
+def limits(task: str) -> Iterator[Mutant]:
+    """The family with one limit made wide."""
+    for name, value in WIDE.get(task, {}).items():
+        yield Mutant(task, f"{name} = {value:.3g}", limits={name: value})
+
+
+# --- values: scenarios that the constraints refute -----------------------------------------------
+
+
+def values(task: str) -> Iterator[Mutant]:
+    """Scenarios that a constraint would refute."""
+    for name, change in VALUES.get(task, {}).items():
+        yield Mutant(task, name, {"constraints": Scenario.constraints}, change=change)
+
+
+def _mirror_balances(self: Any) -> Any:
+    return replace(self, weight=replace(self.weight, mass=self.weight.mass * abs(self.balance / self.offset)))
+
+
+def _guess_balances(self: Any) -> Any:
+    guess = self.guess(-1 if self.balance < 0 else 1)
+    return replace(self, weight=replace(self.weight, mass=self.weight.mass * abs(self.balance / guess)))
+
+
+VALUES: Mapping[str, Mapping[str, Change]] = {
+    "seesaw_balance": {"the mirror image balances": _mirror_balances, "the first guess balances": _guess_balances},
+    "tool_retrieve": {"the arm reaches the cube": lambda s: replace(s, distance=0.76)},
+    "galileo_ramp_drop": {
+        "a ball from the top does not overshoot": lambda s: replace(s, ramp=replace(s.ramp, level=0.86)),
+    },
+    "ball_cage_escape": {
+        "the sill does not hold the ball": lambda s: replace(s, cage=replace(s.cage, sill=0.0)),
+    },
+    "packing": {
+        "every piece lies within 45 deg of its slot": lambda s: replace(
+            s, **{f"spot_{i}": replace(spot, turn=math.copysign(2.0, spot.turn)) for i, spot in enumerate(s.spots)}
+        ),
+    },
+    "domino_single": {},
+    "domino_select": {},
+}
+
+
+# --- holes: what the families did not refuse when they were first attacked ------------------------
+
+
+def holes(task: str) -> Iterator[Mutant]:
+    """The family that there was, against the one that refuses a known cheat."""
+    for name, refused in HOLES.get(task, {}).items():
+        family = config.task(task).family
+        sound = family.failure
+
+        def mended(self: Any, world: World, sound: Any = sound, refused: Any = refused) -> str | None:
+            return sound(self, world) or refused(self, world)
+
+        yield Mutant(task, name, {"failure": sound}, mended={"failure": mended})
+
+
+def _carried(self: Any, world: World) -> str | None:
+    away = math.dist(world.pos("tile_0"), self.spot(0))
+    return "the first tile was carried" if world.touching(ROBOT, "tile_0") and away > 0.01 else None
+
+
+def _again(self: Any, world: World) -> str | None:
+    run_ = world.touched("ball", "ramp/far") and world.touching(ROBOT, "ball")
+    return "the ball was touched again after its run" if run_ else None
+
+
+def _wrong_end(self: Any, world: World) -> str | None:
+    lean = math.degrees(math.asin(max(-1.0, min(1.0, float(world.rot("cage")[:, 0] @ UP)))))
+    return "the cage was tilted to the wrong end" if lean > 25.0 else None
+
+
+def _jerked(self: Any, world: World) -> str | None:
+    moved = float((world.velocity("cage")[3:] ** 2).sum()) ** 0.5
+    return "the cage was shaken" if moved > 0.28 else None
+
+
+HOLES: Mapping[str, Mapping[str, Callable[[Any, World], str | None]]] = {
+    "domino_single": {"hole: the first tile is carried": _carried},
+    "galileo_ramp_drop": {"hole: the ball is caught and let go again": _again},
+    "ball_cage_escape": {"hole: both ends in turn": _wrong_end, "hole: shaking": _jerked},
+}

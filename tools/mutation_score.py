@@ -1,0 +1,166 @@
+"""How good the adversary is: `python tools/mutation_score.py [budget] [task ...]`.
+
+Every mutant of tests/attack/mutants.py is attacked until something succeeds that the sound family refuses. Beside it:
+which written cheats exploit the mutant, hits of random macros alone with as many rollouts, and how many varied runs of
+the oracle would be taken for a way around the task. Results stand in generated/mutation_score.jsonl; a repeated call
+continues there.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
+
+from answers import answering
+from cheats import written
+from mutants import TASKS, Mutant, mutants
+
+from scengen import config
+from scengen.attack.campaign import Settings, Subject, arena_of, drawn, fitted
+from scengen.attack.evidence import Hit, causal
+from scengen.attack.macros import Macro
+from scengen.attack.play import SETTLE, Arena, Attempt
+from scengen.attack.search import RANDOM, TIERS, Attack
+from scengen.attack.signature import pairs
+from scengen.validate.rollout import Jitter, run
+
+PAGE = Path("generated/mutation_score.jsonl")
+SCENARIOS = 3
+VARIED = 40
+"""Varied runs of the oracle for each task."""
+
+
+def main(budget: str = "300", *tasks: str) -> None:
+    """Score all mutants, or those of some tasks, and print the score."""
+    PAGE.parent.mkdir(exist_ok=True)
+    records = [json.loads(line) for line in PAGE.read_text().splitlines()] if PAGE.is_file() else []
+    done = {(record["task"], record["mutant"]) for record in records}
+    with open(PAGE, "a") as page, answering():
+        for mutant in mutants():
+            if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
+                continue
+            records.append(scored(mutant, int(budget)))
+            _keep(page, records[-1])
+        for task in tasks or TASKS:
+            if (task, "") not in done:
+                records.append(flagged(task))
+                _keep(page, records[-1])
+    print(_summary(records))
+
+
+def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
+    """What became of one mutant."""
+    start = time.process_time()
+    with mutant.weakened():
+        subjects = mutant.subjects(SCENARIOS)
+        cheats = exploits(mutant, subjects[:2])
+        used, found = hunted(mutant, subjects, budget, TIERS)
+        _, plain = hunted(mutant, subjects, budget, [tier for tier in TIERS if tier != "shortcut"])
+        _, luck = hunted(mutant, subjects, used, [RANDOM])
+    return {
+        "task": mutant.task,
+        "mutant": mutant.name,
+        "subjects": len(subjects),
+        "cheats": cheats,
+        "rollouts": used,
+        "found": _told(found),
+        "without_shortcuts": _told(plain),
+        "random": _told(luck),
+        "cpu": round(time.process_time() - start, 1),
+    }
+
+
+def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
+    """Names of the written cheats that reach the goal because of the weakness."""
+    found = set()
+    for subject in subjects:
+        arena, known = arena_of(subject), written(mutant.task, subject.scenario)
+        with mock.patch.object(type(subject.scenario), "shortcuts", lambda self, known=known: known):
+            for name in known:
+                for raw in (False, True):
+                    attempt = Attempt("shortcut", (Macro("shortcut", name),))
+                    played = arena.play(attempt.macros, raw)
+                    if played.solved and mutant.kills(
+                        _hit(arena, attempt, played), subject.scenario, subject.scene_xml
+                    ):
+                        found.add(name)
+    return sorted(found)
+
+
+def hunted(
+    mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]
+) -> tuple[int, tuple[Hit, Subject] | None]:
+    """Attack until a hit that the sound family refuses: how many rollouts that took, and the hit."""
+    used = 0
+    priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
+    for number, subject in enumerate(subjects):
+        arena = arena_of(subject)
+        arena.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+
+        def kills(hit: Hit, subject: Subject = subject) -> bool:
+            return mutant.kills(hit, subject.scenario, subject.scene_xml)
+
+        attack = Attack(arena, 0, number, len(subjects), priors, kills)
+        result = attack.run((budget - used) // (len(subjects) - number), tiers)
+        used += sum(rate.rollouts for rate in result.rates)
+        if attack.done:
+            return used, (result.hits[-1], subject)
+    return used, None
+
+
+def flagged(task: str) -> dict[str, Any]:
+    """How many varied runs of the oracle lack a contact that is taken for causal."""
+    runs, lacking = 0, []
+    subjects = drawn(config.task(task), "id", 4, 7)
+    for subject in subjects:
+        arena = arena_of(subject)
+        needed = causal(arena)
+        for k in range(VARIED // len(subjects)):
+            jitter = Jitter(f"varied/{subject.scenario.id}/{k}", 0.003, 2.0, 0.08, 0.15, 0.04, k % 2)
+            world = jitter.disturbed(arena.world)
+            rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
+            if rollout.solved:
+                runs += 1
+                lacking += sorted(needed - pairs(world))
+    return {"task": task, "mutant": "", "runs": runs, "flagged": lacking}
+
+
+def _hit(arena: Arena, attempt: Attempt, played: Any) -> Hit:
+    """A success as a hit that lacks nothing."""
+    scenario, digest = arena.scenario.id, played.digest
+    return Hit(scenario, attempt.tier, False, str(attempt), played.seconds, digest, (), (), played.actions)
+
+
+def _told(found: tuple[Hit, Subject] | None) -> str:
+    if found is None:
+        return ""
+    hit, _ = found
+    return f"{hit.tier} {'raw' if hit.raw else 'filtered'}: {hit.plan[:120]}"
+
+
+def _keep(page: Any, record: dict[str, Any]) -> None:
+    page.write(json.dumps(record) + "\n")
+    page.flush()
+    print(json.dumps(record), flush=True)
+
+
+def _summary(records: Sequence[dict[str, Any]]) -> str:
+    scores = [record for record in records if record["mutant"]]
+    exploited = [record for record in scores if record["cheats"]]
+    lines = [f"{len(scores)} mutants, {len(exploited)} exploited by a written cheat"]
+    for what in ("found", "without_shortcuts", "random"):
+        hits, all_hits = sum(bool(r[what]) for r in exploited), sum(bool(r[what]) for r in scores)
+        lines.append(f"{what}: {hits} of {len(exploited)}, {all_hits} of all")
+    varied = [record for record in records if not record["mutant"]]
+    runs = sum(record["runs"] for record in varied)
+    lines.append(f"varied oracle runs flagged: {sum(bool(r['flagged']) for r in varied)} tasks, of {runs} runs")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
