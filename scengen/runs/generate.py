@@ -23,6 +23,7 @@ from ..validate.identity import fingerprint, source_sha256, versions
 from ..validate.settings import CertifySettings
 from .journal import Journal, Record
 
+
 @dataclass(frozen=True)
 class Settings:
     """Settings of `scengen generate`; meanings stand in conf/command/generate.yaml."""
