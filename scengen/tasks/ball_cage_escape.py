@@ -154,8 +154,9 @@ class BallCageEscape(Scenario):
     def present(self, world: World, down: Vec3) -> Plan:
         """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
 
-        The hand turns the least that takes the leaning cage to the front, or to the middle of the table from there. It
-        may come nearer to the limit of joint 7 than elsewhere: leaning takes the joint away from it.
+        The hand turns the least that takes the leaning cage to the front, or to the middle of the table from there.
+        With a hole in a side it takes it as straight to the front as joint 7 can go: such a cage is tipped towards its
+        end first, and the end must not point to the robot.
         """
         arm, side, steep = world.arm, -1.0 if self.y > 0 else 1.0, math.acos(-down[2])
         low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
@@ -164,8 +165,9 @@ class BallCageEscape(Scenario):
         yield from go_to(arm, spot, pace=LEVEL)
         leaning, laps = world.rot("cage") @ down, (-2 * math.pi, 0.0, 2 * math.pi)
         heading = math.atan2(leaning[1], leaning[0])
-        turns = [lap - side * front - heading for front in np.linspace(0.0, WIDEST, 12) for lap in laps]
-        yield from turn_about_vertical(arm, min((t for t in turns if can_turn(arm, t, WRIST_SPARE / 2)), key=abs))
+        aside = {lap - side * front - heading: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
+        possible = [turn for turn in aside if can_turn(arm, turn, WRIST_SPARE / 2)]  # leaning relieves joint 7
+        yield from turn_about_vertical(arm, min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs))
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
