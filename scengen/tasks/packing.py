@@ -210,8 +210,9 @@ class Packing(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        closes, area = guillotine.closes(self.slots, self.footprint), sum(slot.area for slot in self.slots)
-        yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=self.footprint.area)
+        closes = guillotine.closes(self.slots, self.footprint)
+        area, floor = float(sum(slot.area for slot in self.slots)), float(self.footprint.area)
+        yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=floor)
         narrow = min(min(piece.upright, piece.lying) for piece in self.pieces)
         yield require(narrow >= 2 * REACHES, "an arm is too narrow for the cup", arm=narrow, cup=2 * REACHES)
         near = self._nearest()
@@ -224,8 +225,7 @@ class Packing(Scenario):
 
     def _nearest(self) -> float:
         """Smallest distance between the outlines of two things on the table [m]; negative where they overlap."""
-        outer = np.array([self.bin.width, self.bin.length]) + 2 * self.bin.wall
-        things = [[corners([self.x, self.y], math.radians(self.heading), outer)]]
+        things = [[corners([self.x, self.y], math.radians(self.heading), self.bin.outer)]]
         for i, piece in enumerate(self.pieces):
             things.append([corners(*self.start(i), part[2:], part[:2]) for part in piece.parts])
         pairs = itertools.combinations(things, 2)

@@ -102,7 +102,7 @@ class SeesawBalance(Scenario):
         place(scene, replace(self.seesaw, tilt=tilt), "seesaw", self.foot, yaw, free=False)
         place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
         place(scene, self.target, "target", self.on_deck(self.offset, tilt), yaw)
-        scene.body("target").quat = quat("y", tilt)
+        scene.body("target").quat = np.array(quat("y", tilt))
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -212,8 +212,8 @@ class SeesawBalance(Scenario):
         yield on_table("the stand or the counterweight", [self.foot, self.start], margin=0.05)
         dip, under = deck.dip, deck.height - deck.thickness
         yield require(dip <= under, "the deck strikes the table before its stop", dip=dip, height=under)
-        beside, need = abs(heading(self.heading + 90.0) @ (self.start - self.foot)), PALM_ALONG + AIR + deck.width / 2
-        fits = beside >= need
+        beside = abs(float(heading(self.heading + 90.0) @ (self.start - self.foot)))
+        fits = beside >= (need := PALM_ALONG + AIR + deck.width / 2)
         yield require(fits, "the hand cannot take the counterweight beside the seesaw", beside=beside, needed=need)
         grip, need = max(deck.friction, min(self.target.friction, self.weight.friction)), 1.5 * math.tan(deck.steepest)
         yield require(grip >= need, "blocks slide on the tilted deck", friction=grip, needed=need)
