@@ -1,15 +1,28 @@
-"""replay every stored witness, without any oracle"""
+"""check what a pool claims: rebuild, draw again, replay, and repeat its checks"""
 
+import secrets
 from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
+
+from rich.table import Table
+from rich.text import Text
 
 from .. import config
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
+from ..parallel import Limits
 from ..pool import Pool
+from ..runs.generate import Settings as GenerateSettings
 from ..runs.progress import ProgressBar
-from ..validate.verify import verify
-from . import FAILED, OK, Arguments, err, one, say, warn, write_json
+from ..targets import try_file
+from ..validate.junit import junit
+from ..validate.recheck import LEVELS
+from ..validate.settings import CertifySettings
+from ..validate.verify import Options, Report, verify
+from . import BAD_INPUT, FAILED, OK, Arguments, err, one, out, say, warn, write, write_json
+
+STATUS = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
 
 
 @dataclass(frozen=True)
@@ -17,26 +30,83 @@ class Settings:
     """Settings of `scengen verify`; meanings stand in conf/command/verify.yaml."""
 
     pool: str | list[str]
+    level: str
+    sample: int | None
+    seed: int | None
     json: str | None
+    junit: str | None
     workers: int
+    limit_seconds: float
+    limit_mb: int
     expired: str
 
 
 def command(arguments: Arguments) -> int:
     settings = read("verify", arguments, Settings)
-    if settings.expired not in ("fail", "report"):
-        raise BadConfig(f"expired = {settings.expired}; it must be fail or report")
-    at_least(settings, workers=1)
+    for name, known in (("expired", ("fail", "report")), ("level", LEVELS)):
+        if getattr(settings, name) not in known:
+            raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
+    try_file(settings.json)
+    try_file(settings.junit)
     pool = Pool.open(one(settings.pool))
+    search = search_path(arguments)
+    options = Options(
+        settings.level,
+        settings.sample,
+        secrets.randbelow(2**32) if settings.seed is None else settings.seed,
+        settings.workers,
+        Limits(settings.limit_seconds, settings.limit_mb),
+        settings.expired == "fail",
+    )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        find_task = partial(config.task, search=search_path(arguments))
-        report = verify(pool, find_task, settings.workers, settings.expired == "fail", progress_bar.show)
-    result = {"pool_sha256": pool.sha256, **asdict(report)}
+        find_task = partial(config.task, search=search)
+        report = verify(pool, find_task, levels(pool.task, search), options, progress_bar.show)
     if settings.json:
-        write_json(settings.json, result)
+        write_json(settings.json, {"pool_sha256": pool.sha256, **asdict(report)})
+    if settings.junit:
+        write(Path(settings.junit), junit(str(pool.folder), report))
+    _tell(pool, report)
+    return STATUS[report.verdict]
+
+
+def levels(name: str, search: tuple[str, ...]) -> dict[str, CertifySettings]:
+    """The settings that stand behind the names of a task's levels.
+
+    Raises:
+        UnknownName: there is no such task.
+    """
+    config.task(name, search)
+    asked = ((level, [f"task={name}", f"certify={level}", *search]) for level in ("quick", "full"))
+    return {level: config.read_task("generate", overrides, GenerateSettings)[2] for level, overrides in asked}
+
+
+def _tell(pool: Pool, report: Report) -> None:
+    if report.differences:
+        table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
+        for d in report.differences:
+            table.add_row(*(Text(d[name]) for name in ("key", "pool", "installed")))
+        out.print(table)
     for failure in report.failed:
-        warn(f"FAILED {failure['id']}: {failure['reason']}")
-    remarks = [f"{n} {what}" for n, what in ((report.expired, "expired"), (report.drifted, "end in other bits")) if n]
-    verdict = "all hold" if report.holds else f"{len(report.failed)} failed"
-    say(f"{pool.folder}: {report.checked} checked, {', '.join([verdict, *remarks])}")
-    return OK if report.holds else FAILED
+        warn(f"{failure['verdict'].upper()} {failure['id']}: {failure['reason']}")
+    for remark in report.remarks:
+        say(remark)
+    done = [
+        f"{n} {what}"
+        for n, what in (
+            (report.rebuilt, "rebuilt and drawn again"),
+            (report.replayed, "replayed"),
+            (report.rechecked, "checked again without an oracle"),
+            (report.certified_again, "certified again"),
+            (report.expired, "expired"),
+            (report.drifted, "end in other bits"),
+        )
+        if n
+    ]
+    say(f"settings: {report.settings or 'unknown'}")
+    if report.sample:
+        share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
+        told = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
+        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; without a fault, {told}")
+    parts = ", ".join([f"{report.sound} sound, {report.refuted} refuted, {report.declined} declined", *done])
+    say(f"{pool.folder}: {report.verdict} at level {report.level}: {parts}")

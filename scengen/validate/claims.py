@@ -1,0 +1,261 @@
+"""What a row and a manifest claim, compared with what follows from the manifest's configuration, without simulation."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..certificate import CHECKS, Check, as_json
+from ..control.teleop import ALPHA, LARGEST_CHANGE, MOTION
+from ..errors import Infeasible
+from ..params import canonical
+from ..pool import Pool, PoolRow, sha256
+from ..samplers.split import Split
+from ..samplers.task import Task
+from ..scenario import Scenario
+from .certify import lower_bound
+from .rollout import AT_REST
+from .settings import CertifySettings
+
+NUMERICS = ("half_time_step", "twice_the_iterations")
+"""What the check of the numerics changes."""
+ROUNDING = 1e-6
+"""By how much an action may leave the filter's range: single precision."""
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What a manifest says of all its rows."""
+
+    task: Task
+    """As the manifest describes it, with the installed family."""
+    split: Split
+    sampler: str
+    seed: int
+    settings: CertifySettings
+    indices: int
+    keep: tuple[str, ...]
+    fingerprint: str
+    source_sha256: str
+    versions: Mapping[str, str]
+
+    @classmethod
+    def of(cls, pool: Pool, task: Task, settings: CertifySettings) -> "Claims":
+        """Those of a pool.
+
+        Raises:
+            ScengenError: there is no such split, or no such sampler.
+        """
+        split, made = Split.parse(pool.split), pool.manifest
+        task.shifts(split)
+        task.design(pool.sampler)
+        return cls(
+            task,
+            split,
+            pool.sampler,
+            pool.seed,
+            settings,
+            pool.indices,
+            tuple(made["config"]["keep"]),
+            made["fingerprint"],
+            made["source_sha256"],
+            pool.versions,
+        )
+
+
+def wrong_labels(row: PoolRow, claims: Claims) -> Iterator[str]:
+    """Where a row does not say what its manifest says."""
+    task, certificate = claims.task, row.certificate
+    told = {
+        "task": (row.task, task.name),
+        "code": (row.code, task.code),
+        "category": (row.category, task.category),
+        "instruction": (row.instruction, task.instruction),
+        "horizon": (row.horizon, task.horizon),
+        "embodiment": (row.embodiment, task.embodiment),
+        "split": (row.split, str(claims.split)),
+        "axes": (row.axes, claims.split.axes),
+        "seed": (row.seed, claims.seed),
+        "settings": (certificate.settings, claims.settings.name),
+        "versions": (dict(certificate.versions), dict(claims.versions)),
+        "source_sha256": (certificate.source_sha256, claims.source_sha256),
+        "fingerprint": (certificate.fingerprint, claims.fingerprint),
+    }
+    for name, (here, there) in told.items():
+        if here != there:
+            yield f"the {name} is {_short(here)}, the manifest says {_short(there)}"
+    if row.index >= claims.indices:
+        yield f"the index {row.index} is none of the {claims.indices} that the manifest counts"
+
+
+def wrong_names(row: PoolRow, scenario: Scenario) -> Iterator[str]:
+    """Where identity and hashes do not belong to the parameters, the scene and the witness."""
+    certificate = row.certificate
+    scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
+    if row.id != scenario.id:
+        yield "the id does not belong to the parameters"
+    if as_json(row.params) != canonical(scenario):
+        yield "the parameters are not all there, or not as the family writes them"
+    if {scene} != {row.scene_sha256, certificate.scene_sha256}:
+        yield "the scene has another sha256 than its row or certificate"
+    if {witness} != {row.witness_sha256, certificate.witness_sha256}:
+        yield "the witness has another sha256 than its row or certificate"
+
+
+def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
+    """Where a row is not what comes out when its index is drawn again."""
+    task = claims.task
+    try:
+        draw = task.draw(claims.split, claims.seed, row.index, task.design(claims.sampler))
+    except Infeasible:
+        yield f"drawn again, index {row.index} gives no feasible scenario"
+        return
+    if row.id != draw.scenario.id:
+        yield f"the parameters are not those that are drawn for index {row.index}, which gives {draw.scenario.id}"
+        return
+    told = {
+        "attempt": (row.attempt, draw.attempt),
+        "id_twin": (row.id_twin, draw.id_twin),
+        "shifted": (as_json(row.shifted), as_json(draw.shifted)),
+    }
+    for name, (here, there) in told.items():
+        if here != there:
+            yield f"the {name} is {_short(here)}; drawn again it is {_short(there)}"
+
+
+# --- the certificate ----------------------------------------------------------------------------------
+
+
+def wrong_certificate(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
+    """Where a certificate of a certified row is incomplete, or contradicts its settings or itself."""
+    certificate, checks = row.certificate, row.certificate.checks
+    if certificate.verdict != "certified" or certificate.reason:
+        yield f"the certificate is not complete: its verdict is {_short(certificate.verdict)} {certificate.reason[:80]}"
+    if [check.name for check in checks] != list(CHECKS):
+        yield f"the certificate is not complete: its checks are not {', '.join(CHECKS)}, once each in this order"
+        return
+    for check in checks:
+        if not check.passed:
+            yield f"the certificate is not complete: {check.name} has not passed"
+        elif check.reason:
+            yield f"check {check.name} has passed, with a reason against it: {check.reason[:80]}"
+    yield from _other_settings(checks, claims)
+    yield from _contradictions({check.name: check for check in checks}, row, scenario, claims)
+
+
+def wrong_rejection(row: PoolRow, claims: Claims) -> Iterator[str]:
+    """Where the certificate of a kept scenario that was not certified contradicts itself."""
+    certificate, checks = row.certificate, row.certificate.checks
+    if [check.name for check in checks] != list(CHECKS):
+        yield f"the checks of this reject are not {', '.join(CHECKS)}, once each in this order"
+        return
+    failed = next((check for check in checks if not check.passed), None)
+    if failed is None or failed.passed is None:
+        yield "this reject has failed no check"
+        return
+    place = list(CHECKS).index(failed.name)
+    if any(check.passed is not None for check in checks[place + 1 :]):
+        yield f"this reject has checks after {failed.name}, which failed"
+    if certificate.verdict != CHECKS[failed.name] or certificate.reason != f"{failed.name}: {failed.reason}":
+        yield f"the verdict of this reject does not follow from {failed.name}, which failed"
+    if certificate.verdict not in claims.keep:
+        yield f"this reject is {certificate.verdict}, and keep= does not ask for those"
+    yield from _other_settings(checks[: place + 1], claims)
+
+
+def _other_settings(checks: Sequence[Check], claims: Claims) -> Iterator[str]:
+    settings = claims.settings
+    expected: dict[str, Mapping[str, Any]] = {
+        "overlap": {"overlap": settings.overlap},
+        "rest": asdict(settings.rest),
+        "idle": {"horizon": claims.task.horizon},
+        "solved": {"horizon": claims.task.horizon},
+        "robust": asdict(settings.robust),
+        "witness": {"settle": settings.settle},
+    }
+    for check in checks:
+        if as_json(check.settings) != as_json(expected.get(check.name, {})):
+            yield f"check {check.name} was made with other settings than the manifest says"
+
+
+def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
+    """Numbers with which a check cannot have passed."""
+    rules = {
+        "feasible": lambda n: as_json(n) == as_json(dict(scenario.features())),
+        "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
+        "rest": lambda n: _rested(n, claims.settings),
+        "unsolved": lambda n: n == {},
+        "idle": lambda n: _unsolved(n, True),
+        "shortcuts": lambda n: _shortcuts(n, scenario),
+        "solved": lambda n: _solved(n, claims.task.horizon),
+        "robust": lambda n: _robust(n, claims.settings),
+        "numerics": _numerics,
+        "ablations": lambda n: set(n) == set(scenario.ablations()) and all(_unsolved(r, True) for r in n.values()),
+        "witness": lambda n: n == {"periods": len(row.witness), "seconds": checks["solved"].numbers.get("seconds")},
+    }
+    for name, holds in rules.items():
+        try:
+            fine = holds(checks[name].numbers)
+        except (TypeError, KeyError, AttributeError, ValueError):
+            fine = False
+        if not fine:
+            yield f"check {name} cannot have passed with its numbers, or they are not those of this family"
+    if not _filtered(row.witness):
+        yield "the witness has actions that the teleoperation filter cannot give"
+
+
+def _rested(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+    limits = settings.rest
+    within = 0 <= numbers["drift"] <= limits.drift and 0 <= numbers["turn"] <= limits.turn
+    return set(numbers) == {"drift", "turn"} and within
+
+
+def _unsolved(numbers: Mapping[str, Any], unstable: bool) -> bool:
+    """Whether these are the numbers of an episode that was seen to its end and has not reached the goal."""
+    known = ("failure", "timeout", "unstable") if unstable else ("failure", "timeout")
+    return set(numbers) == {"outcome", "reason", "seconds"} and numbers["outcome"] in known and numbers["seconds"] >= 0
+
+
+def _shortcuts(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
+    known = scenario.shortcuts()
+    seen = all(_unsolved(n, False) and (not known[k].to_rest or n["reason"] == AT_REST) for k, n in numbers.items())
+    return set(numbers) == set(known) and seen
+
+
+def _solved(numbers: Mapping[str, Any], horizon: float) -> bool:
+    told = set(numbers) == {"outcome", "reason", "seconds"} and numbers["reason"] == ""
+    return told and numbers["outcome"] == "success" and 0 <= numbers["seconds"] <= horizon + 0.011
+
+
+def _robust(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+    limits, solved, failures = settings.robust, numbers["solved"], numbers["failures"]
+    whole = type(solved) is int and 0 <= solved <= limits.runs and numbers["runs"] == limits.runs
+    counted = whole and isinstance(failures, list) and len(failures) == limits.runs - solved
+    bound = counted and abs(numbers["bound"] - lower_bound(solved, limits.runs)) <= 1e-9 * numbers["bound"]
+    return bool(bound) and numbers["bound"] >= limits.bound and len(numbers) == 4
+
+
+def _numerics(numbers: Mapping[str, Any]) -> bool:
+    held = (
+        n == {"witness": "success"} or (n["witness"] != "success" and n["oracle"] == "success")
+        for n in numbers.values()
+    )
+    return set(numbers) == set(NUMERICS) and all(held)
+
+
+def _filtered(witness: np.ndarray) -> bool:
+    """Whether the actions can be what the filter makes of some input, from rest on."""
+    if np.abs(witness).max(initial=0.0) > 1.0:
+        return False
+    motion = witness[:, :MOTION].astype(float)
+    before = np.vstack([np.zeros((1, MOTION)), motion])[:-1]
+    lowest = np.maximum(-LARGEST_CHANGE, ALPHA * (-1.0 - before))
+    highest = np.minimum(LARGEST_CHANGE, ALPHA * (1.0 - before))
+    change = motion - before
+    return bool(((change >= lowest - ROUNDING) & (change <= highest + ROUNDING)).all())
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

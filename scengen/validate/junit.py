@@ -1,0 +1,35 @@
+"""The result of a verification as JUnit XML: a test for every scenario, a failure for a refuted one."""
+
+import re
+import xml.etree.ElementTree as ET
+
+from .verify import Report
+
+_UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 cannot hold."""
+
+
+def junit(pool: str, report: Report) -> str:
+    """The text of a file that CI systems read.
+
+    Args:
+        pool: name of the pool.
+    """
+    name = _UNWRITABLE.sub("?", pool)
+    of_pool = [f for f in report.failed if f["id"] not in {e["id"] for e in report.examinations}]
+    tests = [*of_pool, *report.examinations]
+    counts = {kind: sum(t["verdict"] == kind for t in tests) for kind in ("refuted", "declined")}
+    suite = ET.Element("testsuite", {
+        "name": f"scengen verify {name}", "tests": str(len(tests)), "failures": str(counts["refuted"]),
+        "errors": str(counts["declined"]), "skipped": "0",
+    })  # fmt: skip
+    for test in tests:
+        case = ET.SubElement(suite, "testcase", {"classname": name, "name": _UNWRITABLE.sub("?", test["id"])})
+        if test["verdict"] != "sound":
+            kind = "failure" if test["verdict"] == "refuted" else "error"
+            reason = _UNWRITABLE.sub("?", test["reason"])
+            ET.SubElement(case, kind, {"type": test["verdict"], "message": reason[:300]}).text = reason
+    suites = ET.Element("testsuites")
+    suites.append(suite)
+    ET.indent(suites)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode") + "\n"

@@ -1,0 +1,59 @@
+"""Scenes from their parameters: a scene in a pool must be what the installed family builds."""
+
+import math
+import xml.etree.ElementTree as ET
+
+from ..errors import BadConfig
+from ..scenario import Scenario
+from ..sim import scene_text
+
+SAME = 1e-9
+"""Largest difference of two numbers, relative or absolute, on machines that round otherwise."""
+OTHER = "the scene is not the one that the family builds from the parameters"
+
+
+def rebuild(scenario: Scenario) -> str:
+    """The text of a scenario's scene."""
+    return scene_text.emit(scenario.build())[0]
+
+
+def difference(text: str, rebuilt: str, exact: bool) -> str:
+    """How the scene of a pool differs from the rebuilt one, in words; empty if it does not. Compiles nothing.
+
+    Args:
+        exact: whether every byte must be equal, as on a machine that rounds alike; else every element and attribute
+            must be, but for numbers that agree to `SAME`.
+    """
+    if text == rebuilt:
+        return ""
+    try:
+        scene_text.check(text)
+    except BadConfig as error:
+        return f"{OTHER}: {error}"
+    here, there = list(ET.fromstring(text).iter()), list(ET.fromstring(rebuilt).iter())
+    for a, b in zip(here, there, strict=False):
+        where = f"<{b.tag} {b.attrib.get('name', '')}>".replace(" >", ">")
+        if a.tag != b.tag or len(a) != len(b):
+            return f"{OTHER}: it differs at {where}"
+        for name in sorted(a.attrib.keys() | b.attrib.keys()):
+            mine, theirs = a.attrib.get(name), b.attrib.get(name)
+            if mine != theirs and (exact or mine is None or theirs is None or not _close(mine, theirs)):
+                return f"{OTHER}: {name} of {where} is {str(mine)[:60]!r} instead of {str(theirs)[:60]!r}"
+    if len(here) != len(there):
+        return f"{OTHER}: it has {len(here)} elements instead of {len(there)}"
+    return f"{OTHER}: it is written otherwise" if exact else ""
+
+
+def _close(a: str, b: str) -> bool:
+    """Whether two attributes hold the same numbers, or the same words."""
+    mine, theirs = a.split(), b.split()
+    if len(mine) != len(theirs):
+        return False
+    for x, y in zip(mine, theirs, strict=True):
+        if x != y:
+            try:
+                if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=SAME):
+                    return False
+            except ValueError:
+                return False
+    return True

@@ -1,0 +1,120 @@
+"""A run's indices drawn again: what a manifest counts follows from them, from its rows, and from its reasons."""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..certificate import CHECKS, STAGES
+from ..errors import Infeasible
+from ..pool import Pool
+from .claims import Claims
+
+CHUNK = 50
+"""Indices that one worker draws at a time."""
+MOST_PER_ROW = 2000
+"""Indices per certified scenario beyond which a manifest is too large to be drawn again; a run gives up far earlier."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What came of one index."""
+
+    proposals: int
+    infeasible: Mapping[str, int]
+    """Infeasible draws by reason."""
+    feasible: bool
+
+
+def draw_again(indices: Sequence[int], claims: Claims) -> dict[int, Drawn]:
+    """Draw some indices of a run again, up to the first feasible scenario of each."""
+    found, design = {}, claims.task.design(claims.sampler)
+    for index in indices:
+        try:
+            draw = claims.task.draw(claims.split, claims.seed, index, design)
+            found[index] = Drawn(draw.attempt + 1, dict(draw.rejected), True)
+        except Infeasible as error:
+            found[index] = Drawn(error.tries, dict(error.reasons), False)
+    return found
+
+
+def chunks(count: int) -> Iterator[range]:
+    """The indices of a run in pieces."""
+    return (range(start, min(start + CHUNK, count)) for start in range(0, count, CHUNK))
+
+
+def too_large(pool: Pool) -> str:
+    """Why the indices of a pool are not drawn again; empty if they are."""
+    most = 10_000 + MOST_PER_ROW * len(pool)
+    return f"{pool.indices} indices for {len(pool)} scenarios are too many to draw again" if pool.indices > most else ""
+
+
+def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:
+    """Where the indices of the rows cannot be those of a run, or their number."""
+    if any(a >= b for a, b in itertools.pairwise(indices)):
+        yield "the rows do not stand in the order of their indices, each once"
+    if len(indices) != len(pool):
+        yield f"the manifest promises {len(pool)} scenarios, the shards hold {len(indices)}"
+    if len(indices) > pool.manifest["n"]:
+        yield f"the manifest says n = {pool.manifest['n']}, the shards hold {len(indices)} scenarios"
+    if not pool.chosen and len(indices) == pool.manifest["n"] > 0 and indices[-1] != pool.indices - 1:
+        yield f"the manifest counts {pool.indices} indices, but a run ends with the last scenario, index {indices[-1]}"
+
+
+def wrong_funnel(pool: Pool, certified: Mapping[int, int], drawn: Mapping[int, Drawn]) -> Iterator[str]:
+    """Where funnel, reasons and counts of a manifest do not follow from its rows and from what was drawn again.
+
+    Args:
+        certified: attempt of every row by index.
+        drawn: every index of the run.
+    """
+    proposals = sum(d.proposals for d in drawn.values())
+    infeasible, failed = Counter[str](), Counter[str]()
+    for d in drawn.values():
+        infeasible.update({f"feasible: {why}": times for why, times in d.infeasible.items()})
+    told = {key: times for key, times in pool.reasons.items() if key.startswith("feasible: ")}
+    if told != dict(infeasible):
+        yield f"the reasons of infeasible draws are not those that come out again, {dict(infeasible)}"
+    for key, times in pool.reasons.items():
+        name = key.partition(": ")[0]
+        if name not in CHECKS:
+            yield f"the reasons name a check {name[:40]!r} that nobody makes"
+        elif name != "feasible":
+            failed[name] += times
+    left = sum(d.feasible for d in drawn.values()) - len(certified)
+    if failed.total() != left:
+        yield f"the reasons tell of {failed.total()} rejected scenarios, and {left} were drawn and not certified"
+    order = [*reversed(CHECKS)]
+    expected = {"proposed": proposals}
+    for stage, checks in STAGES.items():
+        expected[stage] = len(certified) + sum(n for k, n in failed.items() if order.index(k) < order.index(checks[-1]))
+    if dict(pool.funnel) != expected:
+        yield f"the funnel is not what comes out again, {expected}"
+    first = sum(attempt == 0 for attempt in certified.values())
+    if pool.manifest["first_draws"] != first:
+        yield f"first_draws = {pool.manifest['first_draws']}, and {first} first draws were certified"
+
+
+def wrong_subset(pool: Pool) -> Iterator[str]:
+    """Where the counts of a subset contradict each other; those of the pool it was chosen from cannot be made again."""
+    if pool.manifest["n"] != len(pool) or len(pool) > pool.funnel.get("certified", 0):
+        yield "the subset has another number of scenarios than it says, or more than were certified"
+    if list(pool.funnel) and set(pool.funnel) != {"proposed", *STAGES}:
+        yield "the funnel has other steps than those of a run"
+
+
+def wrong_rejects(pool: Pool, kept: Sequence[str]) -> Iterator[str]:
+    """Where the kept rejects are not as many as the reasons tell.
+
+    Args:
+        kept: the failed check of every reject.
+    """
+    if pool.chosen:
+        return
+    expected = Counter[str]()
+    for key, times in pool.reasons.items():
+        name = key.partition(": ")[0]
+        if name != "feasible" and CHECKS.get(name) in pool.manifest["config"]["keep"]:
+            expected[name] += times
+    if Counter(kept) != expected:
+        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {dict(expected)}"
