@@ -20,6 +20,11 @@ def displaced(world: World, body: str, start: Vec3) -> float:
     return math.hypot(offset[0], offset[1])
 
 
+def carried(world: World, body: str, start: Vec3, beyond: float) -> bool:
+    """Whether the robot touches a body whose origin is more than `beyond` [m] from where it stood."""
+    return world.touching(ROBOT, body) and math.dist(world.pos(body), start) > beyond
+
+
 def still(world: World, body: str, below: float) -> bool:
     """Whether a body's centre of mass moves slower than `below` [m/s]."""
     velocity = world.velocity(body)[3:]

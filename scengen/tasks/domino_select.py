@@ -38,7 +38,7 @@ from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, about_z, heading
 from ..params import param
-from ..predicates import displaced, touched_only
+from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER, TIP
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
@@ -101,8 +101,8 @@ class DominoSelect(Scenario):
             return "the robot touched a slab or a tile other than a first one"
         if len(touched := [tile for tile in firsts if world.touched(ROBOT, tile)]) > 1:
             return "the robot touched a second chain"
-        moved = [tile for tile in touched if math.dist(world.pos(tile), self.feet[tile]) > CARRIED]
-        return "the robot carried the first tile away" if any(world.touching(ROBOT, tile) for tile in moved) else None
+        away = any(carried(world, tile, self.feet[tile], CARRIED) for tile in touched)
+        return "the robot carried the first tile away" if away else None
 
     # --- oracle ---------------------------------------------------------------------------
 

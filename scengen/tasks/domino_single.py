@@ -7,9 +7,9 @@ Bottleneck: the push is local, its effect is not. Each falling tile must reach t
 
 The bypass. The paper forbids touching the slab only, and notes (App. on task-specific behaviours) that policies
 then knock over a tile in the middle instead of the first: pushing the last tile solves almost every scene, and
-nothing is left of the causal chain. Here the robot may touch the first tile and no other; any other contact is a
-latched failure like touching the slab. The paper's canonical plan is unaffected, and the shortcuts below show that
-the bypass is closed.
+nothing is left of the causal chain. Here the robot may touch the first tile and no other, and topple it, not carry
+it: else the starter in the jaw knocks over the slab, or the last tile, without any chain. Both are latched failures
+like touching the slab. The paper's canonical plan is unaffected; the shortcuts below show that the bypass is closed.
 """
 
 import math
@@ -23,13 +23,15 @@ from ..assets.box import Domino
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, heading
 from ..params import param
-from ..predicates import displaced, touched_only
+from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import poke
-from ..skills.motion import FINE, wait
+from ..skills.jaw import pick, poke
+from ..skills.motion import COARSE, FINE, go_to, push, wait
 
+CARRIED = 0.01
+"""How far the foot of the starter may have moved while the robot still touches it [m]; in a topple less than 1 mm."""
 SLAB_MOVES = 0.05
 """How far the slab's centre of mass must go, measured along the table [m] (paper, App. B, T17)."""
 
@@ -67,6 +69,8 @@ class DominoSingle(Scenario):
             return "the robot touched the slab"
         if touched_only(world, "tile_0"):
             return "the robot touched a tile other than the first"
+        if carried(world, "tile_0", self.spot(0), CARRIED):
+            return "the robot carried the first tile away"
         return None
 
     # --- oracle ---------------------------------------------------------------------------
@@ -102,6 +106,8 @@ class DominoSingle(Scenario):
             "push_the_slab": Shortcut(self._push_slab),
             "push_the_last_tile": Shortcut(lambda world: self.topple(world, self.count - 1)),
             "push_the_second_tile": Shortcut(lambda world: self.topple(world, 1)),
+            "carry_the_starter_to_the_slab": Shortcut(lambda world: self._carry(world, self.count)),
+            "carry_the_starter_to_the_last_tile": Shortcut(lambda world: self._carry(world, self.count - 1)),
         }
 
     def _push_slab(self, world: World) -> Plan:
@@ -109,6 +115,15 @@ class DominoSingle(Scenario):
         side = np.array([-self.u[1], self.u[0], 0.0])
         beside = self.spot(self.count) + 0.8 * self.slab.height * UP + 0.08 * side
         yield from poke(world.arm, beside, -0.15 * side, lambda: self.success(world), above=0.12)
+
+    def _carry(self, world: World, i: int) -> Plan:
+        """Take the starter, which may be touched, over the chain and knock piece `i` over with its foot."""
+        start, hit = self.spot(0), self.spot(i) + 0.8 * self.pieces[i].height * UP
+        yield from pick(world.arm, start + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.16)
+        grip = 0.7 * self.starter.height * UP
+        yield from go_to(world.arm, hit + grip + 0.12 * UP - 0.03 * self.u, pace=COARSE)
+        yield from go_to(world.arm, hit + grip - (0.03 if i == self.count else 0.015) * self.u)
+        yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the chain the first tile falls on nothing; one tile less may still be bridged by the others."""

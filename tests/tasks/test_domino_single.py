@@ -90,6 +90,8 @@ BYPASSES = {
     "push_the_slab": "the robot touched the slab",
     "push_the_last_tile": "the robot touched a tile other than the first",
     "push_the_second_tile": "the robot touched a tile other than the first",
+    "carry_the_starter_to_the_slab": "the robot carried the first tile away",
+    "carry_the_starter_to_the_last_tile": "the robot carried the first tile away",
 }
 
 
