@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test check types format certify axes docs reference bench clean
+.PHONY: setup demo test fuzz check types format certify axes docs reference bench clean
 
 setup: $(READY)
 
@@ -27,6 +27,12 @@ demo: setup
 test: setup
 	$(BIN)/scengen verify pool=generated/reference workers=2
 	$(BIN)/python -m pytest -n 2
+
+# Mangled command lines: each must end with exit 0, 1 or 2 and one line with a remedy. FUZZ of them, from SEED.
+FUZZ ?= 2000
+SEED ?= 0
+fuzz: setup
+	$(BIN)/python tests/fuzz/run.py $(FUZZ) $(SEED)
 
 check: setup
 	$(BIN)/ruff format --check

@@ -182,14 +182,14 @@ def _check_override(verb: str, text: str) -> None:
     if override.is_sweep_override():
         raise BadConfig(f"{told} names several values; give one, or quote what is meant as a word: {key}='...'")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{told}: of Hydra's own settings only hydra.searchpath=[file:///folder] can be given")
+        raise BadConfig(f"{told}: of Hydra's own settings give none but hydra.searchpath=[file:///folder]")
     if override.is_delete() and "." not in key:
         raise BadConfig(f"{told}: {key} cannot be deleted; leave it out for its default, or give another value")
     if key == "hydra.searchpath":
         folders = override.value()
         for folder in folders if isinstance(folders, list) else [folders]:
             if not re.match(r"(file|pkg)://.", str(folder)):
-                raise BadConfig(f"{told}: a folder of configuration is given as file:///folder or pkg://package")
+                raise BadConfig(f"{told}: give a folder of configuration as file:///folder or pkg://package")
     if key in ("task", "certify") and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
         names = _groups(verb)
         if key in names:

@@ -85,7 +85,7 @@ MOST = {
     "images": 100_000,
     "index": 1_000_000_000,
     "limit": 1_000_000_000,
-    "limit_megabytes": 1_000_000,
+    "limit_mb": 1_000_000,
     "limit_seconds": 86_400,  # a day
     "n": 1_000_000,
     "permutations": 1_000_000,
@@ -97,9 +97,6 @@ MOST = {
     "seeds": 1_000_000,
     "width": 4096,
     "workers": 256,
-    "sample": 10**9,
-    "limit_seconds": 86_400,
-    "limit_mb": 10**6,
 }
 """Largest values of settings that count or measure something: far beyond use, and within what can be computed."""
 

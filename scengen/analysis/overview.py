@@ -56,16 +56,20 @@ class Contrast:
     """Near duplicates: leakage, if one is for training and the other for evaluation."""
 
 
-def gather(pools: Sequence[Pool]) -> tuple[list[Overview], list[Contrast]]:
-    """Look at every pool, and at every two of one task."""
-    known = [(pool, task_of(pool)) for pool in pools]
+def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Overview], list[Contrast]]:
+    """Look at every pool, and at every two of one task.
+
+    Args:
+        search: folders of other packages with tasks, see `config.search_path`.
+    """
+    known = [(pool, task_of(pool, search)) for pool in pools]
     held = [(pool, task, scenarios_of(task, pool)) for pool, task in known]
     contrasts = [
         _contrast(task, (a, one), (b, other))
         for (a, task, one), (b, beside, other) in itertools.combinations(held, 2)
         if task.name == beside.name and one and other
     ]
-    return [_overview(*each) for each in held], contrasts
+    return [_overview(*each, search) for each in held], contrasts
 
 
 def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequence[Contrast], path: Path) -> str:
@@ -96,10 +100,10 @@ def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[
     return {"pools": [asdict(o) for o in overviews], "contrasts": [asdict(c) for c in contrasts]}
 
 
-def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario]) -> Overview:
+def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario], search: Sequence[str]) -> Overview:
     even = biased = None
     if scenarios and not pool.chosen:
-        drawn = [p for p in redrawn(pool) if p.feasible]
+        drawn = [p for p in redrawn(pool, search=search) if p.feasible]
         numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
         even = evenness(numbers) if numbers.size else None
         rows = [measured(p.scenario) for p in drawn]

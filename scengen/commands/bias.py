@@ -9,7 +9,7 @@ from ..analysis.bias import Bias, acceptance_map, bias
 from ..analysis.redraw import Redrawn, redrawn
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
-from ..config import read
+from ..config import read, search_path
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
@@ -29,7 +29,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     pool = Pool.open(one(settings.pool)).check()
     with ProgressBar(err, f"draw {pool.folder} again", pool.indices) as progress_bar:
-        drawn = redrawn(pool, lambda done, total: progress_bar.show(done))
+        drawn = redrawn(pool, lambda done, total: progress_bar.show(done), search_path(arguments))
     feasible = [p for p in drawn if p.feasible]
     stages = {
         "feasible": ("feasible draws against all draws: what the family's constraints leave out", drawn),

@@ -1,6 +1,6 @@
 """how far pools are from training and from each other, and what leaks from one to the other"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..analysis.distance import energy, near_duplicates, per_parameter
 from ..analysis.redraw import redrawn, scenarios_of, task_of
 from ..analysis.space import of_features
 from ..analysis.tables import pairs_table
-from ..config import read
+from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..samplers.task import Task
@@ -37,19 +37,22 @@ def command(arguments: Arguments) -> int:
     if not 0 < settings.within <= 1000:
         raise BadConfig(f"within = {settings.within:g}; it must lie above 0 and at most at 1000 training widths")
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-    task, names = task_of(pools[0]), {task_of(pool).name for pool in pools}
+    search = search_path(arguments)
+    task, names = task_of(pools[0], search), {task_of(pool, search).name for pool in pools}
     if len(names) > 1:
         raise BadConfig(f"pool = {','.join(several(settings.pool))}; these are pools of {', '.join(sorted(names))}")
     first, *others = ((pool, scenarios_of(task, pool)) for pool in pools)
-    result = [_alone(task, *first, settings)]
+    result = [_alone(task, *first, settings, search)]
     for pool, scenarios in others:
-        result += [_alone(task, pool, scenarios, settings), _pair(task, first, (pool, scenarios), settings)]
+        result += [_alone(task, pool, scenarios, settings, search), _pair(task, first, (pool, scenarios), settings)]
     if settings.json:
         write_json(settings.json, result)
     return FAILED if any(r["near_duplicates"] for r in result) else OK
 
 
-def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: Settings) -> dict[str, Any]:
+def _alone(
+    task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: Settings, search: Sequence[str]
+) -> dict[str, Any]:
     """How far one pool is from training, how even it is, and whether it repeats itself."""
     away = per_parameter(task, list(scenarios.values()))
     told = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
@@ -57,7 +60,7 @@ def _alone(task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: 
     say(f"  outside training by [training widths]: {told or 'nothing'}")
     even = None
     if scenarios and not pool.chosen:
-        certified = [list(p.quantiles.values()) for p in redrawn(pool) if p.certified]
+        certified = [list(p.quantiles.values()) for p in redrawn(pool, search=search) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
             say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws")

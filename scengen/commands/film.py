@@ -39,7 +39,7 @@ class Settings:
     def check(self) -> None:
         """Raise `BadConfig` for settings that make no sense."""
         if Path(self.to).suffix not in (".png", ".mp4"):
-            raise BadConfig(f"to = {self.to}; a film strip is a .png file, a video an .mp4 file")
+            raise BadConfig(f"to = {self.to}; name a .png file for a film strip, an .mp4 file for a video")
         at_least(self, frames=1, fps=1, width=1, height=1)
         if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > STRIP:
             size = f"{self.frames} frames of {self.width} x {self.height} pixels"

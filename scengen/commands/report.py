@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.overview import gather, page, plain
-from ..config import read
+from ..config import read, search_path
 from ..errors import BadConfig
 from ..pool import Pool
 from ..targets import try_file
@@ -23,11 +23,11 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings = read("report", arguments, Settings)
     if Path(settings.to).suffix != ".html":
-        raise BadConfig(f"to = {settings.to}; a report is an .html file")
+        raise BadConfig(f"to = {settings.to}; name an .html file")
     try_file(settings.to)
     try_file(settings.json)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-    overviews, contrasts = gather(pools)
+    overviews, contrasts = gather(pools, search_path(arguments))
     if missing := page(pools, overviews, contrasts, Path(settings.to)):
         remark(f"the report has no pictures: {missing}")
     if settings.json:

@@ -30,7 +30,9 @@ def command(arguments: Arguments) -> int:
     if settings.id is None:
         at_least(settings, images=0)
         if target and target.suffix != ".html":
-            raise BadConfig(f"to = {target}; a contact sheet is an .html file (a single scenario, id=, gives a .png)")
+            raise BadConfig(
+                f"to = {target}; name an .html file for a contact sheet (a single scenario, id=, gives a .png)"
+            )
         try_file(target)
         for pool in pools:
             out.print(report.pool_table(pool))
@@ -40,7 +42,7 @@ def command(arguments: Arguments) -> int:
             remark(f"{target} has no pictures: {missing}")
     else:
         if target and target.suffix != ".png":
-            raise BadConfig(f"to = {target}; the film strip of a scenario is a .png file")
+            raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")
         try_file(target)
         row = pools[0].row(settings.id)
         for table in report.scenario_tables(row):

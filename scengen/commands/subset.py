@@ -6,7 +6,7 @@ from pathlib import Path
 from ..analysis.coverage import farthest_points
 from ..analysis.redraw import scenarios_of, task_of
 from ..analysis.space import of_parameters
-from ..config import read
+from ..config import read, search_path
 from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
 from ..targets import try_folder
@@ -32,7 +32,7 @@ def command(arguments: Arguments) -> int:
     if (target / MANIFEST).exists():
         raise PoolError(f"{target} holds a pool already; choose another to=")
     try_folder(target)
-    task = task_of(pool)
+    task = task_of(pool, search_path(arguments))
     scenarios = scenarios_of(task, pool)
     space = of_parameters(task, list(scenarios.values()))
     chosen = {list(scenarios)[i] for i in farthest_points(space.points(scenarios.values()), settings.n)}

@@ -1,8 +1,9 @@
 """Results of long work in a file, one per line: safe against a kill, and the memory of a run that goes on."""
 
+import errno
 import json
+import os
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -41,7 +42,7 @@ class Log:
         except OSError as error:
             raise refused(folder, error) from None
         try:
-            self._file = self._opened()
+            self._open()
         except OSError as error:
             self._lock.release()
             raise refused(self.path, error) from None
@@ -53,21 +54,19 @@ class Log:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # what a full disk did not take was told when it was added
-            self._file.close()
+        self._file.close()
         self._lock.release()
 
     def add(self, record: dict[str, Any]) -> None:
         """Store one; once this returns it survives a kill."""
         try:
-            self._file.write(json.dumps(record) + "\n")
-            self._file.flush()
+            self._write(record)
         except OSError as error:
             raise refused(self.path, error) from None
         self.records.append(record)
 
-    def _opened(self) -> Any:
-        """The file, ready for more; a line that a kill cut short is dropped."""
+    def _open(self) -> None:
+        """Read the file and make it ready for more; a line that a kill cut short is dropped."""
         content = self.path.read_bytes() if self.path.exists() else b""
         size = content.rfind(b"\n") + 1
         try:
@@ -81,12 +80,24 @@ class Log:
             names = ", ".join(different(whole[0], self.identity))
             raise BadConfig(f"{self.path.parent} holds results of other pools or settings ({names}); {self.remedy}")
         self.records = whole[1:]
-        file = open(self.path, "a")
-        file.truncate(size)
+        self._file = open(self.path, "ab", buffering=0)
+        self._file.truncate(size)
         if not whole:
-            file.write(json.dumps(self.identity) + "\n")
-            file.flush()
-        return file
+            self._write(self.identity)
+
+    def _write(self, record: Mapping[str, Any]) -> None:
+        """Append a whole line, or nothing.
+
+        Raises:
+            OSError: there is no room for it, for instance.
+        """
+        line, size = json.dumps(record).encode() + b"\n", self._file.tell()
+        try:
+            if self._file.write(line) != len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError:
+            self._file.truncate(size)
+            raise
 
 
 def different(a: Any, b: Any, path: str = "") -> list[str]:

@@ -272,7 +272,7 @@ def _check_keys(where: str, node: Mapping[str, Any], required: tuple[str, ...], 
         if key not in required + optional:
             raise UnknownName(f"key of {where}", str(key), required + optional)
     if missing := [key for key in required if key not in node]:
-        raise BadConfig(f"{where} lacks {', '.join(missing)}")
+        raise BadConfig(f"{where} lacks {', '.join(missing)}; give it")
 
 
 def leaves(nodes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -185,7 +185,7 @@ class Window:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["to=film.gif"], "a film strip is a .png file, a video an .mp4 file"),
+        (["to=film.gif"], "name a .png file for a film strip, an .mp4 file for a video"),
         (["to=x.png", "of=push_the_slob"], "no shortcut named 'push_the_slob' (did you mean 'push_the_slab'?)"),
         (["to=x.png", "frames=0"], "frames = 0; it must be at least 1"),
         (["to=x.mp4", "fps=24"], "no fps that divides the control rate of 100 Hz named '24'"),

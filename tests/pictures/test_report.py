@@ -21,7 +21,7 @@ def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("argv", "says"),
-    [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "a report is an .html file")],
+    [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "name an .html file")],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys):
     assert cli.run(("report", *argv)) == 2 and says in capsys.readouterr().err

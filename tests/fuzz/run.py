@@ -1,0 +1,168 @@
+"""Runs command lines of the grammar and judges how they end: `python tests/fuzz/run.py 2000 [seed]`."""
+
+import contextlib
+import io
+import os
+import re
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
+
+from fuzz.grammar import Grammar  # noqa: E402
+
+from scengen import cli  # noqa: E402
+
+REFERENCE = ROOT / "generated" / "reference"
+LIMIT = 20
+"""Wall-clock time of one command line [s]: more than any needs that does no work."""
+REMEDY = re.compile(
+    r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |leave it|"
+    r"quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is no option|install|takes one pool|correct |delete |"
+    r"wait for|needs \w+=|widen|is the size|wants a display"
+)
+"""Words with which an error says what would be right."""
+
+
+class Work(BaseException):
+    """The work itself begins: the command line was accepted."""
+
+
+def judge(line: list[str], place: Path) -> str:
+    """Run a command line; what is wrong with how it ends, or nothing."""
+    before = tree(place)
+    out, err = io.StringIO(), io.StringIO()
+    with _shown(out, err), _alarm():
+        try:
+            status: int | str = cli.run(line)
+        except Work:
+            status = 0
+        except BaseException:
+            return f"escaped: {traceback.format_exc().splitlines()[-1][:300]}"
+    told = err.getvalue()
+    errors = [x for x in told.split("\n") if x and not re.match(r".*: \d+ of \d+", x)]
+    if status not in (0, 1, 2):
+        return f"status {status}: {told[:300]}"
+    if status == 2 and len(errors) != 1:
+        return f"{len(errors)} lines of error: {told[:500]}"
+    if "Traceback" in told + out.getvalue() or "unforeseen" in told:
+        return f"unforeseen: {told[:500]}"
+    if status == 2 and not REMEDY.search(told):
+        return f"no remedy: {told[:300]}"
+    if any(len(x) > cli.LONGEST + 100 for x in errors):
+        return f"a line of {max(map(len, errors))} letters"
+    if re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", told + out.getvalue()):
+        return f"control characters: {told[:300]!r}"
+    left = tree(place) - before
+    if status == 2 and left:
+        return f"left behind: {sorted(left)[:5]}"
+    return ""
+
+
+def tree(place: Path) -> set[str]:
+    """Everything around the folder of targets: the pool, the working folder, tracebacks."""
+    return {str(p) for p in place.parent.rglob("*")}
+
+
+@contextlib.contextmanager
+def playground() -> Iterator[Path]:
+    """A working folder with targets that cannot be written, and work that ends the command at once."""
+    here = Path.cwd()
+    with tempfile.TemporaryDirectory(prefix="fuzz") as made, contextlib.ExitStack() as stack:
+        place = Path(made, "place")
+        (place / "folder").mkdir(parents=True)
+        (place / "file").write_text("a file")
+        os.mkfifo(place / "pipe")
+        (place / "loop").symlink_to(place / "loop")
+        (place / "dangling").symlink_to("/nowhere/at/all")
+        (place / "cut").mkdir()
+        (place / "cut" / "manifest.json").write_text("{")
+        shutil.copytree(REFERENCE, Path(made, "pool"))
+        (Path(made, "cwd")).mkdir()
+        os.chdir(Path(made, "cwd"))
+        stack.enter_context(mock.patch.object(tempfile, "tempdir", made))
+        for name in WORK:
+            stack.enter_context(mock.patch(name, side_effect=Work))
+        try:
+            yield place
+        finally:
+            os.chdir(here)
+            shutil.rmtree(place, ignore_errors=True)
+
+
+WORK = (
+    "scengen.validate.certify.certify",
+    "scengen.runs.generate.each",
+    "scengen.evaluate.rollouts.each",
+    "scengen.validate.verify.verify",
+    "scengen.commands.verify.verify",
+    "scengen.commands.attack.attack",
+    "scengen.commands.bench.bench",
+    "scengen.commands.shrink.certify",
+    "scengen.commands.axis.make",
+    "scengen.export.recording.DataSet",
+    "scengen.envs.agreement.compare_all",
+    "scengen.pictures.film.Take.moments",
+    "scengen.pictures.view.view",
+)
+"""Where work begins that takes seconds: a command line that gets so far has been accepted."""
+
+
+@contextlib.contextmanager
+def _shown(out: io.StringIO, err: io.StringIO) -> Iterator[None]:
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):  # rich asks for the stream at every line
+        yield
+
+
+@contextlib.contextmanager
+def _alarm() -> Iterator[None]:
+    def over(*_: object) -> None:
+        raise TimeoutError(f"no end within {LIMIT} s")
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.alarm(LIMIT)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def run(count: int, seed: int) -> list[tuple[list[str], str]]:
+    """Judge as many command lines; those that end badly, with what is wrong."""
+    bad = []
+    with playground() as place:
+        grammar = Grammar(seed, place.parent / "pool", place)
+        for _ in range(count):
+            line = grammar.line()
+            if wrong := judge(line, place):
+                bad.append((line, wrong))
+            for left in (place / "new", place / "é"):
+                shutil.rmtree(left, ignore_errors=True)
+    return bad
+
+
+def main() -> int:
+    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    resource.setrlimit(resource.RLIMIT_AS, (8_000_000_000, 8_000_000_000))
+    start = time.process_time()
+    bad = run(count, seed)
+    for line, wrong in bad:
+        print(" ".join(x if len(x) < 100 else f"{x[:60]}...({len(x)})" for x in line).encode("unicode_escape").decode())
+        print(f"    {wrong.encode('unicode_escape').decode()}")
+    spent = time.process_time() - start
+    print(f"{len(bad)} of {count} command lines end badly; seed {seed}, {spent:.0f} CPU s")
+    return bool(bad)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
