@@ -456,11 +456,14 @@ def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
 def _replace(path: Path, content: bytes) -> None:
     """Write a file so that it is either the old one or the new one, whenever the process dies."""
     part = path.with_name(path.name + ".part")
-    with open(part, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
+    try:
+        with open(part, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def _sha(path: Path) -> str:
