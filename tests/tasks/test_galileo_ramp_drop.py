@@ -95,6 +95,13 @@ def test_the_ball_may_be_touched_on_the_near_side_and_not_on_the_far_side():
     assert far.reason == "the robot touched the ball beyond the middle of the ramp"
 
 
+def test_a_ball_that_falls_short_may_not_be_caught_and_let_go_again():
+    """Trial and error would find the height without a thought; without the rule it does."""
+    episode = play_shortcut(TASK, NOMINAL, "catch_it_and_try_higher")
+    assert episode.reason == "the ball was touched again after its run"
+    assert play_shortcut(TASK, unguarded(GalileoRampDrop)(), "catch_it_and_try_higher").solved
+
+
 @pytest.mark.parametrize(("split", "solved"), [("light_ball", True), ("high_patch", False), ("rubbing", False)])
 def test_a_memorised_release_serves_a_ball_of_another_weight_and_nothing_else(split, solved):
     trained, shifted = (TASK.draw(name, 0, 2).scenario for name in ("id", split))
