@@ -152,7 +152,11 @@ class _Worker:
             self.connection, theirs = self._context.Pipe()
             arguments = (theirs, self._function, self._limits, os.getpid())
             self._process = self._context.Process(target=_serve, args=arguments, daemon=True)
-            self._process.start()
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C goes to the whole group
+            try:
+                self._process.start()
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             theirs.close()
         try:
             self.connection.send(self._item)

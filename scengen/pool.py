@@ -82,6 +82,9 @@ SCHEMA = pa.schema(
 )
 """Columns of a shard; `shifted`, `params`, `versions` and a check's `settings` and `numbers` hold JSON."""
 
+PROCESS = "process"
+"""Stands for a check in the reasons where a scenario has ended its process, or was ended with it at a limit."""
+
 NO_WITNESS: NDArray[np.float32] = np.zeros((0, 7), np.float32)
 """The witness of a row without one: it was not certified, or its witness was not asked for."""
 

@@ -13,7 +13,7 @@ from typing import Any
 from .. import pool
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
-from ..parallel import each
+from ..parallel import Limits, each
 from ..params import values
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
@@ -36,12 +36,14 @@ class Settings:
     pool: str | None = None
     keep: list[str] = field(default_factory=list)
     limit: int | None = None
+    limit_seconds: float = 600.0
+    limit_mb: int = 4000
 
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         task.shifts(self.split)
         task.design(self.sampler)
-        at_least(self, n=1, seed=0, workers=1, limit=1)
+        at_least(self, n=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200)
         for verdict in self.keep:
             if verdict not in ("refuted", "unknown"):
                 raise BadConfig(f"keep = {verdict}; it must be refuted, unknown, or both")
@@ -81,12 +83,9 @@ class Job:
 
     def __call__(self, index: int) -> Record:
         start = time.process_time()
-        try:
-            draw = self.task.draw(self.split, self.seed, index, self.task.design(self.sampler))
-        except Infeasible as error:
-            why = max(error.reasons, key=error.reasons.__getitem__)
-            cpu = time.process_time() - start
-            return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, cpu)
+        draw = self._draw(index)
+        if isinstance(draw, Record):
+            return replace(draw, cpu=time.process_time() - start)
         certified = certify(draw.scenario, self.task.horizon, self.certify_settings, self.task.embodiment)
         certificate = certified.certificate
         failed = certificate.failed
@@ -100,6 +99,21 @@ class Job:
             row_of(self.task, draw, certified) if certificate.verdict in ("certified", *self.keep) else None,
             time.process_time() - start,
         )
+
+    def lost(self, index: int, reason: str) -> Record:
+        """The record of an index whose scenario has crashed its process, or has reached a limit."""
+        draw = self._draw(index)
+        if isinstance(draw, Record):
+            return draw
+        return Record(index, "unknown", pool.PROCESS, reason, draw.attempt + 1, dict(draw.rejected), None, 0.0)
+
+    def _draw(self, index: int) -> Draw | Record:
+        """The scenario of an index, or the record of one that has none."""
+        try:
+            return self.task.draw(self.split, self.seed, index, self.task.design(self.sampler))
+        except Infeasible as error:
+            why = max(error.reasons, key=error.reasons.__getitem__)
+            return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, 0.0)
 
 
 def generate(task: Task, certify_settings: CertifySettings, settings: Settings, progress: Progress) -> Summary:
@@ -174,8 +188,12 @@ def funnel(records: list[Record]) -> dict[str, int]:
     counts = {"proposed": sum(r.proposals for r in records)}
     for stage, checks in STAGES.items():
         last = order.index(checks[-1])
-        counts[stage] = sum(order.index(r.check) < last for r in records)
+        counts[stage] = sum(order.index(_CHECK.get(r.check, r.check)) < last for r in records)
     return counts
+
+
+_CHECK = {pool.PROCESS: "compiles"}
+"""What the funnel counts a scenario as that has ended its process: feasible, and through nothing else."""
 
 
 def _made_with(task: Task) -> dict[str, Any]:
@@ -200,6 +218,7 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
     if size := job.task.design(job.sampler).size:
         limit = min(limit, size)
     missing = (i for i in range(limit) if i not in records)
+    limits = Limits(settings.limit_seconds, settings.limit_mb)
     verdicts = Counter(r.verdict for r in records.values())
 
     def needed(index: int) -> bool:
@@ -208,7 +227,7 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
             return True
         return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
 
-    for record in each(job, itertools.takewhile(needed, missing), settings.workers):
+    for record in each(job, itertools.takewhile(needed, missing), settings.workers, limits, job.lost):
         journal.add(record)
         records[record.index] = replace(record, row=None)
         verdicts[record.verdict] += 1
@@ -222,7 +241,7 @@ def _finish(
     certified = [i for i in sorted(records) if records[i].verdict == "certified"][: settings.n]
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
-    kept = [r.index for r in counted if r.verdict in settings.keep and r.check != "feasible"]
+    kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in ("feasible", pool.PROCESS)]
     reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
