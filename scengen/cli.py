@@ -9,7 +9,9 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
@@ -51,7 +53,11 @@ def main() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a name need not be Unicode
     status = run(sys.argv[1:], signals)
-    sys.exit(signals.status if status == INTERRUPTED else status)
+    if status == INTERRUPTED:
+        with suppress(OSError):
+            sys.stdout.flush()
+        signals.end()  # at once: Python takes seconds to take itself apart on a busy machine
+    sys.exit(status)
 
 
 class Signals:
@@ -68,18 +74,28 @@ class Signals:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self.status = 128 + number
         if self._came or not self.working:
-            self._end()
+            self.end()
         self._came = True
-        timer = threading.Timer(GRACE, self._end)
+        timer = threading.Timer(GRACE, self.end)
         timer.daemon = True
         timer.start()
         raise KeyboardInterrupt
 
-    def _end(self) -> NoReturn:
-        """Leave without a further step of Python's; workers notice it and end as well."""
-        if not (self._came and self.working):
-            _line("scengen: interrupted")
+    def end(self) -> NoReturn:
+        """Leave without a further step of Python's, and leave nobody behind."""
+        if not self.working:
+            with suppress(OSError):
+                os.write(2, b"scengen: interrupted, nothing was begun\n")
+        end_children()
         os._exit(self.status)
+
+
+def end_children() -> None:
+    """Kill processes that this one has started: a worker that is still importing does not know yet whom to follow."""
+    for path in Path("/proc/self/task").glob("*/children"):
+        with suppress(OSError):
+            for child in path.read_text().split():
+                os.kill(int(child), signal.SIGKILL)
 
 
 def run(argv: Sequence[str], signals: Signals | None = None) -> int:

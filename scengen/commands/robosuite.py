@@ -26,7 +26,7 @@ class Settings:
     def check(self) -> None:
         """Raise `BadConfig` for a value that means nothing."""
         if not 0.0 <= self.limit <= 1.0:
-            raise BadConfig(f"limit = {self.limit:g}; it is a share, between 0 and 1")
+            raise BadConfig(f"limit = {self.limit:g}; it must lie in [0, 1]")
         at_least(self, first=1, workers=1)
 
 

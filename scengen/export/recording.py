@@ -67,7 +67,7 @@ class Settings:
         """Raise `ScengenError` for settings that make no sense."""
         periods_between(self.fps)
         check_size(self.width, self.height)
-        at_least(self, n=1)
+        at_least(self, n=1, width=2, height=2)
         for name in self.eyes:
             if name not in CAMERAS:
                 raise UnknownName("camera", name, [NONE, *CAMERAS])

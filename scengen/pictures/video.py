@@ -19,7 +19,9 @@ def check_size(width: int, height: int) -> None:
     """Raise `BadConfig` unless a video can have this size: colours are stored for squares of 2 x 2 pixels."""
     for name, value in (("width", width), ("height", height)):
         if value < 2 or value % 2:
-            raise BadConfig(f"{name} = {value}; the pictures of a video have an even number of pixels, at least 2")
+            raise BadConfig(
+                f"{name} = {value}; the pictures of a video have an even number of pixels, at least 2; choose another"
+            )
 
 
 class Movie:

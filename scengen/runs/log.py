@@ -1,8 +1,6 @@
 """Results of long work in a file, one per line: safe against a kill, and the memory of a run that goes on."""
 
-import errno
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -93,8 +91,8 @@ class Log:
         """
         line, size = json.dumps(record).encode() + b"\n", self._file.tell()
         try:
-            if self._file.write(line) != len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            while line:  # a disk that gets full takes a part of it first, and refuses the rest
+                line = line[self._file.write(line) :]
         except OSError:
             self._file.truncate(size)
             raise

@@ -19,16 +19,15 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
 
 from fuzz.grammar import Grammar  # noqa: E402
-
 from scengen import cli  # noqa: E402
 
 REFERENCE = ROOT / "generated" / "reference"
-LIMIT = 20
+LIMIT = 60
 """Wall-clock time of one command line [s]: more than any needs that does no work."""
 REMEDY = re.compile(
-    r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |leave it|"
-    r"quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is no option|install|takes one pool|correct |delete |"
-    r"wait for|needs \w+=|widen|is the size|wants a display"
+    r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |"
+    r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is no option|install|takes one pool|"
+    r"correct |delete |wait for|needs \w+=|widen|wants a display"
 )
 """Words with which an error says what would be right."""
 

@@ -5,8 +5,8 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from fuzz import run
 
+from fuzz import run
 from scengen import cli
 
 COUNT, SEED = 200, 1
