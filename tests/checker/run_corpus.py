@@ -26,10 +26,12 @@ from checkers import CHECKERS, CONTROLS, EASY
 from forgery import Case
 from make_corpus import cases, write
 
-LIMIT = 60.0
-"""How long a checker may take for one pool [s]; at level full, which certifies again, three times that."""
-PATIENCE = 10.0
-"""How long a control may take [s]: they hang where nobody looks."""
+LIMIT = 60
+"""How much processor time a checker may take for one pool [s]; three times that at level full."""
+PATIENCE = 10
+"""How much a control may take [s]: they hang where nobody looks."""
+BUSY = 4
+"""How much longer that may take on a busy machine."""
 MEMORY = 1500
 """How much memory it may use [MB]."""
 VERDICTS = {0: "accept", 1: "reject", 2: "decline"}
@@ -78,7 +80,7 @@ def attempt(case: Case, pool: Path, checker: str) -> Outcome:
         child = os.fork()
         if child == 0:
             _judge(case, pool, checker, here, told)
-        status, usage = _ended(child, start + _limit(case, checker))
+        status, usage = _ended(child, start + BUSY * _limit(case, checker))
         wall = time.monotonic() - start
         text = told.read_text(errors="replace") if told.exists() else ""
         verdict, why = _verdict(status, text)
@@ -96,7 +98,7 @@ def attempt(case: Case, pool: Path, checker: str) -> Outcome:
     return outcome if why else _compared(outcome, case)
 
 
-def _limit(case: Case, checker: str) -> float:
+def _limit(case: Case, checker: str) -> int:
     if checker not in ("scengen", "robosuite"):
         return PATIENCE
     return 3 * LIMIT if case.level == "full" or checker == "robosuite" else LIMIT
@@ -117,6 +119,7 @@ def _judge(case: Case, pool: Path, checker: str, here: Path, told: Path) -> None
         os.setsid()
         os.chdir(here)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, 2 * (_limit(case, checker),))
         out = os.open(told, os.O_WRONLY | os.O_CREAT)
         os.dup2(out, 1)
         os.dup2(out, 2)
@@ -144,7 +147,7 @@ def _ended(child: int, deadline: float) -> tuple[int | None, resource.struct_rus
 
 
 def _verdict(status: int | None, text: str) -> tuple[str, str]:
-    if status is None:
+    if status in (None, -signal.SIGXCPU, -signal.SIGKILL):
         return "crash", "did not end in time"
     if "Traceback (most recent call last)" in text:
         return "crash", text.strip().splitlines()[-1][:200]
@@ -237,6 +240,17 @@ def put(checker: str, chosen: Iterable[Case], pools: Path, progress: Callable[[O
     return outcomes
 
 
+def _warm() -> None:
+    """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
+    from scengen import cli, config  # noqa: F401
+    from scengen.commands import verify  # noqa: F401
+    from scengen.validate.identity import fingerprint, source_sha256
+
+    fingerprint()
+    for name in config.tasks():
+        source_sha256(config.task(name).family)
+
+
 def _tables(scores: Sequence[Score], outcomes: Sequence[Outcome]) -> Iterable[str]:
     for kind in sorted({o.kind for o in outcomes}):
         those = [o for o in outcomes if o.kind == kind]
@@ -264,9 +278,7 @@ def main() -> int:
         chosen = [c for c in chosen if c.expect == "accept"]
     shutil.rmtree(asked.pools, ignore_errors=True)
     write(chosen, asked.pools, FOLDER / "base")
-    from scengen import cli  # imported once, here, and not in every child  # noqa: F401
-    from scengen.validate import verify  # noqa: F401
-
+    _warm()
     scores, results, judged = [], {}, []
     for checker in asked.checker:
         outcomes = put(checker, chosen, asked.pools, lambda o: None)
