@@ -273,7 +273,7 @@ SIMULATED = {
 
 OTHERS = ("code", "horizon", "instruction", "seed", "comment", "wind", "motors on the robot", "idle left out", "jerk",
           "ablation not told", "shortcut not told", "lenient rest", "attempt", "twin", "level",
-          "one of four")  # fmt: skip
+          "bound")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FALSE)
