@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ..geometry import Vec3, quat
+from ..geometry import Vec3, about_y, quat
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, show, solid
 
@@ -182,6 +182,12 @@ class Ramp(Prop):
                 self._slab(part, f"{name}_{i}", start, end, rgba)
         for side in (-1, 1):
             self._walls(body, side)
+
+    def lay_down(self, patch: mujoco.MjsBody) -> None:
+        """Put the patch, which has lost its support, flat below its place, flush with the ground."""
+        middle = self.floor(self.at_height(self.goal))
+        patch.quat = np.array(quat("y", self.slope))
+        patch.pos = np.array([middle[0], 0.0, 0.0]) - about_y(self.slope) @ middle
 
     def _floors(self) -> Iterator[tuple[str, Rgba, list[tuple[Vec3, Vec3]]]]:
         """Name, colour and stretches of each part of the floor: the ends of every slab's surface."""

@@ -11,23 +11,20 @@ too high and it crosses the patch, too low and it never gets there.
 
 Decisions. (1) What "arrives at near-zero velocity" means; the paper gives no number. A ball that turns back on the
 patch has speed zero there, so the goal is: the ball rolled through the valley, has touched the patch, and has not gone
-past its upper edge. The patch is `Ramp.band` = 6 mm high, which is the same as a sliding ball that crosses the lower
-edge with at most sqrt(2 g band) = 0.34 m/s: 7 % of the energy that it has in the valley, if it comes down from 80 mm.
-The goal asks for contact and not for a speed because contact is seen at the physics rate, and because on a ramp
-without friction the ball rolls back at once: there is no state that lasts. Crossing the upper edge loses for good, and
-HOLD is longer than the time to cross the patch, so a ball that is only on its way across it never counts.
-(2) The robot may not touch the ball beyond the middle of the ramp; else the patch is reached by carrying the ball
-there. Pushing the ball on the near side is no failure, but makes it arrive too fast. (3) The paper calls the ramp
-frictionless and ships it with a friction of 0.10 to 0.50 (App. C). Training is close to the former; App. C is an axis,
-where the ball rolls. Rolling changes the speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not the height; the loss
-lies in between, where the ball slips as it rolls (see `Ramp.climb`). (4) The tray is fixed to the table: the paper does
-not say, and a tray that moves would be a tool of its own.
+past its upper edge. The patch is `Ramp.band` = 6 mm high: a sliding ball crosses its lower edge with at most
+sqrt(2 g band) = 0.34 m/s, 7 % of its energy in the valley. Contact is seen at the physics rate; on a ramp without
+friction no state lasts. Crossing the upper edge loses for good, and HOLD is longer than the time to cross the patch.
+(2) The robot may not touch the ball beyond the middle of the ramp, nor again after its run: else it is carried to the
+patch, or tried higher and higher. Pushing it on the near side is no failure, but makes it too fast. (3) The paper calls
+the ramp frictionless and ships it with 0.10 to 0.50 (App. C). Training is close to the former; App. C is an axis, where
+the ball rolls: that changes its speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not the height; the loss lies in
+between, where it slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table: a tray that moves is a tool.
 """
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import mujoco
@@ -37,7 +34,7 @@ from ..assets.ball import Ball
 from ..assets.bin import Bin
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ramp import RIM, WALL, Ramp
-from ..geometry import UP, Mat3, Outline, Vec3, about_y, about_z, corners, quat
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners
 from ..params import param
 from ..robots import jaw
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
@@ -102,17 +99,13 @@ class GalileoRampDrop(Scenario):
         yield from self.release_at(world, self.start)
 
     def release_at(self, world: World, s: float, on: str = "ramp/near") -> Plan:
-        """Take the ball from the tray and release it at rest on the floor of the ramp, at s [m].
-
-        The hand turns before it moves: doing both at once, by a right angle and so near to the robot's base, bends the
-        arm to where it cannot reach the ramp in 3 of 100 scenes.
-        """
+        """Take the ball from the tray and release it at rest on the floor of the ramp, at s [m]."""
         yield from self._drop_at(world, s, on)
         yield from retreat(world.arm, LIFT)
         yield from wait(world.arm, lambda: self.success(world), give_up=3.0)
 
     def _drop_at(self, world: World, s: float, on: str = "ramp/near") -> Plan:
-        """As `release_at`, but the open jaw stays where it is."""
+        """As `release_at`, but the open jaw stays. The hand turns first: both at once may bend the arm out of reach."""
         across, down = self.axes[:, 1], -self.axes @ self.ramp.normal(s)
         yield from turn_to(world.arm, closing_along(world.arm, across), rate=2.0)
         yield from pick(world.arm, world.com("ball"), across, lift=LIFT)
@@ -121,18 +114,15 @@ class GalileoRampDrop(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        def release(s: float, on: str = "ramp/near") -> Shortcut:
-            return Shortcut(lambda world: self.release_at(world, s, on))
-
         start, patch = self.ramp.height(self.start), self.ramp.at_height(self.ramp.goal)
         plans = {
-            "as_high_as_possible": release(self.brim),
-            "half_as_high": release(-self.ramp.at_height(start / 2)),
-            "carry_it_to_the_patch": release(patch, on="ramp/patch"),
+            "as_high_as_possible": Shortcut(partial(self.release_at, s=self.brim)),
+            "half_as_high": Shortcut(partial(self.release_at, s=-self.ramp.at_height(start / 2))),
+            "carry_it_to_the_patch": Shortcut(partial(self.release_at, s=patch, on="ramp/patch")),
             "catch_it_and_try_higher": Shortcut(self._try_higher),
         }
         if start - self.ramp.goal > 1.5 * self.ramp.band:
-            plans["as_high_as_the_patch"] = release(-patch)
+            plans["as_high_as_the_patch"] = Shortcut(partial(self.release_at, s=-patch))
         return plans
 
     def _try_higher(self, world: World) -> Plan:
@@ -140,54 +130,46 @@ class GalileoRampDrop(Scenario):
         arm, height = world.arm, self.ramp.height(self.start) - 0.008
         yield from self._drop_at(world, -self.ramp.at_height(height))
         while True:
-            yield from wait(arm, lambda: self._from_hand(world) > 0.12, give_up=2.0)
-            yield from wait(arm, lambda: self._from_hand(world) < 0.08, give_up=3.0)
+            yield from wait(arm, lambda: math.dist(world.com("ball"), arm.hand) > 0.12, give_up=2.0)
+            yield from wait(arm, lambda: math.dist(world.com("ball"), arm.hand) < 0.08, give_up=3.0)
             yield from grasp(arm)
             s = -self.ramp.at_height(height := height + 0.004)
             yield from put(arm, "ball", self.resting(s), "ramp/near", hover=0.02, down=-self.axes @ self.ramp.normal(s))
 
-    def _from_hand(self, world: World) -> float:
-        """Distance of the ball from the grip site [m]."""
-        return float(np.linalg.norm(world.com("ball") - world.arm.hand))
-
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it."""
         near, far = self.build(), self.build()
-        near.delete(near.body("ramp/near"))
-        for geom in [*far.body("ramp/far").geoms, *far.body("ramp/beyond").geoms]:
-            far.delete(geom)
-        patch, middle = far.body("ramp/patch"), self.ramp.floor(self.ramp.at_height(self.ramp.goal))
-        patch.quat = quat("y", self.ramp.slope)  # it has lost its support: flat on the table, below its place
-        patch.pos = np.array([middle[0], 0.0, 0.0]) - about_y(self.ramp.slope) @ middle
+        for scene, part in ((near, "near"), (far, "far"), (far, "beyond")):
+            for geom in list(scene.body(f"ramp/{part}").geoms):
+                scene.delete(geom)
+        self.ramp.lay_down(far.body("ramp/patch"))
         return {"no_near_incline": near, "no_far_incline": far}
 
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
         ramp, (low, high) = self.ramp, self.ramp.patch
-        on_incline = ramp.foot <= low and high <= ramp.top
-        yield require(on_incline, "the patch is not on the incline", low=low, high=high, foot=ramp.foot, top=ramp.top)
+        fits = ramp.foot <= low and high <= ramp.top
+        yield require(fits, "the patch is not on the incline", low=low, high=high, foot=ramp.foot, top=ramp.top)
         release, top, edge = ramp.height(self.start), ramp.height(self.brim), ramp.height(high)
         yield require(self.start >= self.brim, "the ball would have to start above the ramp", release=release, top=top)
         climbs = ramp.climb(self.brim, self.ball.radius)
         yield require(climbs >= edge + ramp.band, "a ball from the top does not overshoot", climbs=climbs, edge=edge)
 
         # A hand that points down holds the ball on the incline by its middle.
-        fits = ramp.width >= jaw.SPAN
+        fall, centre, fits = math.tan(ramp.slope), self.ball.radius / math.cos(ramp.slope), ramp.width >= jaw.SPAN
         yield require(fits, "the open jaw does not fit between the walls", jaw=jaw.SPAN, width=ramp.width)
-        fall, centre = math.tan(ramp.slope), self.ball.radius / math.cos(ramp.slope)
         room = centre - jaw.TIP - jaw.FINGER * fall
         yield require(room >= 0.0, "the fingers meet the floor before the ball does", room=room)
         room = centre + jaw.PALM_ABOVE - jaw.PALM_ACROSS * fall - RIM / math.cos(ramp.slope)
         yield require(room >= 0.0, "the palm meets the walls before the ball meets the floor", room=room)
-
         yield on_table("the ramp or the tray", self.outlines)
         yield within_reach("the ball's way", self.resting(self.start) + LIFT * UP, self.tray + LIFT * UP)
 
     def features(self) -> Mapping[str, float]:
         """How high the ball must start [m], and whether it slips: from 2/7 on it rolls."""
-        slope = math.tan(self.ramp.slope)
-        return {"release_height": self.ramp.height(self.start), "friction_over_slope": self.ramp.friction / slope}
+        ramp = self.ramp
+        return {"release_height": ramp.height(self.start), "friction_over_slope": ramp.friction / math.tan(ramp.slope)}
 
     # --- geometry ---------------------------------------------------------------------------
 
