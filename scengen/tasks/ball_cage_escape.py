@@ -40,7 +40,7 @@ from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
-from ..sim.world import World
+from ..sim.world import Arm, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import WRIST_SPARE, Pace, can_turn, go_to, hand_yaw, hold, turn_about_vertical, turn_to, wait
 
@@ -152,22 +152,24 @@ class BallCageEscape(Scenario):
         yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=0.05)
 
     def present(self, world: World, down: Vec3) -> Plan:
-        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
-
-        The hand turns the least that takes the leaning cage to the front, or to the middle of the table from there.
-        With a hole in a side it takes it as straight to the front as joint 7 can go: such a cage is tipped towards its
-        end first, and the end must not point to the robot.
-        """
+        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down."""
         arm, side, steep = world.arm, -1.0 if self.y > 0 else 1.0, math.acos(-down[2])
         low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
         spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
         yield from go_to(arm, [spot[0], spot[1], max(arm.hand[2], spot[2])], pace=LEVEL)
         yield from go_to(arm, spot, pace=LEVEL)
-        leaning, laps = world.rot("cage") @ down, (-2 * math.pi, 0.0, 2 * math.pi)
-        heading = math.atan2(leaning[1], leaning[0])
-        aside = {lap - side * front - heading: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
+        yield from turn_about_vertical(arm, self._turn_to_front(arm, world.rot("cage") @ down, -side))
+
+    def _turn_to_front(self, arm: Arm, leaning: Vec3, side: float) -> float:
+        """The least turn of the hand that takes a direction to the front, or up to `WIDEST` to a side of it [rad].
+
+        With a hole in a side it is the turn that takes it straightest to the front, as far as joint 7 can go: such a
+        cage is tipped towards its end first, and the end must not point to the robot.
+        """
+        heading, laps = math.atan2(leaning[1], leaning[0]), (-2 * math.pi, 0.0, 2 * math.pi)
+        aside = {side * front - heading + lap: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
         possible = [turn for turn in aside if can_turn(arm, turn, WRIST_SPARE / 2)]  # leaning relieves joint 7
-        yield from turn_about_vertical(arm, min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs))
+        return min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs)
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
@@ -213,22 +215,18 @@ class BallCageEscape(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        yield from self._ball_can_leave()
-        yield from self._ball_stays()
-        yield from self._cage_stands()
-
-    def _ball_can_leave(self) -> Iterator[Refutation | None]:
-        cage, r, near = self.cage, self.ball.radius, self.cage.offset - self.cage.hole
+        cage, stool, r = self.cage, self.stool, self.ball.radius
+        # The ball can leave.
         yield require(cage.margin >= 0, "the hole does not fit into its face", hole=cage.hole, margin=cage.margin)
         yield require(r < cage.hole, "the ball is wider than the hole", ball=r, hole=cage.hole)
+        near = cage.offset - cage.hole
         beyond = cage.face not in (BOTTOM, SIDE) or near >= cage.sill_x + cage.wall / 2
         yield require(beyond, "the hole is not beyond the sill", hole=near, sill=cage.sill_x)
         yield require(cage.face != TOP, "the hole looks up, and the hand cannot turn over", steepest=STEEPEST)
-        reached, numbers = self.least_tilt + SPARE <= STEEPEST, {"least": self.least_tilt, "steepest": STEEPEST}
-        yield require(reached, "the ball stays in at every tilt that the hand reaches", **numbers, spare=SPARE)
+        tilt = self.least_tilt + SPARE
+        yield require(tilt <= STEEPEST, "the ball stays in at every tilt of the hand", tilt=tilt, steepest=STEEPEST)
 
-    def _ball_stays(self) -> Iterator[Refutation | None]:
-        cage, r = self.cage, self.ball.radius
+        # It stays in until the cage is tilted.
         fits = 2 * r <= cage.cavity[2] and r + abs(self.ball_y) <= cage.cavity[1] / 2
         yield require(fits, "the ball does not fit between the walls", radius=r, y=self.ball_y)
         low, high = cage.pocket(r)
@@ -237,11 +235,10 @@ class BallCageEscape(Scenario):
         tilt = cage.tilt_over_sill(r)
         yield require(tilt >= LEAST_HELD, "the sill does not hold the ball", tilt=tilt, least=LEAST_HELD)
 
-    def _cage_stands(self) -> Iterator[Refutation | None]:
-        cage, stool, half = self.cage, self.stool, self.stool.length / 2
-        covered = abs(cage.offset - self.stool_x) + cage.hole <= half and cage.hole <= stool.width / 2
-        covered, sides = covered or cage.face != BOTTOM, {"length": stool.length, "width": stool.width}
-        yield require(covered, "the stool does not cover the hole", **sides)
+        # The cage stands by itself, where the hand can take it.
+        half, far = stool.length / 2, abs(cage.offset - self.stool_x) + cage.hole
+        covered = cage.face != BOTTOM or (far <= half and cage.hole <= stool.width / 2)
+        yield require(covered, "the stool does not cover the hole", far=far, hole=cage.hole, width=stool.width)
         load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
         lever = abs(load - self.stool_x)
         yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
