@@ -31,6 +31,8 @@ from scengen.validate.rollout import Jitter, run
 
 PAGE = Path("generated/mutation_score.jsonl")
 SCENARIOS = 3
+IDLE = 3
+"""Mutants that no written cheat exploits get this share of the rollouts."""
 VARIED = 40
 """Varied runs of the oracle for each task."""
 
@@ -59,9 +61,11 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
     with mutant.weakened():
         subjects = mutant.subjects(SCENARIOS)
         cheats = exploits(mutant, subjects[:2])
-        used, found = hunted(mutant, subjects, budget, TIERS)
-        _, plain = hunted(mutant, subjects, budget, [tier for tier in TIERS if tier != "shortcut"])
-        _, luck = hunted(mutant, subjects, used, [RANDOM])
+        used, found = hunted(mutant, subjects, budget if cheats else budget // IDLE, TIERS)
+        plain = found
+        if found and found.tier == "shortcut":
+            _, plain = hunted(mutant, subjects, budget, [tier for tier in TIERS if tier != "shortcut"])
+        luck = hunted(mutant, subjects, used, [RANDOM])[1] if found else None
     return {
         "task": mutant.task,
         "mutant": mutant.name,
@@ -92,9 +96,7 @@ def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
     return sorted(found)
 
 
-def hunted(
-    mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]
-) -> tuple[int, tuple[Hit, Subject] | None]:
+def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> tuple[int, Hit | None]:
     """Attack until a hit that the sound family refuses: how many rollouts that took, and the hit."""
     used = 0
     priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
@@ -109,7 +111,7 @@ def hunted(
         result = attack.run((budget - used) // (len(subjects) - number), tiers)
         used += sum(rate.rollouts for rate in result.rates)
         if attack.done:
-            return used, (result.hits[-1], subject)
+            return used, result.hits[-1]
     return used, None
 
 
@@ -136,10 +138,9 @@ def _hit(arena: Arena, attempt: Attempt, played: Any) -> Hit:
     return Hit(scenario, attempt.tier, False, str(attempt), played.seconds, digest, (), (), played.actions)
 
 
-def _told(found: tuple[Hit, Subject] | None) -> str:
-    if found is None:
+def _told(hit: Hit | None) -> str:
+    if hit is None:
         return ""
-    hit, _ = found
     return f"{hit.tier} {'raw' if hit.raw else 'filtered'}: {hit.plan[:120]}"
 
 

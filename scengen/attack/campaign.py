@@ -114,13 +114,12 @@ class Job:
     seed: int
     tiers: tuple[str, ...]
     priors: tuple[Prior, ...]
-    until: Callable[[Hit], bool] = lambda hit: False
 
     def __call__(self, number: int) -> Result:
         attacked = self.subjects[number]
         arena = arena_of(attacked)
         arena.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
-        attack = Attack(arena, self.seed, number, len(self.subjects), self.priors, self.until)
+        attack = Attack(arena, self.seed, number, len(self.subjects), self.priors)
         return attack.run(self.budget, self.tiers)
 
 

@@ -21,7 +21,7 @@ from scengen.attack.evidence import Hit
 from scengen.geometry import UP
 from scengen.scenario import Scenario
 from scengen.sim import scene_text
-from scengen.sim.world import ROBOT, World
+from scengen.sim.world import World
 from scengen.validate.rollout import replay, run
 
 TASKS = (
@@ -243,16 +243,6 @@ def holes(task: str) -> Iterator[Mutant]:
         yield Mutant(task, name, {"failure": sound}, mended={"failure": mended})
 
 
-def _carried(self: Any, world: World) -> str | None:
-    away = math.dist(world.pos("tile_0"), self.spot(0))
-    return "the first tile was carried" if world.touching(ROBOT, "tile_0") and away > 0.01 else None
-
-
-def _again(self: Any, world: World) -> str | None:
-    run_ = world.touched("ball", "ramp/far") and world.touching(ROBOT, "ball")
-    return "the ball was touched again after its run" if run_ else None
-
-
 def _wrong_end(self: Any, world: World) -> str | None:
     lean = math.degrees(math.asin(max(-1.0, min(1.0, float(world.rot("cage")[:, 0] @ UP)))))
     return "the cage was tilted to the wrong end" if lean > 25.0 else None
@@ -264,7 +254,5 @@ def _jerked(self: Any, world: World) -> str | None:
 
 
 HOLES: Mapping[str, Mapping[str, Callable[[Any, World], str | None]]] = {
-    "domino_single": {"hole: the first tile is carried": _carried},
-    "galileo_ramp_drop": {"hole: the ball is caught and let go again": _again},
     "ball_cage_escape": {"hole: both ends in turn": _wrong_end, "hole: shaking": _jerked},
 }

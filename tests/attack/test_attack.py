@@ -1,0 +1,200 @@
+"""The adversary on the smallest task: macros, forks, evidence, priors, and a hole that it must find."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from scengen import config
+from scengen.attack import draws
+from scengen.attack.campaign import Settings, arena_of, attack, drawn
+from scengen.attack.evidence import Hit, Rate, causal, hit, rates
+from scengen.attack.macros import Macro
+from scengen.attack.play import Arena, Attempt
+from scengen.attack.priors import fit
+from scengen.attack.search import RANDOM, RETRY, SEARCH, Attack
+from scengen.attack.solids import handles, sides
+from scengen.attack.variations import perturbed, rest
+from scengen.cli import run
+from scengen.control.teleop import Filter
+from scengen.predicates import touched_only
+from scengen.scenario import Answer
+from scengen.sim.world import ROBOT
+from scengen.validate.rollout import replay
+
+TASK = config.task("domino_single")
+
+
+def with_hole(self, world):
+    """The rules of the task without the one that the first tile may not be carried."""
+    if world.touched(ROBOT, "slab"):
+        return "the robot touched the slab"
+    return touched_only(world, "tile_0")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def hole():
+    with mock.patch.object(TASK.family, "failure", with_hole):
+        yield
+
+
+@pytest.fixture(scope="module")
+def subject():
+    return drawn(TASK, "id", 1, 0)[0]
+
+
+@pytest.fixture(scope="module")
+def arena(subject) -> Arena:
+    return arena_of(subject)
+
+
+PICK, AGAINST = Macro("pick", "tile_0", (0.6, 0.0, 1.0, 0.2)), Macro("push", "slab", (np.pi / 2, 0.8, 0.0, 0.08, 0.15))
+
+
+# --- playing ------------------------------------------------------------------------------------
+
+
+def test_a_hand_takes_what_leaves_room_for_its_fingers(arena):
+    arena.rewind()
+    best = handles(arena.solids, suction=False)[0]
+    assert best.name == "tile_0" and sides(arena.world, arena.solids, best) == [1, 0]
+
+
+@pytest.mark.parametrize("raw", [False, True])
+def test_a_fork_continues_bit_for_bit(arena, raw):
+    whole = arena.play((PICK, AGAINST), raw)
+    node = arena.play((PICK,), raw).nodes[0]
+    forked = arena.play((AGAINST,), raw, node)
+    assert forked.digest == whole.digest and np.array_equal(forked.actions, whole.actions)
+    assert forked.signature == whole.signature
+
+
+def test_a_macro_that_gives_up_does_not_end_the_plan(arena):
+    played = arena.play(
+        (Macro("press", "slab", (0.0, 0.0, 0.2, 0.1)), Macro("go", "", (3.0, 0, 1, 0, 0, 0, 1)), PICK), True
+    )
+    assert played.outcome == "failure" or played.notes
+
+
+def test_draws_depend_on_their_key_alone(arena):
+    first = [draws.plan(arena, 0, "a", k) for k in range(20)]
+    arena.play((PICK,), False)
+    assert [draws.plan(arena, 0, "a", k) for k in range(20)] == first
+    assert len({macro.kind for plan in first for macro in plan}) >= 5
+    assert draws.plan(arena, 1, "a", 0) != first[0]
+
+
+# --- witnesses ----------------------------------------------------------------------------------
+
+
+def test_phases_cover_the_witness_and_can_be_followed(arena):
+    phases = arena.trace.phases
+    assert phases[0][0] == 0 and phases[-1][1] == len(arena.trace.actions)
+    assert all(one[1] == other[0] for one, other in pairwise(phases))
+    assert arena.trace.handled == ("tile_0",) and arena.trace.concerned[0] == "slab"
+    for raw in (False, True):
+        assert arena.play(rest(arena, 0), raw).solved
+
+
+def test_recorded_actions_come_through_the_filter(arena):
+    arena.foreign = {"own": arena.trace.actions}
+    asked = list(arena.plan(Macro("replay", "own"), raw=False))
+    filtered = np.array([f(a) for f in [Filter()] for a in asked])
+    assert np.allclose(filtered, arena.trace.actions, atol=1e-5)
+    assert arena.play((Macro("replay", "own"),), raw=True).solved
+    arena.foreign = {}
+
+
+def test_perturbed_witnesses_begin_where_a_phase_does(arena):
+    attempts = list(perturbed(arena))
+    assert {attempt.stage for attempt in attempts} == {None, *range(arena.phases)}
+    assert len(set(attempts)) == len(attempts)
+
+
+# --- evidence -----------------------------------------------------------------------------------
+
+
+def test_carrying_lacks_the_chain(arena, subject, tmp_path):
+    played = arena.play((PICK, AGAINST), raw=False)
+    found = hit(arena, Attempt("random", (PICK, AGAINST)), False, played, None, causal(arena))
+    assert found and found.refutes and ("tile_0", "tile_1") in found.lacks and "tile_1" in found.unmoved
+    found.store(tmp_path)
+    stored = Hit.load(tmp_path / f"{found.name}.npz")
+    assert stored == found
+    again = replay(subject.scenario, arena.world, stored.actions, subject.horizon)
+    assert again.solved and again.digest == found.digest
+
+
+def test_the_witness_itself_refutes_nothing(arena):
+    steps = rest(arena, 0)
+    found = hit(arena, Attempt("witness", steps), False, arena.play(steps, False), None, causal(arena))
+    assert found and not found.refutes
+
+
+def test_what_does_not_replay_is_no_hit(arena):
+    played = arena.play((PICK, AGAINST), raw=False)
+    forged = replace(played, digest="0" * 16)
+    assert hit(arena, Attempt("random", (PICK,)), False, forged, None, frozenset()) is None
+
+
+def test_rates_add_up_and_have_bounds():
+    counts = [Rate(RANDOM, False, 20), Rate(RANDOM, False, 39), Rate(RANDOM, True, 10, 10, 2)]
+    none, every = rates(counts)
+    assert none.rollouts == 59 and none.bound == pytest.approx(0.0495, abs=1e-3)
+    assert every.value == 1.0 and every.bound == 1.0 and every.refuting == 2
+
+
+def test_the_adversary_finds_that_the_first_tile_can_be_carried(arena):
+    """It knows nothing of dominoes: it takes what the witness touches, to where the witness ends."""
+    found = Attack(arena, 0, until=lambda hit: hit.refutes)
+    result = found.run(60, (RETRY, RANDOM, SEARCH))
+    assert any(one.refutes for one in result.hits)
+    assert sum(rate.rollouts for rate in result.rates) <= 60
+
+
+# --- priors -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A family that asks for a number from 0 to 4."""
+
+    number: int
+
+    def answer(self):
+        return Answer((0.0, 1.0, 2.0, 3.0, 4.0), lambda world, value: iter(()), lambda value: value == self.number)
+
+
+def test_fixed_answers_are_the_best_ones_together():
+    training = [Lane(k) for k in (2, 2, 2, 2, 1, 1, 1, 4, 4, 0)]
+    one, two, three = fit(training, fresh=[Lane(2), Lane(4), Lane(3), Lane(3)])
+    assert (one.values, one.fitted, one.fresh) == ((2.0,), 0.4, 0.25)
+    assert two.values == (2.0, 1.0) and two.fitted == 0.7
+    assert three.values == (2.0, 1.0, 4.0) and three.fresh == 0.5 and three.bound < 1.0
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+def test_an_attack_is_stored_and_continues(tmp_path, subject):
+    settings, said = Settings(n=1, budget=4, tiers=["random"]), []
+    first = attack(TASK, [subject], settings, tmp_path, lambda done, hits: said.append(done))
+    again = attack(TASK, [subject], settings, tmp_path, lambda done, hits: said.append(done))
+    assert said == [1] and first.plain() == again.plain() and first.rollouts == 4
+
+
+def test_the_command_says_what_is_missing(tmp_path, capsys):
+    assert run(["attack"]) == 2
+    assert "task=NAME or pool=FOLDER" in capsys.readouterr().err
+    assert run(["attack", "task=domino_single", "tiers=[luck]"]) == 2
+    assert "random" in capsys.readouterr().err
+
+
+def test_the_command_fails_where_a_hit_refutes(tmp_path):
+    """The declared shortcut that carries the tile is no failure here."""
+    report = tmp_path / "report.json"
+    words = ["task=domino_single", "n=1", "budget=10", "tiers=[shortcut]", f"to={tmp_path}", f"json={report}"]
+    assert run(["attack", *words]) == 1
+    assert '"refutes": true' in report.read_text() and list(tmp_path.glob("*.npz"))
