@@ -96,6 +96,12 @@ def task(name: str, search: Sequence[str] = ()) -> Task:
     return load(choices["task"], plain["task"])
 
 
+def levels(found: Task) -> dict[str, CertifySettings]:
+    """The settings that stand behind each name of a level, such as `quick`, for a task: without a command line."""
+    names = sorted(path.stem for path in (conf_dir() / "certify").glob("*.yaml"))
+    return {name: typed("certify", CertifySettings, _settled({}, found, name)) for name in names}
+
+
 def typed(where: str, cls: type[T], node: Mapping[str, Any]) -> T:
     """Fill a dataclass from plain data, checking names and types.
 
@@ -258,7 +264,7 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
         known = ", ".join(re.findall(r"^\s+(\S+)$", text, re.M))
         return BadConfig(f"which {match[1]}? say {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
-        return _unknown_key(verb, overrides, match[1]) or BadConfig(_first_lines(text))
+        return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_first_lines(text)}; see scengen {verb} --help")
     if isinstance(error, OmegaConfBaseException):
         what = f"{error.full_key}: " if error.full_key else ""
         return BadConfig(f"{what}{_first_lines(text.splitlines()[0])}; give the value itself")

@@ -2,7 +2,6 @@
 
 import secrets
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 from rich.table import Table
@@ -13,12 +12,10 @@ from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..parallel import Limits
 from ..pool import Pool
-from ..runs.generate import Settings as GenerateSettings
 from ..runs.progress import ProgressBar
 from ..targets import try_file
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
-from ..validate.settings import CertifySettings
 from ..validate.verify import Options, Report, verify
 from . import BAD_INPUT, FAILED, OK, Arguments, err, one, out, say, warn, write, write_json
 
@@ -50,7 +47,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_file(settings.junit)
     pool = Pool.open(one(settings.pool))
-    search = search_path(arguments)
+    task = config.task(pool.task, search_path(arguments))
     options = Options(
         settings.level,
         settings.sample,
@@ -60,25 +57,13 @@ def command(arguments: Arguments) -> int:
         settings.expired == "fail",
     )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        find_task = partial(config.task, search=search)
-        report = verify(pool, find_task, levels(pool.task, search), options, progress_bar.show)
+        report = verify(pool, task, config.levels(task), options, progress_bar.show)
     if settings.json:
         write_json(settings.json, {"pool_sha256": pool.sha256, **asdict(report)})
     if settings.junit:
         write(Path(settings.junit), junit(str(pool.folder), report))
     _tell(pool, report)
     return STATUS[report.verdict]
-
-
-def levels(name: str, search: tuple[str, ...]) -> dict[str, CertifySettings]:
-    """The settings that stand behind the names of a task's levels.
-
-    Raises:
-        UnknownName: there is no such task.
-    """
-    config.task(name, search)
-    asked = ((level, [f"task={name}", f"certify={level}", *search]) for level in ("quick", "full"))
-    return {level: config.read_task("generate", overrides, GenerateSettings)[2] for level, overrides in asked}
 
 
 def _tell(pool: Pool, report: Report) -> None:

@@ -99,7 +99,7 @@ class Report:
 
 def verify(
     pool: Pool,
-    find_task: Callable[[str], Task],
+    installed: Task,
     levels: Mapping[str, CertifySettings],
     options: Options,
     progress: Callable[[int], None] = lambda done: None,
@@ -107,7 +107,7 @@ def verify(
     """Check every claim of a pool that can be checked at a level.
 
     Args:
-        find_task: gives the installed task of a name; a pool names its tasks and never code.
+        installed: the task of that name on this machine; a pool names its task, and never code.
         levels: the settings that stand behind a name such as `quick`, for this task.
         progress: told how many scenarios have been checked.
     """
@@ -115,7 +115,6 @@ def verify(
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
     try:
-        installed = find_task(pool.task)
         task, settings = task_of_manifest(pool, installed), settings_of(pool.manifest["config"]["certify"])
         claims = Claims.of(pool, task, settings)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:

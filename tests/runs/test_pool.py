@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 def examined(folder, strict=True, workers=1):
     options = Options("replay", workers=workers, strict=strict, limits=None)
-    return verify(Pool.open(folder), config.task, {"quick": CertifySettings()}, options)
+    return verify(Pool.open(folder), config.task("domino_single"), {"quick": CertifySettings()}, options)
 
 
 def failures(folder, strict=True, workers=1):

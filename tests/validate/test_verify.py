@@ -19,7 +19,6 @@ from pools import certificate_of
 
 from scengen import config, pool
 from scengen.certificate import as_json
-from scengen.commands.verify import levels
 from scengen.errors import PoolError
 from scengen.parallel import Limits
 from scengen.pool import Pool
@@ -43,11 +42,13 @@ def rows(source):
     return tuple(opened(source).rows())
 
 
+task = cache(config.task)
+
+
 @cache
 def claims(source):
     of = opened(source)
-    task = task_of_manifest(of, config.task(of.task))
-    return Claims.of(of, task, settings_of(of.manifest["config"]["certify"]))
+    return Claims.of(of, task_of_manifest(of, task(of.task)), settings_of(of.manifest["config"]["certify"]))
 
 
 def reasons(source, row, level="replay", simulated=False):
@@ -149,7 +150,7 @@ def parameter(name, by):
         from scengen.validate.rebuilt import rebuild
 
         params = {**row.params, name: row.params[name] * by}
-        scenario = config.task(row.task).scenario(params)
+        scenario = task(row.task).scenario(params)
         text = rebuild(scenario)
         forged = pool.sha256(text)
         row = replace(row, params=params, id=scenario.id, id_twin=scenario.id, scene_xml=text, scene_sha256=forged)
@@ -317,7 +318,7 @@ def mine(tmp_path):
 def report(folder, **options):
     of = Pool.open(folder)
     asked = {"level": "replay", "limits": None, "strict": False, "sample": 1, **options}
-    return verify(of, config.task, levels(of.task, ()), Options(**asked))
+    return verify(of, task(of.task), config.levels(task(of.task)), Options(**asked))
 
 
 def changed(folder, change):
@@ -476,7 +477,7 @@ def test_own_settings_are_told(mine):
 
 
 def test_what_takes_too_long_is_declined_and_the_others_are_not():
-    found = verify(opened("single"), config.task, levels("domino_single", ()),
+    found = verify(opened("single"), task("domino_single"), config.levels(task("domino_single")),
                    Options("full", sample=1, limits=Limits(0.5, 4000), strict=False))  # fmt: skip
     assert (found.verdict, found.declined, found.sound) == ("declined", 1, 5)
     assert "took longer than 0.5 s" in found.failed[0]["reason"]
