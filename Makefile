@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test fuzz check types format certify axes docs reference bench clean
+.PHONY: setup demo test fuzz kills check types format certify axes docs reference bench clean
 
 setup: $(READY)
 
@@ -33,6 +33,11 @@ FUZZ ?= 2000
 SEED ?= 0
 fuzz: setup
 	$(BIN)/python tests/fuzz/run.py $(FUZZ) $(SEED)
+
+# Generation runs that are killed in every way and continued: their pools must have the same bytes in the end.
+KILLS ?= 50
+kills: setup
+	$(BIN)/python tests/fuzz/kills.py $(KILLS) $(SEED)
 
 check: setup
 	$(BIN)/ruff format --check

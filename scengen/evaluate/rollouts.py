@@ -248,7 +248,7 @@ class PolicyPlayer:
         over = False
         while not over:
             with blamed(name, f"its act {where}"):
-                action = np.asarray(policy.act(observation))
+                action = np.asarray(policy.act(observation), float)
             try:
                 observation, _, terminated, truncated, info = env.step(action)
             except (ValueError, TypeError) as error:

@@ -19,6 +19,8 @@ from .dists import Dist, Fixed, parse
 from .split import ID, Part, Split
 
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
+LONGEST = 3600.0
+"""Largest horizon of a task [s]: what a certificate may take, and far beyond any task."""
 OPTIONAL = ("axes", "certify", "embodiment", "limits")
 
 
@@ -211,11 +213,11 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     family = _family(name, node["family"])
     known = {p.name: p for p in parameters(family())}
     training: dict[str, Dist] = {n: Fixed(p.nominal) for n, p in known.items()}
-    training.update(_space(f"{name}.id", node["id"] or {}, known))
+    training.update(_space(f"{name}.id", _group(f"{name}.id", node["id"]), known))
     for symmetry in family.SYMMETRIES:
         symmetry.check(known)
-    axes, limits = {}, node.get("limits") or {}
-    for axis, inner in (node.get("axes") or {}).items():
+    axes, limits = {}, _group(f"{name}.limits", node.get("limits"))
+    for axis, inner in _group(f"{name}.axes", node.get("axes")).items():
         where = f"{name}.axes.{axis}"
         if axis == ID or not str(axis).isidentifier():
             raise BadConfig(f"{where}: {axis!r} cannot name an axis; use letters, digits and _, and not {ID!r}")
@@ -242,7 +244,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         _embodiment(name, node.get("embodiment", JAW)),
         training,
         axes,
-        node.get("certify") or {},
+        _group(f"{name}.certify", node.get("certify")),
         node,
     )
     _ = task.proofs
@@ -265,6 +267,13 @@ def _family(name: str, path: Any) -> type[Scenario]:
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is no Scenario")
     return family
+
+
+def _group(where: str, node: Any) -> Mapping[str, Any]:
+    """A group of settings; an empty one where nothing is given."""
+    if node is not None and not isinstance(node, Mapping):
+        raise BadConfig(f"{where} = {cut(repr(node))}; expected a group of settings, {{name: value}}")
+    return node or {}
 
 
 def _check_keys(where: str, node: Mapping[str, Any], required: tuple[str, ...], optional: tuple[str, ...]) -> None:
@@ -319,12 +328,14 @@ def _limits(
 
 
 def _positive(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
-        raise BadConfig(f"{where} = {value!r}; it must be a positive number of seconds")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= LONGEST:
+        told = cut(repr(value))
+        raise BadConfig(f"{where} = {told}; it must be a positive number of seconds, at most {LONGEST:g}")
     return float(value)
 
 
-def _embodiment(name: str, value: str) -> str:
-    if value not in EMBODIMENTS:
-        raise BadConfig(f"{name}.embodiment = {value!r}{nearest(value, EMBODIMENTS)}; known: {', '.join(EMBODIMENTS)}")
+def _embodiment(name: str, value: Any) -> str:
+    if not isinstance(value, str) or value not in EMBODIMENTS:
+        close, known = nearest(str(value), EMBODIMENTS), ", ".join(EMBODIMENTS)
+        raise BadConfig(f"{name}.embodiment = {cut(repr(value))}{close}; known: {known}")
     return value

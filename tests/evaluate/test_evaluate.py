@@ -1,6 +1,9 @@
 """Evaluation: who must succeed succeeds, who must fail fails, and a run that was cut short goes on."""
 
+import importlib
 import json
+import sys
+import tempfile
 
 import helpers
 import pytest
@@ -99,3 +102,69 @@ def test_results_of_other_settings_are_not_mixed(tmp_path, capsys):
     run(tmp_path / "out", "idle", seeds=1)
     argv = ("evaluate", f"pool={REFERENCE}", "policy=random", "seeds=1", f"to={tmp_path / 'out'}")
     assert cli.run(argv) == 2 and "other pools or settings" in capsys.readouterr().err
+
+
+MINE = (
+    "class Up:\n"
+    "    def __init__(self, env): pass\n"
+    "    def reset(self, *_): pass\n"
+    "    def act(self, _): return [0] * 7\n"
+)
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A policy of one's own in the working directory, and a function that evaluates it."""
+    monkeypatch.chdir(tmp_path)
+    name = f"mine_{tmp_path.name}".replace("-", "_")
+
+    def go(*more, source=MINE):
+        (tmp_path / f"{name}.py").write_text(source)
+        sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        argv = ("evaluate", f"policy={name}:Up", f"pool={REFERENCE}", "seeds=1", "rollouts=1", "to=out", *more)
+        return cli.run(argv)
+
+    return go
+
+
+def test_episodes_of_another_policy_are_never_taken_for_new_ones(mine, tmp_path, capsys):
+    assert mine() == 0 and "earlier run" not in capsys.readouterr().out
+    assert mine("rollouts=2") == 0 and "1 of 2 episodes are from an earlier run" in capsys.readouterr().out
+    changed = MINE.replace("[0] * 7", "[1] * 7")
+    assert mine(source=changed) == 2
+    told = capsys.readouterr().err
+    assert "(code." in told and "fresh=true" in told and told.count("\n") == 1
+    assert mine("version=2") == 2 and "(version)" in capsys.readouterr().err
+    old = (tmp_path / "out" / "episodes.jsonl").read_bytes()
+    assert mine("fresh=true", source=changed) == 0 and "earlier run" not in capsys.readouterr().out
+    assert (tmp_path / "out" / "episodes-1.jsonl").read_bytes() == old
+    assert mine("fresh=true", source=changed) == 0 and (tmp_path / "out" / "episodes-2.jsonl").exists()
+
+
+@pytest.mark.parametrize("told", ["    version = {0!r}\n", "    def identity(self): return {0!r}\n"])
+def test_a_policy_that_tells_its_version_is_bound_to_it_and_not_to_its_source(mine, told):
+    assert mine(source=MINE + told.format("a")) == 0
+    assert mine(source=MINE + told.format("a") + "# a remark\n") == 0
+    assert mine(source=MINE + told.format("b")) == 2
+
+
+@pytest.mark.parametrize(
+    ("source", "says"),
+    [
+        ("raise RuntimeError('no GPU')\n", "its module cannot be imported (RuntimeError: no GPU)"),
+        ("import nowhere_at_all\nUp = 1\n", "its module cannot be imported (ModuleNotFoundError"),
+        ("def Up(env): return None\n", "its factory returned NoneType, which has no method reset and no act"),
+        ("def Up(env): return 1 / 0\n", "its factory fails (ZeroDivisionError"),
+        (MINE.replace("return [0] * 7", "raise ValueError('odd')"), "its act on scenario"),
+        (MINE.replace("[0] * 7", "'up'"), "its act on scenario"),
+        (MINE.replace("[0] * 7", "[0] * 6"), "7 finite numbers"),
+    ],
+)
+def test_a_fault_of_a_policy_is_called_one(mine, capsys, monkeypatch, tmp_path, source, says):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    assert mine(source=source) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1 and "unforeseen" not in told
+    traces = list(tmp_path.glob("scengen-*.txt"))
+    assert len(traces) == ("the fault is the policy's" in told) and all(str(t) in told for t in traces)

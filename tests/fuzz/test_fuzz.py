@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzz import run
+from fuzz import kills, run
 from scengen import cli
 
 COUNT, SEED = 200, 1
@@ -15,6 +15,10 @@ COUNT, SEED = 200, 1
 def test_mangled_command_lines_end_in_order():
     bad = run.run(COUNT, SEED)
     assert not bad, "\n".join(f"{' '.join(line)[:300]}\n    {wrong}" for line, wrong in bad)
+
+
+def test_runs_that_are_killed_lose_nothing():
+    assert not kills.run(2, seed=1, each=2)
 
 
 def test_the_judge_sees_what_is_wrong(monkeypatch):

@@ -1,0 +1,122 @@
+"""Kills generation runs in every way and compares their pools in the end: `python tests/fuzz/kills.py 50 [seed]`.
+
+A run is begun, killed after a random time, and continued until it ends. Its pool must have the bytes of one that was
+made without a break, and no process may stay.
+"""
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+WAYS = ("SIGKILL", "SIGTERM", "SIGINT", "worker", "disk")
+"""Kill the group; tell the run to stop; press Ctrl-C; kill one worker; let no file grow beyond a size."""
+QUICKLY = ("certify.robust.runs=1", "certify.robust.bound=0.04")
+N = 3
+"""Scenarios of a pool."""
+SECONDS = 12.0
+"""A run is killed within this time [s]: about as long as it takes on a free machine."""
+
+
+def start(pool: Path, workers: int, limit: int | None = None) -> subprocess.Popen[str]:
+    """Begin or continue a run, in a process group of its own."""
+
+    def prepare() -> None:
+        os.setsid()
+        if limit:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    argv = [sys.executable, "-m", "scengen", "generate", "task=domino_single", *QUICKLY, f"n={N}"]
+    return subprocess.Popen(
+        [*argv, f"workers={workers}", f"pool={pool}"],
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=prepare,
+    )
+
+
+def group(leader: int) -> list[int]:
+    """Living processes of a process group besides its leader."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, pgrp = stat.read_text().rpartition(")")[2].split()[:3]
+            if int(pgrp) == leader and state != "Z" and int(stat.parent.name) != leader:
+                found.append(int(stat.parent.name))
+    return found
+
+
+def hit(pool: Path, way: str, after: float, workers: int) -> str:
+    """Begin or continue a run and kill it. What went wrong, or nothing."""
+    process = start(pool, workers, limit=int(20_000 + 10_000 * after) if way == "disk" else None)
+    if way != "disk":
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(after)
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            if way == "SIGKILL":
+                os.killpg(process.pid, signal.SIGKILL)
+            elif way == "SIGTERM":
+                process.terminate()
+            elif way == "SIGINT":
+                os.killpg(process.pid, signal.SIGINT)
+            elif way == "worker" and (workers_alive := group(process.pid)):
+                os.kill(workers_alive[-1], signal.SIGKILL)
+    _, told = process.communicate()
+    time.sleep(0.3)
+    if left := group(process.pid):
+        return f"processes stay: {left}"
+    lines = [line for line in told.splitlines() if line.startswith("scengen")]
+    if "Traceback" in told or len(lines) > 1 or "damaged" in told:
+        return f"said {told[-600:]!r}"
+    if list(pool.parent.rglob("*.part")) and way != "SIGKILL":
+        return "a .part is left"
+    return ""
+
+
+def finish(pool: Path) -> bytes:
+    """Continue a run to its end; its manifest, which holds the hashes of all files."""
+    process = start(pool, workers=1)
+    _, told = process.communicate()
+    if process.returncode != 0:
+        raise RuntimeError(f"the run does not go on: {told[-600:]}")
+    return (pool / "manifest.json").read_bytes()
+
+
+def run(kills: int, seed: int, each: int = 5) -> list[str]:
+    """Kill runs, `each` times every pool; what went wrong."""
+    pick, wrong = random.Random(seed), []
+    with tempfile.TemporaryDirectory() as folder:
+        whole = finish(Path(folder, "whole"))
+        for number in range(0, kills, each):
+            pool = Path(folder, f"pool{number}")
+            for k in range(number, min(number + each, kills)):
+                way, after = WAYS[k % len(WAYS)], pick.uniform(0.2, SECONDS)
+                if fault := hit(pool, way, after, workers=pick.choice((1, 2))):
+                    wrong.append(f"{way} after {after:.1f} s: {fault}")
+            try:
+                if finish(pool) != whole:
+                    wrong.append(f"pool {number}: other bytes")
+            except RuntimeError as error:
+                wrong.append(f"pool {number}: {error}")
+            print(f"{min(number + each, kills)} of {kills} kills, {len(wrong)} ended badly", flush=True)
+    return wrong
+
+
+def main() -> int:
+    wrong = run(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)
+    print("\n".join(wrong))
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
