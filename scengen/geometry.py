@@ -22,6 +22,12 @@ def heading(angle: float) -> Vec3:
     return np.array([math.cos(a), math.sin(a), 0.0])
 
 
+def polar(offset: Vec3) -> tuple[float, float]:
+    """Direction [rad], 0 is x, and length [m] of an offset as seen from above."""
+    x, y = offset[:2]
+    return math.atan2(y, x), math.hypot(x, y)
+
+
 def about_z(yaw: float) -> Mat3:
     """The rotation by `yaw` [rad] about the vertical."""
     c, s = math.cos(yaw), math.sin(yaw)

@@ -90,6 +90,19 @@ def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
     return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - length
 
 
+def box_shortfall(
+    centre: NDArray[np.float64], rot: NDArray[np.float64], half: ArrayLike, length: float = panda.REACH
+) -> float:
+    """`shortfall` of the point of a box that is nearest to the shoulder, and so of every point of it [m].
+
+    Args:
+        half: half its edges, shape (3,), or half the edge of a cube [m].
+        length: as for `shortfall`.
+    """
+    inside = np.clip(rot.T @ (panda.SHOULDER - centre), -np.asarray(half), half)
+    return shortfall(centre + rot @ inside, length)
+
+
 def _descend(goal: NDArray[np.float64], rot: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
     arm = _arm()
     low, high = arm.limits

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from scengen import config
-from scengen.geometry import UP, between
+from scengen.geometry import UP, about_y, about_z, between
 from scengen.robots import ik, panda
 from scengen.skills.motion import facing_down
 from scengen.tasks.tool_retrieve import ARM, ToolRetrieve
@@ -120,6 +120,29 @@ def test_the_search_never_comes_nearer_than_the_bound(direction, away):
     target = panda.SHOULDER + (panda.REACH + away) * np.array(direction) / np.linalg.norm(direction)
     assert ik.shortfall(target) == pytest.approx(away)
     assert ik.reach(target).residual >= away
+
+
+@given(
+    half=st.tuples(*[st.floats(0.01, 0.2)] * 3),
+    centre=st.tuples(*[st.floats(-0.8, 0.8)] * 3),
+    yaw=st.floats(-3.0, 3.0),
+    tilt=st.floats(-3.0, 3.0),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_box_is_missed_by_as_much_as_the_nearest_of_its_points(half, centre, yaw, tilt):
+    """The grid misses the nearest point by at most half the diagonal of a cell."""
+    middle, rot = panda.SHOULDER + np.array(centre), about_z(yaw) @ about_y(tilt)
+    grid = np.array(np.meshgrid(*[np.linspace(-1, 1, 11)] * 3)).reshape(3, -1).T * half
+    nearest = min(float(np.linalg.norm(middle + rot @ point - panda.SHOULDER)) for point in grid) - ik.TOUCH
+    assert nearest - 0.1 * float(np.linalg.norm(half)) - 1e-9 <= ik.box_shortfall(middle, rot, half, ik.TOUCH)
+    assert ik.box_shortfall(middle, rot, half, ik.TOUCH) <= nearest + 1e-9
+
+
+@pytest.mark.parametrize("half", [0.03, (0.03, 0.03, 0.03)])
+def test_a_box_in_front_of_the_shoulder_is_missed_by_its_near_face(half):
+    centre = panda.SHOULDER + np.array([panda.REACH + 0.1, 0.01, -0.02])
+    near = panda.SHOULDER + np.array([panda.REACH + 0.07, 0.0, 0.0])
+    assert ik.box_shortfall(centre, np.eye(3), half) == pytest.approx(ik.shortfall(near)) == pytest.approx(0.07)
 
 
 @pytest.mark.parametrize("split", ["id", "far_corner"])  # the others have the cubes of id
