@@ -25,7 +25,7 @@ demo: setup
 	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html
 
 test: setup
-	$(BIN)/scengen verify pool=generated/reference workers=2
+	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
 	$(BIN)/python -m pytest -n 2
 
 # Mangled command lines: each must end with exit 0, 1 or 2 and one line with a remedy. FUZZ of them, from SEED.
