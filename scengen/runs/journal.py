@@ -91,7 +91,8 @@ class Journal:
         if before is not None and begun[0] != text:
             differs = ", ".join(different(before, dict(identity)))
             raise PoolError(
-                f"{pool} was begun with other settings ({differs}); choose another pool=, or move it and {self.folder} aside"
+                f"{pool} was begun with other settings ({differs}); choose another pool=, or move it and "
+                f"{self.folder} aside"
             )
 
     def records(self) -> dict[int, Record]:
