@@ -104,7 +104,7 @@ def test_a_failed_verification_is_status_1(capsys, made, tmp_path):
     content[len(content) // 2] ^= 4
     shard.write_bytes(content)
     status, err = said(capsys, "verify", f"pool={broken}", f"json={tmp_path / 'v.json'}")
-    assert status == 1 and "FAILED" in err and "Traceback" not in err
+    assert status == 1 and "REFUTED" in err and "Traceback" not in err
     assert '"failed": [' in (tmp_path / "v.json").read_text()
 
 
