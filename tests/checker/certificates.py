@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from forgery import Case, Draft
+from forgery import ELSEWHERE, Case, Draft
 from labels import Change, _both
 
 OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
@@ -267,6 +267,17 @@ WITNESS: dict[str, tuple[str, Change]] = {
     "tail": (r"witness", _witness(_tail)),
     "unfiltered_oracle": (r"witness|filter", _unfiltered),
 }
+
+
+def _tail_elsewhere(draft: Draft) -> None:
+    """Ten minutes of actions behind the end, where the lengths of other machines need not be equal."""
+    draft.everywhere(fingerprint=ELSEWHERE)
+    actions = draft.row["witness"]
+    draft.row["witness"] = np.vstack([actions, np.tile(actions[-1:], (60_000, 1))])
+    draft.timed(len(draft.row["witness"]), draft.check("witness")["numbers"]["seconds"])
+
+
+WITNESS["tail_elsewhere"] = (r"witness", _tail_elsewhere)
 
 QUICK = {
     "one_check_listed", "check_failed", "called_full_everywhere", "settle_was_short", "rest_beyond_its_limit",

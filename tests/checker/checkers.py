@@ -17,7 +17,7 @@ def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
     """`scengen verify`, as on the command line."""
     from scengen import cli
 
-    return cli.run(["verify", f"pool={folder}", f"level={level}", *arguments])
+    return cli.run(["verify", f"pool={folder}", f"level={level}", "json=out.json", "junit=out.xml", *arguments])
 
 
 def robosuite(folder: Path, level: str, arguments: tuple[str, ...]) -> int:

@@ -225,7 +225,7 @@ class Case:
     base: str
     """The pool that it is made from."""
     expect: str
-    """`accept`, `reject`, `decline`, or `refuse` where either of the last two will do."""
+    """`accept`, `reject`, `decline`, `refuse` where either of the last two will do, or `end` where any will."""
     says: str = ""
     """Regular expression of the reason, or of the remark about a pool that is accepted."""
     forge: Callable[[Draft], None] | None = None

@@ -100,6 +100,7 @@ ROWS: dict[str, Change] = {
     "id_capital": _row(id="ABCDEF012345"),
     "id_empty": _row(id=""),
     "id_null": _row(id=None),
+    "id_with_a_line": lambda d: d.row.update(id=d.row["id"] + "\n", kept=("id",)),
     "task_null": _row(task=None),
     "task_climbs": _row(task="../../evil"),
     "task_bracketed": _row(task="[domino_single]"),
@@ -108,6 +109,7 @@ ROWS: dict[str, Change] = {
     "task_interpolated": _row(task="${oc.env:HOME}"),
     "instruction_markup": _row(instruction="[/]"),
     "instruction_terminal": _row(instruction="\x1b[31m\x1b]0;owned\x07"),
+    "instruction_long": _row(instruction="x" * 50_000_000),
     "instruction_null": _row(instruction=None),
     "split_markup": _row(split="[/bold]"),
     "axes_null": _row(axes=None),
@@ -176,6 +178,27 @@ def _imports(family: str) -> Change:
     return lambda draft: draft.task.update(family=family)
 
 
+def _axes(count: int, severities: int = 0) -> Change:
+    """Axes of the command line's own, each of them sound."""
+    axis = {"why": "", "replace": {"gap_ratio": ["uniform", 1.3, 1.4]}, "severities": severities}
+    return lambda draft: draft.task["axes"].update({f"own_{k}": axis for k in range(count)})
+
+
+def _mixture(depth: int) -> Change:
+    node: list[Any] = ["uniform", 0.6, 1.2]
+    for _ in range(depth):
+        node = ["mixture", node, ["uniform", 0.6, 1.2]]
+    return _entry(node, "config", "task", "id", "gap_ratio")
+
+
+def _hopeless(draft: Draft) -> None:
+    """Ten thousand indices, of which every one has to be drawn a hundred times in vain."""
+    draft.config["split"] = "hopeless"
+    draft.task["axes"]["hopeless"] = {"why": "", "replace": {"gap_ratio": ["uniform", 2.1, 2.4]}}
+    draft.manifest.update(indices=11_000, n=20_000, first_draws=0)
+    draft.every(split="hopeless", axes=["hopeless"])
+
+
 MANIFESTS: dict[str, Change] = {
     "family_antigravity": _imports("antigravity.fly"),
     "family_module": _imports("evilmod.Evil"),
@@ -186,6 +209,12 @@ MANIFESTS: dict[str, Change] = {
     "task_no_mapping": _entry("domino_single", "config", "task"),
     "axis_markup": _entry({"[/]": {"replace": {}}}, "config", "task", "axes"),
     "range_no_list": _entry("uniform", "config", "task", "id", "gap_ratio"),
+    "axes_many": _axes(20_000),
+    "severities_endless": _axes(1, severities=10**9),
+    "choice_long": _entry(["choice", *range(-180, 180)] * 300, "config", "task", "id", "heading"),
+    "mixture_deep": _mixture(300),
+    "manifest_extra": _manifest(signed_by="the authors"),
+    "config_extra": _entry(True, "config", "reviewed"),
     "range_endless": _entry(["uniform", 0.6, float("inf")], "config", "task", "id", "gap_ratio"),
     "range_unknown": _entry(["evil", 0.6, 1.0], "config", "task", "id", "gap_ratio"),
     "config_list": _manifest(config=[]),
@@ -203,6 +232,7 @@ MANIFESTS: dict[str, Change] = {
     "funnel_markup": _entry(1, "funnel", "[/]"),
     "reasons_list": _manifest(reasons=["x"]),
     "indices_huge": _manifest(indices=10**15),
+    "indices_hopeless": _hopeless,
     "indices_true": _manifest(indices=True),
     "versions_list": _manifest(versions=[]),
     "format_text": _manifest(format="two"),
@@ -221,7 +251,7 @@ SAYS = {
     "id": r"\bid\b",
     "task": r"task",
     "horizon": r"horizon|finite",
-    "settle": r"settle|settings|finite",
+    "settle": r"settl|finite",
     "params": r"param|JSON|id |deep|nested",
     "family": r"family",
 }
@@ -237,9 +267,12 @@ def _yaml(folder: Path) -> None:
 
 
 def _case(prefix: str, name: str, change: Change) -> Case:
+    """One of the above. Many axes of one's own are no fault, as long as verification comes to an end."""
     damage = _yaml if name in WITH_A_MODULE else None
     says = SAYS.get(name.partition("_")[0], r"\w")
-    return Case(f"{prefix}__{name}", BASE, "refuse", says, change, damage, quick=name in QUICK)
+    return Case(
+        f"{prefix}__{name}", BASE, "end" if name == "axes_many" else "refuse", says, change, damage, quick=name in QUICK
+    )
 
 
 CASES = [

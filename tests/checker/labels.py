@@ -212,6 +212,12 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
     "fingerprint_of_a_row": ("single_quick", r"fingerprint", _certificate(fingerprint=ELSEWHERE)),
     "fingerprint_of_the_manifest": ("single_quick", r"fingerprint", _manifest(fingerprint=ELSEWHERE)),
     "final_state": ("single_quick", r"another state|final", _certificate(final_state="0" * 16)),
+    "reject_without_its_scene": ("single_kept", r"reject|scene", lambda d: d.rejected[0].update(scene_xml="")),
+    "reject_of_another_scene": (
+        "single_kept",
+        r"reject|scene",
+        lambda d: d.rejected[0].update(scene_xml=d.row["scene_xml"]),
+    ),
     "keep_without_rejects": ("single_kept", r"reject|keep|kept", lambda d: d.rejected.clear()),
     "rejects_without_keep": ("single_kept", r"reject|keep|kept", _config(keep=[])),
     "reject_of_another_index": ("single_kept", r"reject|index|drawn", lambda d: d.rejected[0].update(index=40)),

@@ -19,6 +19,7 @@ import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -35,6 +36,8 @@ BUSY = 4
 MEMORY = 1500
 """How much memory it may use [MB]."""
 VERDICTS = {0: "accept", 1: "reject", 2: "decline"}
+MEANT = {"refuse": ("reject", "decline"), "end": ("accept", "reject", "decline")}
+"""Verdicts that will do where more than one will."""
 FOLDER = Path(__file__).parents[2] / "generated" / "checker"
 
 
@@ -60,9 +63,7 @@ class Outcome:
     @property
     def right(self) -> bool:
         """Whether the verdict is one of those that are expected."""
-        if self.expect == "refuse":
-            return self.verdict in ("reject", "decline")
-        return self.verdict == self.expect
+        return self.verdict in MEANT.get(self.expect, (self.expect,))
 
     @property
     def noticed(self) -> bool:
@@ -82,13 +83,16 @@ def attempt(case: Case, pool: Path, checker: str) -> Outcome:
             _judge(case, pool, checker, here, told)
         status, usage = _ended(child, start + BUSY * _limit(case, checker))
         wall = time.monotonic() - start
-        text = told.read_text(errors="replace") if told.exists() else ""
+        text = told.read_text(errors="replace").replace(str(pool), "POOL") if told.exists() else ""
         verdict, why = _verdict(status, text)
         memory = usage.ru_maxrss / 1000 if usage else 0.0
-        if left := _survivors(child):
+        left = _survivors(child)
+        if left and status is not None:
             verdict, why = "crash", f"{len(left)} processes were left running"
-        elif files := sorted(path.name for path in here.iterdir()):
+        elif files := sorted(path.name for path in here.iterdir() if path.stem != "out"):
             verdict, why = "crash", f"wrote {', '.join(files)}"
+        elif broken := _broken(here):
+            verdict, why = "crash", broken
         elif _listing(pool) != before:
             verdict, why = "crash", "changed the pool"
         elif memory > MEMORY:
@@ -158,6 +162,16 @@ def _verdict(status: int | None, text: str) -> tuple[str, str]:
     return VERDICTS[status], ""
 
 
+def _broken(here: Path) -> str:
+    """What is wrong with the reports that a checker has written, if it has: they are for other programs."""
+    try:
+        for path in here.glob("out.*"):
+            (json.loads if path.suffix == ".json" else ElementTree.fromstring)(path.read_text())
+    except (ValueError, ElementTree.ParseError) as error:
+        return f"writes a report that nobody can read: {error}"
+    return ""
+
+
 def _survivors(session: int) -> list[int]:
     """Processes of a child's session that still run; they are ended."""
     found = []
@@ -196,7 +210,7 @@ class Score:
     @classmethod
     def of(cls, checker: str, outcomes: Sequence[Outcome]) -> "Score":
         sound = [o for o in outcomes if o.expect == "accept"]
-        false = [o for o in outcomes if o.expect != "accept"]
+        false = [o for o in outcomes if o.expect in ("reject", "refuse")]
         return cls(
             checker,
             len(sound),
@@ -240,6 +254,21 @@ def put(checker: str, chosen: Iterable[Case], pools: Path, progress: Callable[[O
     return outcomes
 
 
+def _apart(work: Callable[[], None]) -> None:
+    """Do something in a process of its own: what it has used of the memory does not come back."""
+    child = os.fork()
+    if child == 0:
+        try:
+            work()
+            os._exit(0)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(1)
+    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]):
+        sys.exit("the corpus could not be made")
+
+
 def _warm() -> None:
     """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
     from scengen import cli, config  # noqa: F401
@@ -277,7 +306,7 @@ def main() -> int:
     if asked.checker == ["robosuite"]:
         chosen = [c for c in chosen if c.expect == "accept"]
     shutil.rmtree(asked.pools, ignore_errors=True)
-    write(chosen, asked.pools, FOLDER / "base")
+    _apart(lambda: write(chosen, asked.pools, FOLDER / "base"))
     _warm()
     scores, results, judged = [], {}, []
     for checker in asked.checker:

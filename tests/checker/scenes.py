@@ -5,10 +5,10 @@ one: whoever only replays believes it. In the paper's tasks a slab that falls by
 """
 
 import re
-from collections.abc import Callable
 
 import numpy as np
 from forgery import ELSEWHERE, Case, Draft
+from labels import Change
 
 NOT_THE_FAMILYS = r"scene.*(rebuilt|parameters|family)|(rebuil|family).*scene"
 """Reason of every case here: the scene in the file is not what comes out of the parameters."""
@@ -54,7 +54,7 @@ def _swap(draft: Draft) -> None:
         first[name], second[name] = second[name], first[name]
 
 
-def _recolour(first: str, second: str) -> Callable[[Draft], None]:
+def _recolour(first: str, second: str) -> Change:
     """Exchange the colours of two geoms: a policy that sees is sent elsewhere."""
 
     def change(draft: Draft) -> None:
@@ -67,12 +67,12 @@ def _recolour(first: str, second: str) -> Callable[[Draft], None]:
     return change
 
 
-def _attribute(geom: str, name: str, value: str) -> Callable[[Draft], None]:
+def _attribute(geom: str, name: str, value: str) -> Change:
     """Give a named element another value of one attribute."""
     return lambda draft: draft.scene(f'(<[^>]*name="{geom}"[^>]* {name}=)"[^"]*"', rf'\1"{value}"')
 
 
-def _scaled(geom: str, name: str, by: float) -> Callable[[Draft], None]:
+def _scaled(geom: str, name: str, by: float) -> Change:
     def change(draft: Draft) -> None:
         found = re.search(f'name="{geom}"[^>]* {name}="([^"]*)"', draft.row["scene_xml"])
         assert found, f"no {name} of {geom}"
@@ -82,11 +82,11 @@ def _scaled(geom: str, name: str, by: float) -> Callable[[Draft], None]:
     return change
 
 
-def _extra(xml: str, to: str = "worldbody") -> Callable[[Draft], None]:
+def _extra(xml: str, to: str = "worldbody") -> Change:
     return lambda draft: draft.add(xml, to)
 
 
-SINGLE: dict[str, tuple[Callable[[Draft], None], str]] = {
+SINGLE: dict[str, tuple[Change, str]] = {
     "gravity_sideways": (lambda d: _option(d, 'gravity="0 5 -9.81"'), IDLE),
     "gravity_weaker": (lambda d: _option(d, 'gravity="0 0 -9.5"'), SAME),
     "wind": (lambda d: _option(d, 'wind="0 8 0"'), IDLE),
@@ -129,10 +129,16 @@ SINGLE: dict[str, tuple[Callable[[Draft], None], str]] = {
     "renamed": (lambda d: d.scene('model="MuJoCo Model"', 'model="certified"'), SAME),
 }
 
+ELSEWHERE_ONLY: dict[str, tuple[Change, str]] = {
+    "underscore": (_attribute("slab/box", "mass", "0.0_6"), ""),
+    "other_digits": (_attribute("slab/box", "mass", "\u0660.06"), ""),
+    "one_in_a_million": (_scaled("slab/box", "mass", 1.00001), SAME),
+}
+"""What Python reads as the same number and MuJoCo does not, or a difference that no rounding explains."""
 FOREIGN = ("gravity_sideways", "robot_passes_through", "lighter_slab", "green_slab", "camera_moved", "invisible_wall")
 """Those that are also told by a machine that rounds otherwise, where texts need not be equal byte by byte."""
 
-OTHERS: dict[str, dict[str, tuple[Callable[[Draft], None], str]]] = {
+OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
     "select_id": {
         "decoy_is_red": (_recolour("decoy_0/box", "slab_1/box"), SAME),
         "lighter_tiles": (_scaled("tile_2_1/box", "mass", 0.9), SAME),
@@ -166,7 +172,7 @@ OTHERS: dict[str, dict[str, tuple[Callable[[Draft], None], str]]] = {
 }
 
 
-def _case(base: str, name: str, change: Callable[[Draft], None], how: str, elsewhere: bool = False) -> Case:
+def _case(base: str, name: str, change: Change, how: str, elsewhere: bool = False) -> Case:
     def forge(draft: Draft) -> None:
         before = draft.row["scene_xml"]
         change(draft)
@@ -195,6 +201,7 @@ QUICK = {
 CASES = [
     *(_case("single_quick", name, *change) for name, change in SINGLE.items()),
     *(_case("single_quick", name, *SINGLE[name], elsewhere=True) for name in FOREIGN),
+    *(_case("single_quick", name, *change, elsewhere=True) for name, change in ELSEWHERE_ONLY.items()),
     *(_case(base, name, *change) for base, changes in OTHERS.items() for name, change in changes.items()),
     _case("single_quick", "scenes_exchanged", _swap, ""),
 ]
