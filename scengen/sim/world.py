@@ -221,7 +221,7 @@ class World:
         return bool(self.loop.touched[self._label(a), self._label(b)])
 
     def touching_bodies(self, body: str) -> set[str]:
-        """Names of the bodies that a body was in contact with in the last control period; `ROBOT` stands for its own."""
+        """Names of the bodies that a body touched in the last control period; `ROBOT` stands for the robot's own."""
         others = np.flatnonzero(self.loop.touching[self._label(body)])
         return {ROBOT if i == self.model.nbody else self.model.body(int(i)).name for i in others if i not in self._own}
 
