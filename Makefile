@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test fuzz kills check types format certify axes docs reference bench clean
+.PHONY: setup demo test fuzz kills check types format certify axes docs reference bench clean checker checker-base
 
 setup: $(READY)
 
@@ -64,6 +64,16 @@ axes: setup
 # A page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
 docs: setup
 	$(BIN)/python tools/task_pages.py $(TASKS)
+
+# Verification, and checkers that must do badly, on some 450 pools that are sound, false or hostile: about 15 minutes.
+# CHECKER=robosuite lets robosuite judge the sound ones.
+CHECKER ?= scengen always parse hashes
+checker: setup
+	$(BIN)/python tests/checker/run_corpus.py --checker $(CHECKER) --json generated/checker/report.json
+
+# The sound pools that the corpus is made from; make them anew when a family changes.
+checker-base: setup
+	$(BIN)/python tests/checker/make_base.py
 
 # The small pool in the repository; write it anew when a family or the format changes.
 reference: setup

@@ -104,7 +104,35 @@ def _no(why: str) -> int:
     return REFUTED
 
 
-CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)}
+def _command(*command: str) -> Checker:
+    """A command that opens pools: it judges nothing, and is only asked to end properly."""
+
+    def run(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
+        from scengen import cli
+
+        return cli.run([command[0], f"pool={folder}", *command[1:]])
+
+    return run
+
+
+ANY = "id=8"
+"""The beginning of an id in the pools that hostile ones are made from."""
+COMMANDS: dict[str, Checker] = {
+    "show": _command("show"),
+    "show_one": _command("show", ANY),
+    "show_sheet": _command("show", "to=out.html", "images=2"),
+    "export": _command("export", "to=out"),
+    "film": _command("film", ANY, "to=out.png", "frames=2", "width=64", "height=64"),
+    "record": _command("record", "to=out", "cameras=none", "n=1"),
+    "evaluate": _command("evaluate", "policy=idle", "seeds=1", "rollouts=1", "to=out"),
+    "attack": _command("attack", "n=1", "budget=2", "to=out"),
+    "bias": _command("bias"),
+    "compare": _command("compare"),
+    "report": _command("report", "to=out.html"),
+    "subset": _command("subset", "n=1", "to=out"),
+    "robosuite_one": _command("robosuite", "first=1"),
+}
+CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)} | COMMANDS
 CONTROLS = ("always", "parse", "hashes")
 """Checkers that know nothing of the claims: if one of them does well, the corpus is too easy."""
 EASY = 0.30

@@ -17,19 +17,19 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from checkers import CHECKERS, CONTROLS, EASY
+from checkers import CHECKERS, COMMANDS, CONTROLS, EASY
 from forgery import Case
 from make_corpus import cases, write
 
 LIMIT = 60
 """How much processor time a checker may take for one pool [s]; three times that at level full."""
-PATIENCE = 10
+PATIENCE = 5
 """How much a control may take [s]: they hang where nobody looks."""
 BUSY = 4
 """How much longer that may take on a busy machine."""
@@ -81,7 +81,8 @@ def attempt(case: Case, pool: Path, checker: str) -> Outcome:
         child = os.fork()
         if child == 0:
             _judge(case, pool, checker, here, told)
-        status, usage = _ended(child, start + BUSY * _limit(case, checker))
+        patience = 1 if checker in CONTROLS else BUSY
+        status, usage = _ended(child, start + patience * _limit(case, checker))
         wall = time.monotonic() - start
         text = told.read_text(errors="replace").replace(str(pool), "POOL") if told.exists() else ""
         verdict, why = _verdict(status, text)
@@ -103,7 +104,7 @@ def attempt(case: Case, pool: Path, checker: str) -> Outcome:
 
 
 def _limit(case: Case, checker: str) -> int:
-    if checker not in ("scengen", "robosuite"):
+    if checker in (*CONTROLS, "replay"):
         return PATIENCE
     return 3 * LIMIT if case.level == "full" or checker == "robosuite" else LIMIT
 
@@ -166,7 +167,8 @@ def _broken(here: Path) -> str:
     """What is wrong with the reports that a checker has written, if it has: they are for other programs."""
     try:
         for path in here.glob("out.*"):
-            (json.loads if path.suffix == ".json" else ElementTree.fromstring)(path.read_text())
+            if read := {".json": json.loads, ".xml": ElementTree.fromstring}.get(path.suffix):
+                read(path.read_text())
     except (ValueError, ElementTree.ParseError) as error:
         return f"writes a report that nobody can read: {error}"
     return ""
@@ -305,6 +307,8 @@ def main() -> int:
         parser.error("robosuite judges accepted pools only; run it alone")
     if asked.checker == ["robosuite"]:
         chosen = [c for c in chosen if c.expect == "accept"]
+    if set(asked.checker) <= COMMANDS.keys():
+        chosen = [replace(c, expect="end", says="") for c in chosen if c.kind.startswith("hostile")]
     shutil.rmtree(asked.pools, ignore_errors=True)
     _apart(lambda: write(chosen, asked.pools, FOLDER / "base"))
     _warm()
