@@ -154,8 +154,8 @@ class Scenario(abc.ABC):
     def features(self) -> Mapping[str, float]:
         """What the physics depends on, by name in snake_case: ratios and heights rather than parameters.
 
-        Proves and decides nothing. Scenes that differ in every parameter may be equal in these, and then it takes no new
-        insight to solve them. A certificate records them in its first check.
+        Proves and decides nothing. Scenes that differ in every parameter may be equal in these, and then it takes no
+        new insight to solve them. A certificate records them in its first check.
         """
         return {}
 
