@@ -19,7 +19,7 @@ from ..validate.rollout import run
 from .evidence import Hit, Rate, rates
 from .play import Arena
 from .priors import Judge, Prior, by_statics, fit, has_statics
-from .search import PRIOR, TIERS, Attack, Result
+from .search import PRIOR, TIERS, Attack, Result, Untried
 
 GRAMMAR = 1
 """Version of macros and tiers: reports of different ones are not comparable."""
@@ -79,6 +79,7 @@ class Report:
     rates: tuple[Rate, ...]
     hits: tuple[Hit, ...]
     priors: tuple[Prior, ...]
+    untried: tuple[Untried, ...]
     cpu: float
     """Processor time of the adversary's rollouts [s]; differs from run to run."""
 
@@ -100,6 +101,7 @@ class Report:
             "rollouts": self.rollouts,
             "rates": [rate.plain() for rate in self.rates],
             "priors": [{**asdict(prior), "bound": prior.bound} for prior in self.priors],
+            "not_tried": [asdict(one) for one in self.untried],
             "hits": [{"name": hit.name, "refutes": hit.refutes, **hit.plain()} for hit in self.hits],
         }
 
@@ -207,15 +209,17 @@ def fitted(task: Task, settings: Settings) -> list[Prior]:
 
 
 def _by_rollouts(task: Task) -> Judge:
-    def judge(scenario: Scenario, value: float) -> bool:
-        text, _ = scene_text.emit(scenario.build())
+    def judge(scenario: Scenario) -> Callable[[float], bool]:
+        world, answer = World.load(scene_text.emit(scenario.build())[0], task.embodiment), scenario.answer()
+        assert answer is not None, "asked for once for the family"
 
-        def guess(world: World) -> Plan:
-            answer = scenario.answer()
-            assert answer is not None, "asked for once for the family"
-            return answer.act(world, value)
+        def right(value: float) -> bool:
+            def guess(world: World) -> Plan:
+                return answer.act(world, value)
 
-        return run(scenario, World.load(text, task.embodiment), guess, task.horizon, until_settled=True).solved
+            return run(scenario, world, guess, task.horizon, until_settled=True).solved
+
+        return right
 
     return judge
 
@@ -230,7 +234,9 @@ def _draws(task: Task, split: str, seed: int, count: int) -> Iterator[Scenario]:
 
 def _record(result: Result) -> dict[str, Any]:
     counts = [asdict(rate) for rate in result.rates]
-    return {"scenario": result.scenario, "rates": counts, "hits": [h.name for h in result.hits], "cpu": result.cpu}
+    untried = [asdict(one) for one in result.untried]
+    hits = [hit.name for hit in result.hits]
+    return {"scenario": result.scenario, "rates": counts, "hits": hits, "untried": untried, "cpu": result.cpu}
 
 
 def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> Report:
@@ -238,8 +244,9 @@ def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, pri
     records = sorted(log.records, key=lambda record: order.index(record["scenario"]))
     counts = [Rate(**rate) for record in records for rate in record["rates"]]
     hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
+    untried = tuple(Untried(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
-    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, cpu)
+    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, cpu)
 
 
 def _sorted(counts: Sequence[Rate]) -> list[Rate]:

@@ -124,7 +124,7 @@ def hit(
         arena.scenario.id,
         attempt.tier,
         raw,
-        str(attempt) if node is None or attempt.stage is not None else f"from {node.seconds:.2f} s on: {attempt}",
+        (node or arena.start).after(attempt),
         played.seconds,
         played.digest,
         tuple(sorted(needed - left.pairs)),

@@ -33,8 +33,7 @@ class Attempt:
     """The stage of the witness at which it begins; the start of the episode without it."""
 
     def __str__(self) -> str:
-        begin = "" if self.stage is None else f"the first {self.stage} phases of the witness; "
-        return begin + ("; ".join(map(str, self.macros)) or "nothing more")
+        return "; ".join(map(str, self.macros)) or "nothing more"
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,12 @@ class Node:
     """What has led here."""
     signature: Signature
     """What has happened so far."""
+    about: str = ""
+    """In words what has led here; empty at the start."""
+
+    def after(self, what: object) -> str:
+        """In words what has led here, and something more."""
+        return f"{self.about}; {what}" if self.about else str(what)
 
     @property
     def seconds(self) -> float:
@@ -130,7 +135,8 @@ class Arena:
     def stage(self, k: int) -> Node:
         """The state at the beginning of phase `k` of the witness."""
         stage = self.trace.stages[k]
-        return Node(stage.state, stage.held, self.trace.actions[: stage.row], stage.signature)
+        about = f"the first {k} phases of the witness" if k else ""
+        return Node(stage.state, stage.held, self.trace.actions[: stage.row], stage.signature, about)
 
     @cached_property
     def phases(self) -> int:
@@ -169,18 +175,21 @@ class _Run:
     """One attempt on its way."""
 
     def __init__(self, arena: Arena, episode: Episode, node: Node, raw: bool):
-        self.arena, self.episode, self.raw, self.world = arena, episode, raw, arena.world
+        self.arena, self.episode, self.node, self.raw, self.world = arena, episode, node, raw, arena.world
         self.rows: list[NDArray[np.float32]] = list(node.actions)
         self.notes: list[str] = []
         self.nodes: list[Node] = []
 
     def to_end(self, steps: Sequence[Macro]) -> Played:
+        node = self.node
         for macro in steps:
             self._macro(macro)
             if self.episode.outcome is not None:
                 break
             actions = np.array(self.rows, np.float32).reshape(-1, 7)
-            self.nodes.append(Node(self.world.state(), self.episode.held, actions, self.arena.signature()))
+            state, left = self.world.state(), self.arena.signature()
+            node = Node(state, self.episode.held, actions, left, node.after(macro))
+            self.nodes.append(node)
         self._idle()
         if self.episode.outcome == "success":
             return self._settled()
@@ -193,7 +202,7 @@ class _Run:
                 if self._step(action) is not None:
                     return
         except GaveUp as error:
-            self.notes.append(f"{macro.kind} {macro.target}: {error}")
+            self.notes.append(f"{macro.kind} {macro.target}".rstrip() + f": {error}")
 
     def _step(self, action: NDArray[np.float64]) -> Outcome | None:
         given = np.clip(np.asarray(action, np.float32), -1.0, 1.0) if self.raw else self.world.filter(action)

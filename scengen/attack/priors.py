@@ -36,14 +36,15 @@ class Prior:
         return 1.0 - lower_bound(round((1 - self.fresh) * self.draws), self.draws)
 
 
-Judge = Callable[[Scenario, float], bool]
+Judge = Callable[[Scenario], Callable[[float], bool]]
 """Whether a value is right in a scenario: by statics, or by a rollout."""
 
 
-def by_statics(scenario: Scenario, value: float) -> bool:
-    """What the family itself says about a guess."""
+def by_statics(scenario: Scenario) -> Callable[[float], bool]:
+    """What the family itself says about guesses."""
     answer = scenario.answer()
-    return answer is not None and answer.right is not None and answer.right(value)
+    assert answer is not None and answer.right is not None, "asked for once for the family"
+    return answer.right
 
 
 def fit(training: Sequence[Scenario], judge: Judge = by_statics, fresh: Sequence[Scenario] = ()) -> list[Prior]:
@@ -81,5 +82,5 @@ def guesses(priors: Iterable[Prior]) -> Iterator[Attempt]:
 
 def _table(scenarios: Sequence[Scenario], values: Sequence[float], judge: Judge) -> NDArray[np.bool_]:
     """Which value is right in which scenario, shape (scenarios, values)."""
-    rows = [[judge(scenario, value) for value in values] for scenario in scenarios]
+    rows = [[right(value) for value in values] for right in map(judge, scenarios)]
     return np.array(rows, bool).reshape(len(scenarios), len(values))

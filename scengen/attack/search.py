@@ -27,6 +27,15 @@ LEFT = 2.0
 """An episode with less time left than this is not continued [s]."""
 
 
+@dataclass(frozen=True)
+class Untried:
+    """A shortcut that was not carried out: a move of it gave up, so that nothing is known about it."""
+
+    name: str
+    raw: bool
+    reason: str
+
+
 @dataclass
 class Result:
     """What came of the attack on one scenario."""
@@ -36,6 +45,7 @@ class Result:
     hits: list[Hit]
     cpu: float
     """Processor time of the rollouts of the adversary [s]."""
+    untried: list[Untried]
 
 
 @dataclass(frozen=True)
@@ -96,6 +106,7 @@ class Attack:
         self.archive, self.fatal = Archive(), Counter[tuple[int | None, str, str]]()
         self.counts: list[Rate] = []
         self.hits: list[Hit] = []
+        self.untried: list[Untried] = []
         self.cpu, self.done = 0.0, False
         self._needed: frozenset[Pair] | None = None
         for k, stage in enumerate(arena.trace.stages[: arena.phases]):
@@ -111,7 +122,7 @@ class Attack:
             owed -= self._tier(tier, 2 * round(owed / 2))
         if round(owed) > 0 and not self.done and {RANDOM, SEARCH} & {*tiers}:
             self._tier(SEARCH if SEARCH in tiers else RANDOM, 2 * round(owed / 2))
-        return Result(self.arena.scenario.id, rates(self.counts), self.hits, self.cpu)
+        return Result(self.arena.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
 
     def _tier(self, tier: str, rollouts: int) -> int:
         """Play attempts of one tier; returns how many rollouts that took."""
@@ -175,6 +186,8 @@ class Attack:
             self.hits.append(found)
             self.archive.successes.append((found, node, attempt.macros))
             self.done = self.done or self.until(found)
+        if attempt.tier == SHORTCUT and len(attempt.macros) == 1 and played.outcome == "timeout" and played.notes:
+            self.untried.append(Untried(attempt.macros[0].target, raw, played.notes[0]))
         if played.outcome == "failure" and not played.nodes:
             self.fatal[_first(attempt)] += 1
         for one in played.nodes:

@@ -1,5 +1,6 @@
 """the built-in adversary: whether a goal can be reached without what the task is about"""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -75,7 +76,12 @@ def _cells(rate: Rate) -> list[str]:
 
 
 def _remarks(report: Report) -> list[str]:
-    return [_fixed(prior) for prior in report.priors]
+    counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
+    untried = [
+        f"not tried {times} times: {name} ({'raw' if raw else 'filtered'}): {reason}"
+        for (name, raw, reason), times in counts.items()
+    ]
+    return [*map(_fixed, report.priors), *untried]
 
 
 def _fixed(prior: Prior) -> str:

@@ -16,14 +16,14 @@ from scengen.tasks.seesaw_balance import LEVEL, SeesawBalance
 
 def galileo(self: GalileoRampDrop) -> Answer:
     """A share of the height of the near incline."""
-    ramp, radius = self.ramp, self.ball.radius
-    top = ramp.height(self.brim)
+    ramp = self.ramp
+    top, wanted = ramp.height(self.brim), ramp.height(self.start)
 
     def act(world: World, share: float) -> Plan:
         yield from self.release_at(world, -ramp.at_height(share * top))
 
     def right(share: float) -> bool:
-        return abs(share * top - ramp.release(radius)) <= ramp.band / 2
+        return abs(share * top - wanted) <= ramp.band / 2
 
     return Answer(tuple(np.linspace(0.3, 1.0, 29).round(3).tolist()), act, right)
 

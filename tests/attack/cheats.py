@@ -135,10 +135,9 @@ def only_draw_it_in(self, world: World) -> Plan:
     yield from retreat(world.arm, 0.12)
 
 
-def drop_them_over_the_bin(self, world: World) -> Plan:
-    """Every piece over the middle of the bin, as it lies."""
-    yield from self.shortcuts()["squared_up"].plan(world)
-    yield from self.shortcuts()["as_they_lie"].plan(world)
+def take_it_by_hand(self, world: World) -> Plan:
+    """Take the cube where it stands."""
+    yield from self.lift_cube(world)
 
 
 CHEATS: Mapping[str, Mapping[str, Cheat]] = {
@@ -147,7 +146,7 @@ CHEATS: Mapping[str, Mapping[str, Cheat]] = {
     "galileo_ramp_drop": {"staircase": staircase},
     "ball_cage_escape": {f.__name__: f for f in (both_ends_in_turn, shake_level)},
     "seesaw_balance": {f.__name__: f for f in (hold_the_weight_down, nudge_the_target)},
-    "tool_retrieve": {f.__name__: f for f in (only_draw_it_in,)},
+    "tool_retrieve": {f.__name__: f for f in (only_draw_it_in, take_it_by_hand)},
     "packing": {},
 }
 
