@@ -50,6 +50,8 @@ class Answer:
     """Acts on a guess as the oracle acts on the right answer, and leaves the scene such that another may follow."""
     right: Callable[[float], bool] | None = None
     """Whether a guess is right, by statics, without simulating anything; None if only a rollout can tell."""
+    tries: int = 3
+    """How many guesses an episode allows, three at most: one where a wrong one ends it."""
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def fit(training: Sequence[Scenario], judge: Judge = by_statics, fresh: Sequence
     values = answer.candidates
     known, other = _table(training, values, judge), _table(fresh, values, judge)
     priors = []
-    for count in (n for n in GUESSES if n <= len(values)):
+    for count in (n for n in GUESSES if n <= min(answer.tries, len(values))):
         best = max(combinations(range(len(values)), count), key=lambda chosen: known[:, chosen].any(axis=1).mean())
         order = sorted(best, key=lambda k: -known[:, k].mean())
         found = other[:, order].any(axis=1).mean() if len(fresh) else None

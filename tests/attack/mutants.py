@@ -19,6 +19,7 @@ from scengen import config
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
 from scengen.geometry import UP
+from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.sim import scene_text
 from scengen.sim.world import World
@@ -53,6 +54,13 @@ class Mutant:
     """Makes of a scenario one that the constraints refute."""
     mended: Mapping[str, Any] = field(default_factory=dict)
     """Attributes of the family that is not weakened, where it differs from the one that there is."""
+    narrow: tuple[str, ...] = ()
+    """Overrides of the task: training ranges so narrow that fixed answers are right too often."""
+
+    @property
+    def asked(self) -> Task:
+        """The task."""
+        return config.task(self.task, self.narrow)
 
     @contextmanager
     def weakened(self) -> Iterator[None]:
@@ -71,7 +79,7 @@ class Mutant:
 
     def subjects(self, n: int, seed: int = 0) -> list[Subject]:
         """The first scenarios of training, changed as they must be, that the oracle solves."""
-        task, found = config.task(self.task), list[Subject]()
+        task, found = self.asked, list[Subject]()
         for index in range(4 * n):
             with strict(self):
                 scenario = task.draw("id", seed, index).scenario
@@ -114,7 +122,8 @@ SOUND: dict[tuple[type, str], Any] = {}
 
 def mutants() -> list[Mutant]:
     """All of them."""
-    found = [mutant for task in TASKS for mutant in (*clauses(task), *limits(task), *values(task), *holes(task))]
+    kinds = (clauses, limits, values, holes, narrow)
+    found = [mutant for task in TASKS for kind in kinds for mutant in kind(task)]
     for mutant in found:
         family = config.task(mutant.task).family
         module = sys.modules[family.__module__]
@@ -171,6 +180,26 @@ def _made(function: Callable[..., Any], tree: ast.FunctionDef) -> Any:
     space: dict[str, Any] = {}
     exec(compile(module, f"<mutant of {function.__qualname__}>", "exec"), function.__globals__, space)
     return space[tree.name]
+
+
+def narrow(task: str) -> Iterator[Mutant]:
+    """The ranges that there were when a few fixed answers solved most draws."""
+    if overrides := NARROW.get(task):
+        yield Mutant(task, "hole: fixed answers", narrow=overrides)
+
+
+NARROW: Mapping[str, tuple[str, ...]] = {
+    "seesaw_balance": (
+        "task.id.offset=[uniform,0.12,0.15]",
+        "task.id.seesaw.pivot_offset=[uniform,-0.01,0.01]",
+        "task.id.seesaw.mass=[uniform,0.20,0.35]",
+        "task.id.target.mass=[uniform,0.20,0.25]",
+        "task.id.weight.mass=[mixture,[uniform,0.13,0.15],[uniform,0.32,0.37]]",
+    ),
+    "galileo_ramp_drop": ("task.id.ramp.level=[uniform,0.42,0.60]",),
+}
+BARS: Mapping[int, float] = {1: 0.10, 3: 0.20}
+"""How many fresh draws one and three fixed answers may solve."""
 
 
 # --- limits: constants made wide ----------------------------------------------------------------
