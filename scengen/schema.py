@@ -42,6 +42,7 @@ _SHORT_HASH = re.compile(r"[0-9a-f]{16}")
 _HASH = re.compile(r"[0-9a-f]{64}")
 _SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _SAMPLER = re.compile(r"iid|sobol|(lhs|grid):[0-9]{1,6}")
+_CONFIG = ("task", "certify", "split", "sampler", "seed", "keep")
 _VERDICTS = ("certified", "refuted", "unknown")
 _ENTRIES = ("config", "fingerprint", "first_draws", "format", "funnel", "indices", "n", "reasons", "shards")
 _MORE_ENTRIES = ("source_sha256", "versions", "rejected", "subset")
@@ -94,8 +95,10 @@ def check_manifest(manifest: Any) -> None:
     for name in (*_ENTRIES, "source_sha256", "versions"):
         _require(name in entries, f"no {name}")
     config = _mapping("config", entries["config"])
-    for name in ("task", "certify", "split", "sampler", "seed", "keep"):
+    for name in _CONFIG:
         _require(name in config, f"no config.{name}")
+    for name in config:
+        _require(name in _CONFIG, f"an entry of config that no pool has, {name[:40]!r}")
     _check_task(_mapping("config.task", config["task"]))
     certify = _mapping("config.certify", config["certify"])
     _text("config.certify.name", certify.get("name"), 100)

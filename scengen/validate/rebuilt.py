@@ -1,6 +1,7 @@
 """Scenes from their parameters: a scene in a pool must be what the installed family builds."""
 
 import math
+import re
 import xml.etree.ElementTree as ET
 
 from ..errors import BadConfig
@@ -9,6 +10,8 @@ from ..sim import scene_text
 
 SAME = 1e-9
 """Largest difference of two numbers, relative or absolute, on machines that round otherwise."""
+_NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?([eE][-+]?[0-9]+)?")
+"""A number as MuJoCo reads and writes it; Python takes `0.0_6` and Arabic digits for numbers too."""
 OTHER = "the scene is not the one that the family builds from the parameters"
 
 
@@ -51,9 +54,8 @@ def _close(a: str, b: str) -> bool:
         return False
     for x, y in zip(mine, theirs, strict=True):
         if x != y:
-            try:
-                if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=SAME):
-                    return False
-            except ValueError:
+            if not (_NUMBER.fullmatch(x) and _NUMBER.fullmatch(y)):
+                return False
+            if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=SAME):
                 return False
     return True

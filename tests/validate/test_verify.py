@@ -256,9 +256,9 @@ FALSE = {
 """False claims that are told without simulation."""
 
 SIMULATED = {
-    "nothing": (witness(lambda a: a[:0]), "the witness fails", "replay"),
-    "half of it": (witness(lambda a: a[: len(a) // 3]), "the witness fails", "replay"),
-    "tail": (witness(lambda a: np.vstack([a, np.zeros((100, 7))])), "are played|another state|filter", "replay"),
+    "nothing": (witness(lambda a: a[:0]), "check witness", "replay"),
+    "half of it": (witness(lambda a: a[: len(a) // 3]), "check witness", "replay"),
+    "tail": (witness(lambda a: np.vstack([a, np.zeros((100, 7))])), "check witness|filter", "replay"),
     "final state": (certificate_with(final_state="0" * 16), "ends in another state", "replay"),
     "counts": (numbers("compiles", bodies=3), "check compiles has other numbers", "replay"),
     "stiller than it is": (numbers("rest", drift=1e-12), "check rest has other numbers", "recheck"),
