@@ -89,6 +89,8 @@ def _tell(pool: Pool, report: Report) -> None:
         if n
     ]
     say(f"settings: {report.settings or 'unknown'}")
+    if pool.chosen:
+        say("a subset: its scenarios were chosen from another pool, whose funnel it repeats")
     if report.sample:
         share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
         told = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
