@@ -60,6 +60,9 @@ class Outcome:
     memory: float
     """Largest memory of a process [MB]."""
 
+    def __str__(self) -> str:
+        return f"{self.verdict:<8}{self.name} {self.why} ({self.cpu:.1f} s, {self.memory:.0f} MB)"
+
     @property
     def right(self) -> bool:
         """Whether the verdict is one of those that are expected."""
@@ -298,6 +301,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--checker", nargs="*", default=["scengen", *CONTROLS], choices=CHECKERS)
     parser.add_argument("--quick", action="store_true", help="the small corpus, made from pools in the repository")
+    parser.add_argument("--verbose", action="store_true", help="tell of every pool as soon as it is judged")
+    parser.add_argument("--again", action="store_true", help="take the pools as the last run has written them")
     parser.add_argument("--only", default="", help="regular expression of names")
     parser.add_argument("--json", type=Path, help="write every outcome to this file")
     parser.add_argument("--pools", type=Path, default=FOLDER / "pools", help="where the corpus is written")
@@ -309,12 +314,13 @@ def main() -> int:
         chosen = [c for c in chosen if c.expect == "accept"]
     if set(asked.checker) <= COMMANDS.keys():
         chosen = [replace(c, expect="end", says="") for c in chosen if c.kind.startswith("hostile")]
-    shutil.rmtree(asked.pools, ignore_errors=True)
-    _apart(lambda: write(chosen, asked.pools, FOLDER / "base"))
+    if not asked.again:
+        shutil.rmtree(asked.pools, ignore_errors=True)
+        _apart(lambda: write(chosen, asked.pools, FOLDER / "base"))
     _warm()
     scores, results, judged = [], {}, []
     for checker in asked.checker:
-        outcomes = put(checker, chosen, asked.pools, lambda o: None)
+        outcomes = put(checker, chosen, asked.pools, lambda o: print(o) if asked.verbose else None)
         results[checker] = [asdict(o) for o in outcomes]
         scores.append(Score.of(checker, outcomes))
         judged = judged or outcomes
