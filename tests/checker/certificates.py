@@ -1,16 +1,10 @@
-"""False claims about checks and witness: settings, numbers and verdicts that the certificate does not bear out."""
+"""False claims about the checks: lists, settings, numbers and verdicts that the certificate does not bear out."""
 
 import copy
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from forgery import ELSEWHERE, Case, Draft
-from labels import Change, _both
-
-OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
-
-# --- checks ---------------------------------------------------------------------------------------
+from forgery import Case, Draft
+from labels import OTHERS, Change, _both
 
 
 def _only(*names: str) -> Change:
@@ -192,96 +186,9 @@ CERTIFIED_AGAIN: dict[str, tuple[str, str, Change]] = {
 }
 """Refuted by certifying again with the oracle, and by nothing less."""
 
-# --- witnesses --------------------------------------------------------------------------------------
-
-
-def _witness(change: Callable[[np.ndarray], np.ndarray], played: bool = True) -> Change:
-    """Other actions in the first scenario; the final state is right where they still reach the goal."""
-
-    def forge(draft: Draft) -> None:
-        actions = change(draft.row["witness"].copy())
-        draft.row["witness"] = actions
-        if played:
-            draft.played()
-            draft.row["witness"] = actions
-            draft.timed(len(actions), draft.check("witness")["numbers"]["seconds"])
-
-    return forge
-
-
-def _jerk(actions: np.ndarray) -> np.ndarray:
-    """In the settling time the arm is told to go from one extreme to the other in one period."""
-    actions[-20:, 2] = np.where(np.arange(20) % 2, 1.0, -1.0)
-    return actions
-
-
-def _beyond(actions: np.ndarray) -> np.ndarray:
-    actions[-10:, 2] = np.linspace(0.1, 1.5, 10)
-    return actions
-
-
-def _tail(actions: np.ndarray) -> np.ndarray:
-    """A hundred rows that nobody ever plays."""
-    return np.vstack([actions, np.tile(np.float32([0, 0, 0, 0, 0, 0, -1]), (100, 1))]).astype(np.float32)
-
-
-def _spoiled(value: float) -> Callable[[np.ndarray], np.ndarray]:
-    def change(actions: np.ndarray) -> np.ndarray:
-        actions[40, 1] = value
-        return actions
-
-    return change
-
-
-def _unfiltered(draft: Draft) -> None:
-    """The oracle without the filter of the interface: another, quicker robot."""
-    from scengen import config
-    from scengen.sim.world import World
-
-    row = draft.row
-    scenario = config.task(row["task"]).scenario(row["params"])
-    world = World.load(row["scene_xml"], row["embodiment"])
-    world.reset()
-    actions = []
-    for action in scenario.oracle(world):
-        actions.append(np.asarray(action, np.float32))
-        world.apply(actions[-1])
-        if scenario.success(world):
-            break
-    draft.played(np.array(actions, np.float32))
-
-
-def _of_the_second(draft: Draft) -> None:
-    draft.row["witness"] = draft.rows[1]["witness"].copy()
-
-
-WITNESS: dict[str, tuple[str, Change]] = {
-    "nothing": (r"witness", _witness(lambda a: a[:0], played=False)),
-    "half_of_it": (r"witness", _witness(lambda a: a[: len(a) // 3], played=False)),
-    "of_the_second": (r"witness", _of_the_second),
-    "mirrored": (r"witness", _witness(lambda a: a * np.float32([-1, -1, 1, 1, 1, 1, 1]), played=False)),
-    "nan": (r"witness|finite", _witness(_spoiled(float("nan")), played=False)),
-    "infinite": (r"witness|finite", _witness(_spoiled(float("inf")), played=False)),
-    "jerk": (r"witness|filter", _witness(_jerk)),
-    "beyond_one": (r"witness|filter", _witness(_beyond)),
-    "tail": (r"witness", _witness(_tail)),
-    "unfiltered_oracle": (r"witness|filter", _unfiltered),
-}
-
-
-def _tail_elsewhere(draft: Draft) -> None:
-    """Ten minutes of actions behind the end, where the lengths of other machines need not be equal."""
-    draft.everywhere(fingerprint=ELSEWHERE)
-    actions = draft.row["witness"]
-    draft.row["witness"] = np.vstack([actions, np.tile(actions[-1:], (60_000, 1))])
-    draft.timed(len(draft.row["witness"]), draft.check("witness")["numbers"]["seconds"])
-
-
-WITNESS["tail_elsewhere"] = (r"witness", _tail_elsewhere)
-
 QUICK = {
     "one_check_listed", "check_failed", "called_full_everywhere", "settle_was_short", "rest_beyond_its_limit",
-    "robust_one_of_four", "ablation_not_told", "jerk", "tail", "half_of_it",
+    "robust_one_of_four", "ablation_not_told",
 }  # fmt: skip
 
 EVERY = ("idle_not_listed", "shortcut_not_told", "rest_was_lenient", "ablation_not_told")
@@ -295,9 +202,6 @@ def _cases() -> list[Case]:
         for name in EVERY:
             says, change = CHECKS[name]
             found.append(Case(f"{base}__{name}", base, "reject", says, change))
-        found.append(Case(f"{base}__witness_half_of_it", base, "reject", *WITNESS["half_of_it"]))
-    for name, (says, change) in WITNESS.items():
-        found.append(Case(f"single_quick__witness_{name}", "single_quick", "reject", says, change, quick=name in QUICK))
     for level, cases in (("recheck", RECHECKED), ("full", CERTIFIED_AGAIN)):
         for name, (base, says, change) in cases.items():
             quick = name == "stiller_than_it_is"

@@ -1,0 +1,100 @@
+"""False witnesses: actions that nobody could have sent, that nobody plays, or that do not reach the goal."""
+
+from collections.abc import Callable
+
+import numpy as np
+from forgery import ELSEWHERE, Case, Draft
+from labels import OTHERS, Change
+
+
+def _witness(change: Callable[[np.ndarray], np.ndarray], played: bool = True) -> Change:
+    """Other actions in the first scenario; the final state is right where they still reach the goal."""
+
+    def forge(draft: Draft) -> None:
+        actions = change(draft.row["witness"].copy())
+        draft.row["witness"] = actions
+        if played:
+            draft.played()
+            draft.row["witness"] = actions
+            draft.timed(len(actions), draft.check("witness")["numbers"]["seconds"])
+
+    return forge
+
+
+def _jerk(actions: np.ndarray) -> np.ndarray:
+    """In the settling time the arm is told to go from one extreme to the other in one period."""
+    actions[-20:, 2] = np.where(np.arange(20) % 2, 1.0, -1.0)
+    return actions
+
+
+def _beyond(actions: np.ndarray) -> np.ndarray:
+    actions[-10:, 2] = np.linspace(0.1, 1.5, 10)
+    return actions
+
+
+def _tail(actions: np.ndarray) -> np.ndarray:
+    """A hundred rows that nobody ever plays."""
+    return np.vstack([actions, np.tile(np.float32([0, 0, 0, 0, 0, 0, -1]), (100, 1))]).astype(np.float32)
+
+
+def _tail_elsewhere(draft: Draft) -> None:
+    """Ten minutes of actions behind the end, where the lengths of other machines need not be equal."""
+    draft.everywhere(fingerprint=ELSEWHERE)
+    actions = draft.row["witness"]
+    draft.row["witness"] = np.vstack([actions, np.tile(actions[-1:], (60_000, 1))])
+    draft.timed(len(draft.row["witness"]), draft.check("witness")["numbers"]["seconds"])
+
+
+def _spoiled(value: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(actions: np.ndarray) -> np.ndarray:
+        actions[40, 1] = value
+        return actions
+
+    return change
+
+
+def _unfiltered(draft: Draft) -> None:
+    """The oracle without the filter of the interface: another, quicker robot."""
+    from scengen import config
+    from scengen.sim.world import World
+
+    row = draft.row
+    scenario = config.task(row["task"]).scenario(row["params"])
+    world = World.load(row["scene_xml"], row["embodiment"])
+    world.reset()
+    actions = []
+    for action in scenario.oracle(world):
+        actions.append(np.asarray(action, np.float32))
+        world.apply(actions[-1])
+        if scenario.success(world):
+            break
+    draft.played(np.array(actions, np.float32))
+
+
+def _of_the_second(draft: Draft) -> None:
+    draft.row["witness"] = draft.rows[1]["witness"].copy()
+
+
+WITNESS: dict[str, tuple[str, Change]] = {
+    "nothing": (r"witness", _witness(lambda a: a[:0], played=False)),
+    "half_of_it": (r"witness", _witness(lambda a: a[: len(a) // 3], played=False)),
+    "of_the_second": (r"witness", _of_the_second),
+    "mirrored": (r"witness", _witness(lambda a: a * np.float32([-1, -1, 1, 1, 1, 1, 1]), played=False)),
+    "nan": (r"witness|finite", _witness(_spoiled(float("nan")), played=False)),
+    "infinite": (r"witness|finite", _witness(_spoiled(float("inf")), played=False)),
+    "jerk": (r"witness|filter", _witness(_jerk)),
+    "beyond_one": (r"witness|filter", _witness(_beyond)),
+    "tail": (r"witness", _witness(_tail)),
+    "tail_elsewhere": (r"witness", _tail_elsewhere),
+    "unfiltered_oracle": (r"witness|filter", _unfiltered),
+}
+
+QUICK = ("jerk", "tail", "half_of_it")
+
+CASES = [
+    *(
+        Case(f"single_quick__witness_{name}", "single_quick", "reject", says, change, quick=name in QUICK)
+        for name, (says, change) in WITNESS.items()
+    ),
+    *(Case(f"{base}__witness_half_of_it", base, "reject", *WITNESS["half_of_it"]) for base in OTHERS),
+]
