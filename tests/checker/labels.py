@@ -225,9 +225,9 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
 }
 
 QUICK = {
-    "task_of_another", "category_everywhere", "instruction_of_all_rows", "horizon", "training_called_shifted",
+    "task_of_another", "instruction_of_all_rows", "horizon", "training_called_shifted",
     "severity_raised", "seed_everywhere", "sampler", "twin_of_another", "attempt", "hand_picked_by_little",
-    "funnel_certified", "first_left_out", "final_state", "versions_of_a_row",
+    "first_left_out", "final_state", "versions_of_a_row",
 }  # fmt: skip
 
 OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")

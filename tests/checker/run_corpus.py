@@ -13,6 +13,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -145,7 +146,8 @@ def main() -> int:
         chosen = [replace(c, expect="end", says="") for c in chosen if c.kind.startswith("hostile")]
     if not asked.again:
         shutil.rmtree(asked.pools, ignore_errors=True)
-        _apart(lambda: write(chosen, asked.pools, FOLDER / "base"))
+        make = partial(write, chosen, asked.pools, FOLDER / "base")
+        make() if asked.quick else _apart(make)
     _warm()
     scores, results, judged = [], {}, []
     for checker in asked.checker:

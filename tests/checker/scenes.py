@@ -192,7 +192,6 @@ def _case(base: str, name: str, change: Change, how: str, elsewhere: bool = Fals
 QUICK = {
     "gravity_sideways",
     "robot_passes_through",
-    "comment",
     "lighter_slab_elsewhere",
     "green_slab_elsewhere",
     "cube_green",
