@@ -45,7 +45,8 @@ def carried(arena: Arena) -> Iterator[Attempt]:
             pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(arena, other))
             yield Attempt(RETRY, (pick, *pushes[:2]))
             yield Attempt(RETRY, (pick, *pushes[2:]))
-            yield Attempt(RETRY, (pick, Macro("place", other.name, (0.0, 0.0, 0.06, 0.1))))
+            for share in SHARES[-1], *SHARES[:2]:
+                yield Attempt(RETRY, (pick, Macro("place", other.name, (share, 0.0, 0.06, 0.1))))
             yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in SHARES[:3])))
 
 
