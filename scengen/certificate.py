@@ -21,11 +21,17 @@ CHECKS: dict[str, Verdict] = {
     "numerics": "unknown",
     "ablations": "refuted",
     "witness": "unknown",
+    "attack": "refuted",
 }
 """The checks in the order in which they run, and the verdict when one fails.
 
 A failed check refutes the scenario where it shows, by itself, that the scenario is invalid: it cannot be, it does not
 stand still, it solves itself, or a shortcut solves it. Where only the oracle failed the verdict is unknown."""
+
+WAIVABLE = ("ablations", "attack")
+"""Checks that may have nothing to check: a family without ablations, settings that ask for no attack."""
+NOT_CHECKED = "not checked: "
+"""How the reason of such a check begins."""
 
 STAGES: dict[str, tuple[str, ...]] = {
     "feasible": ("feasible",),
@@ -34,7 +40,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "not trivial": ("unsolved", "idle", "shortcuts"),
     "solved": ("solved",),
     "robust": ("robust", "numerics", "ablations"),
-    "certified": ("witness",),
+    "certified": ("witness", "attack"),
 }
 """Steps of the funnel, and the checks that a scenario must pass to get through each."""
 
@@ -45,11 +51,16 @@ class Check:
 
     name: str
     passed: bool | None
-    """None: skipped, which certifies nothing."""
+    """None: not made. It was skipped, which certifies nothing, or there was nothing to check, see `waived`."""
     reason: str
-    """Why it failed or was skipped; empty when it passed."""
+    """Why it failed or was not made; empty when it passed."""
     settings: Mapping[str, Any]
     numbers: Mapping[str, Any]
+
+    @property
+    def waived(self) -> bool:
+        """Whether there was nothing to check, which is told and stands against nothing."""
+        return self.passed is None and self.name in WAIVABLE and self.reason.startswith(NOT_CHECKED)
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,7 @@ class Certificate:
     @property
     def failed(self) -> Check | None:
         """The first check that did not pass."""
-        return next((c for c in self.checks if not c.passed), None)
+        return next((c for c in self.checks if not c.passed and not c.waived), None)
 
     @property
     def verdict(self) -> Verdict:
@@ -101,8 +112,9 @@ class StoredCertificate:
 
     @property
     def complete(self) -> bool:
-        """Whether it says `certified` and every check passed."""
-        return self.verdict == "certified" and bool(self.checks) and all(check.passed for check in self.checks)
+        """Whether it says `certified`, and every check passed or had nothing to check."""
+        held = all(check.passed or check.waived for check in self.checks)
+        return self.verdict == "certified" and bool(self.checks) and held
 
     @property
     def settle(self) -> float | None:

@@ -24,7 +24,7 @@ from .errors import PoolError, UnknownName
 from .params import Value
 
 MANIFEST = "manifest.json"
-FORMAT = 2
+FORMAT = 3
 SHARD_ROWS = 100_000
 REJECTED = "rejected.parquet"
 GROUP_ROWS = 1000

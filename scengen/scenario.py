@@ -98,6 +98,8 @@ class Scenario(abc.ABC):
     """How long the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()
     """Bodies that are meant to move without anybody acting; they are exempt from the rest check."""
+    NO_ABLATIONS: ClassVar[str] = ""
+    """Why a family has no ablations: its certificates say so, and that this was not checked."""
     SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
     """Changes of the parameters that give the same scene, besides the periods that parameters declare themselves.
 

@@ -52,6 +52,11 @@ class Hit:
         """Of its files."""
         return f"{self.scenario}-{self.tier}-{'raw' if self.raw else 'filtered'}-{self.digest[:6]}"
 
+    def __str__(self) -> str:
+        without = ", ".join(f"{one} - {other}" for one, other in self.lacks)
+        kind = "raw" if self.raw else "filtered"
+        return f"without {without or 'lacking anything'} ({self.tier}, {kind}): {self.plan}"
+
     def plain(self) -> dict[str, Any]:
         """Everything but the actions."""
         kept = {key: value for key, value in vars(self).items() if key != "actions"}

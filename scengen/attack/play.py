@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
+from ..control.teleop import unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import BadConfig, GaveUp
 from ..scenario import Plan, Scenario
@@ -205,7 +206,7 @@ class _Run:
             self.notes.append(f"{macro.kind} {macro.target}".rstrip() + f": {error}")
 
     def _step(self, action: NDArray[np.float64]) -> Outcome | None:
-        given = np.clip(np.asarray(action, np.float32), -1.0, 1.0) if self.raw else self.world.filter(action)
+        given = unfiltered(action) if self.raw else self.world.filter(action)
         self.rows.append(given)
         return self.episode.step(given)
 

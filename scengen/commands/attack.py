@@ -93,6 +93,4 @@ def _fixed(prior: Prior) -> str:
 
 
 def _told(hit: Hit) -> str:
-    without = ", ".join(f"{one} - {other}" for one, other in hit.lacks)
-    kind = "raw" if hit.raw else "filtered"
-    return f"REFUTED {hit.scenario} ({hit.tier}, {kind}) without {without}: {hit.plan}; {hit.name}.npz"
+    return f"REFUTED {hit.scenario} {hit}; {hit.name}.npz"

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from ..analysis.shrink import centre, shrink
 from ..analysis.space import scale
 from ..analysis.tables import shrunk_table
+from ..attack.check import attacked
 from ..certificate import Check
 from ..config import read_task
 from ..errors import BadConfig, at_least
@@ -35,7 +36,7 @@ def command(arguments: Arguments) -> int:
     at_least(settings, seed=0, index=0)
     try_file(settings.json)
     scenario = _proposed(task, settings)
-    failed = certify(scenario, task.horizon, certify_settings, task.embodiment).certificate.failed
+    failed = certify(scenario, task.horizon, certify_settings, task.embodiment, adversary=attacked).certificate.failed
     where = f"{task.name}/{settings.split}/{settings.index}"
     if failed is None:
         raise BadConfig(f"{where} passes every check of certify={certify_settings.name}; there is nothing to shrink")
@@ -74,7 +75,9 @@ def _fails(
         judged += 1
         progress(judged, judged + 1)
         scenario = with_values(start, candidate)
-        certificate = certify(scenario, task.horizon, certify_settings, task.embodiment, last=failed.name).certificate
+        certificate = certify(
+            scenario, task.horizon, certify_settings, task.embodiment, failed.name, attacked
+        ).certificate
         checks = [c for c in certificate.checks if c.passed is False]
         return bool(checks) and checks[0].name == failed.name
 

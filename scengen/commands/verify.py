@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .. import config
+from ..attack.check import attacked
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..parallel import Limits
@@ -55,6 +56,7 @@ def command(arguments: Arguments) -> int:
         settings.workers,
         Limits(settings.limit_seconds, settings.limit_mb),
         settings.expired == "fail",
+        attacked,
     )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
         report = verify(pool, task, config.levels(task), options, progress_bar.show)

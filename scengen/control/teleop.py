@@ -51,6 +51,11 @@ class Filter:
         self._state[:] = given
 
 
+def unfiltered(action: ArrayLike) -> NDArray[np.float32]:
+    """An action as the controller gets it without the filter: clipped to [-1, 1], nothing else."""
+    return np.clip(np.asarray(action, np.float32), -1.0, 1.0)
+
+
 @njit(nogil=True, cache=True)
 def _filter(state: NDArray[np.float64], action: NDArray[np.float64], out: NDArray[np.float32]) -> bool:
     """Advance `state` by one action and write the result; False, and nothing done, if it is not finite."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import pool
+from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
 from ..parallel import Limits, each
@@ -86,7 +87,8 @@ class Job:
         draw = self._draw(index)
         if isinstance(draw, Record):
             return replace(draw, cpu=time.process_time() - start)
-        certified = certify(draw.scenario, self.task.horizon, self.certify_settings, self.task.embodiment)
+        task = self.task
+        certified = certify(draw.scenario, task.horizon, self.certify_settings, task.embodiment, adversary=attacked)
         certificate = certified.certificate
         failed = certificate.failed
         return Record(

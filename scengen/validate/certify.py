@@ -1,17 +1,17 @@
 """Certification: every check of one scenario, cheap ones first."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from scipy.stats import beta
 
-from ..certificate import CHECKS, Certificate, Check
+from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
 from ..episode import Actions, Episode
-from ..errors import ScengenError
+from ..errors import BadConfig, ScengenError
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.world import IDLE, JAW, World
@@ -39,6 +39,7 @@ def certify(
     settings: CertifySettings = QUICK,
     embodiment: str = JAW,
     last: str | None = None,
+    adversary: "Adversary | None" = None,
 ) -> Certified:
     """Run every check on a scenario, cheap ones first, until one fails.
 
@@ -48,12 +49,20 @@ def certify(
         settings: of the checks.
         embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
         last: the check after which to stop, for those who want to know about it only; nothing is certified then.
+        adversary: who attacks the scenario where the settings ask for it: `scengen.attack.check.attacked`.
+
+    Raises:
+        BadConfig: the settings ask for an attack, and there is no adversary.
     """
-    trial = Trial(scenario, horizon, settings, embodiment)
+    if settings.attack and adversary is None:
+        what = f"certify.attack = {settings.attack}, but nobody attacks"
+        raise BadConfig(f"{what}; pass adversary=scengen.attack.check.attacked")
+    trial = Trial(scenario, horizon, settings, embodiment, adversary)
     checks: list[Check] = []
     for name in CHECKS:
-        if checks and (not checks[-1].passed or checks[-1].name == last):
-            why = "not asked for" if checks[-1].passed else "skipped after a failed check"
+        failed = bool(checks) and checks[-1].passed is False
+        if failed or (checks and checks[-1].name == last):
+            why = "skipped after a failed check" if failed else "not asked for"
             checks.extend(Check(rest, None, why, {}, {}) for rest in list(CHECKS)[len(checks) :])
             break
         checks.append(trial.check(name))
@@ -73,8 +82,16 @@ class Trial:
     Whoever has a witness already may set it, and run the checks that only replay it.
     """
 
-    def __init__(self, scenario: Scenario, horizon: float, settings: CertifySettings, embodiment: str):
+    def __init__(
+        self,
+        scenario: Scenario,
+        horizon: float,
+        settings: CertifySettings,
+        embodiment: str,
+        adversary: "Adversary | None" = None,
+    ):
         self.scenario, self.horizon, self.settings, self.embodiment = scenario, horizon, settings, embodiment
+        self.adversary = adversary
         self.text = ""
         self.witness: Rollout | None = None
 
@@ -93,11 +110,14 @@ class Trial:
             "numerics": self._numerics,
             "ablations": self._ablations,
             "witness": self._witness,
+            "attack": self._attack,
         }
         settings, numbers, reason = look[name]()
-        return Check(name, not reason, reason, settings, numbers)
+        waived = reason.startswith(NOT_CHECKED)
+        return Check(name, None if waived else not reason, reason, settings, numbers)
 
-    # Each check returns its settings, its numbers, and the reason of its failure (empty when it passed).
+    # Each check returns its settings, its numbers, and the reason of its failure: empty when it passed, and one that
+    # begins with `NOT_CHECKED` where there is nothing to check.
 
     def _feasible(self) -> "Finding":
         """What refutes the scenario before anything moves; of one that stands, what its physics depends on."""
@@ -168,17 +188,17 @@ class Trial:
         return {"horizon": self.horizon}, _outcome(episode), ""
 
     def _shortcuts(self) -> "Finding":
-        shortcuts = self.scenario.shortcuts()
-        rollouts = {
-            name: try_shortcut(self.scenario, self.world, shortcut, self.horizon, self.settings.settle)
-            for name, shortcut in shortcuts.items()
-        }
-        numbers = {name: _outcome(e) for name, e in rollouts.items()}
-        for name, e in rollouts.items():
-            if e.solved:
-                return {}, numbers, f"{name!r} reaches the goal"
-            if e.outcome == "unstable" or (shortcuts[name].to_rest and e.reason != AT_REST):
-                return {}, numbers, f"{name!r} was not seen to its end: {e.reason}"
+        """Every tempting plan, through the teleoperation filter and without it: a policy has none in its way."""
+        numbers: dict[str, dict[str, Any]] = {}
+        for name, shortcut in self.scenario.shortcuts().items():
+            numbers[name] = {}
+            for how, raw in ACTIONS.items():
+                tried = try_shortcut(self.scenario, self.world, shortcut, self.horizon, self.settings.settle, raw)
+                numbers[name][how] = _attempted(tried)
+                if tried.solved:
+                    return {}, numbers, f"{name!r} reaches the goal ({how})"
+                if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
+                    return {}, numbers, f"{name!r} was not seen to its end ({how}): {tried.reason}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":
@@ -232,8 +252,10 @@ class Trial:
 
     def _ablations(self) -> "Finding":
         assert self.witness is not None
+        if not (ablations := self.scenario.ablations()):
+            return {}, {}, no_ablations(self.scenario)
         numbers = {}
-        for name, scene in self.scenario.ablations().items():
+        for name, scene in ablations.items():
             text, _ = scene_text.emit(scene)
             episode = replay(
                 self.scenario,
@@ -262,6 +284,13 @@ class Trial:
             "" if again.digest == self.witness.digest else "the replay ends in another state",
         )
 
+    def _attack(self) -> "Finding":
+        """Whether the built-in adversary finds a way around what the task is about."""
+        if not self.settings.attack:
+            return {}, {}, NO_ATTACK
+        assert self.adversary is not None
+        return self.adversary(self)
+
     def _load(self, substeps: int | None = None) -> World:
         return World.load(self.text, self.embodiment, substeps=substeps)
 
@@ -270,6 +299,19 @@ class Trial:
 
 
 Finding = tuple[Mapping[str, Any], Mapping[str, Any], str]
+Adversary = Callable[[Trial], Finding]
+"""Attacks the scenario of a trial whose witness has been found."""
+ACTIONS = {"filtered": False, "raw": True}
+"""How actions come to the controller, and whether that is raw."""
+NO_ATTACK = f"{NOT_CHECKED}the settings ask for no rollouts of the adversary"
+"""What a certificate says where nobody has attacked."""
+NOT_TRIED = "not tried"
+"""What a certificate says of a shortcut that gave up: nothing is known about it."""
+
+
+def no_ablations(scenario: Scenario) -> str:
+    """What a certificate says where a family has no ablations."""
+    return NOT_CHECKED + (scenario.NO_ABLATIONS or "the family has no ablations, and does not say why")
 
 
 def lower_bound(successes: int, runs: int) -> float:
@@ -283,6 +325,12 @@ def _nothing(world: World) -> Plan:
 
 def _outcome(episode: Rollout) -> dict[str, Any]:
     return {"outcome": episode.outcome, "reason": episode.reason, "seconds": episode.seconds}
+
+
+def _attempted(tried: Rollout) -> dict[str, Any]:
+    """As `_outcome`, of a shortcut: one that gave up, and was not stopped by a failure, has not been tried."""
+    told = _outcome(tried)
+    return {**told, "outcome": NOT_TRIED} if tried.gave_up and tried.outcome == "timeout" else told
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:

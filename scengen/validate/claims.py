@@ -16,7 +16,7 @@ from ..pool import Pool, PoolRow, sha256
 from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
-from .certify import lower_bound
+from .certify import ACTIONS, NO_ATTACK, NOT_TRIED, lower_bound, no_ablations
 from .rollout import AT_REST
 from .settings import CertifySettings
 
@@ -137,13 +137,22 @@ def wrong_certificate(row: PoolRow, scenario: Scenario, claims: Claims) -> Itera
     if [check.name for check in checks] != list(CHECKS):
         yield f"the certificate is not complete: its checks are not {', '.join(CHECKS)}, once each in this order"
         return
+    nothing = _nothing_to_check(scenario, claims.settings)
     for check in checks:
-        if not check.passed:
+        if check.name in nothing and (check.passed is not None or check.reason != nothing[check.name]):
+            yield f"check {check.name} has nothing to check here, and does not say so"
+        elif check.name not in nothing and not check.passed:
             yield f"the certificate is not complete: {check.name} has not passed"
-        elif check.reason:
+        elif check.name not in nothing and check.reason:
             yield f"check {check.name} has passed, with a reason against it: {check.reason[:80]}"
     yield from _other_settings(checks, claims)
     yield from _contradictions({check.name: check for check in checks}, row, scenario, claims)
+
+
+def _nothing_to_check(scenario: Scenario, settings: CertifySettings) -> dict[str, str]:
+    """Checks that are not made, by name, and the reason that a certificate gives."""
+    found = {} if settings.attack else {"attack": NO_ATTACK}
+    return found if scenario.ablations() else {**found, "ablations": no_ablations(scenario)}
 
 
 def wrong_rejection(row: PoolRow, claims: Claims) -> Iterator[str]:
@@ -175,6 +184,7 @@ def _other_settings(checks: Sequence[Check], claims: Claims) -> Iterator[str]:
         "solved": {"horizon": claims.task.horizon},
         "robust": asdict(settings.robust),
         "witness": {"settle": settings.settle},
+        "attack": {"rollouts": settings.attack} if settings.attack else {},
     }
     for check in checks:
         if as_json(check.settings) != as_json(expected.get(check.name, {})):
@@ -207,6 +217,7 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
         "numerics": _numerics,
         "ablations": lambda n: set(n) == set(scenario.ablations()) and all(_unsolved(r, True) for r in n.values()),
         "witness": lambda n: _played(n, checks["solved"].numbers["seconds"], row, claims.settings.settle),
+        "attack": lambda n: _attacked(n, claims.settings),
     }
     for name, holds in rules.items():
         try:
@@ -233,8 +244,21 @@ def _unsolved(numbers: Mapping[str, Any], unstable: bool) -> bool:
 
 def _shortcuts(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
     known = scenario.shortcuts()
-    seen = all(_unsolved(n, False) and (not known[k].to_rest or n["reason"] == AT_REST) for k, n in numbers.items())
-    return set(numbers) == set(known) and seen
+    tries = [(known[name], n) for name, told in numbers.items() for n in told.values() if set(told) == set(ACTIONS)]
+    seen = all(_failed(n) and (not shortcut.to_rest or n["reason"] == AT_REST) for shortcut, n in tries)
+    return set(numbers) == set(known) and len(tries) == len(ACTIONS) * len(known) and seen
+
+
+def _failed(numbers: Mapping[str, Any]) -> bool:
+    """Whether these are the numbers of a shortcut that has not reached the goal, or of one that was not tried."""
+    return _unsolved({**numbers, "outcome": "timeout"} if numbers["outcome"] == NOT_TRIED else numbers, False)
+
+
+def _attacked(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+    rollouts = [told["rollouts"] for told in numbers.values()]
+    whole = all(type(n) is int and n > 0 for n in rollouts) and sum(rollouts) <= settings.attack
+    counted = all(set(n) == {"rollouts", "hits"} and 0 <= n["hits"] <= n["rollouts"] for n in numbers.values())
+    return whole and counted and bool(numbers) == bool(settings.attack)
 
 
 def _solved(numbers: Mapping[str, Any], horizon: float) -> bool:

@@ -9,7 +9,7 @@ from ..certificate import Check, as_json
 from ..errors import NoOracle
 from ..pool import PoolRow
 from ..scenario import Scenario
-from .certify import Trial, certify
+from .certify import Adversary, Trial, certify
 from .identity import fingerprint
 from .rollout import Rollout, replay
 from .settings import CertifySettings
@@ -33,7 +33,14 @@ class Simulated:
     """The witness reaches the goal, but ends in other bits than on the machine of the certificate."""
 
 
-def simulate(row: PoolRow, scenario: Scenario, text: str, settings: CertifySettings, level: str) -> Simulated:
+def simulate(
+    row: PoolRow,
+    scenario: Scenario,
+    text: str,
+    settings: CertifySettings,
+    level: str,
+    adversary: Adversary | None = None,
+) -> Simulated:
     """Simulate what a level asks for, until something does not hold.
 
     Args:
@@ -41,6 +48,7 @@ def simulate(row: PoolRow, scenario: Scenario, text: str, settings: CertifySetti
         text: the scene as the family builds it here; that of the row is never compiled.
         settings: of the certificate.
         level: one of `LEVELS`.
+        adversary: see `certify`.
     """
     here = row.certificate.fingerprint == fingerprint()
     trial = Trial(scenario, row.horizon, settings, row.embodiment)
@@ -55,7 +63,7 @@ def simulate(row: PoolRow, scenario: Scenario, text: str, settings: CertifySetti
     if not reasons and level == "recheck":
         reasons = list(_repeated(trial, rollout, stored, here))
     if not reasons and level == "full":
-        reasons = list(_certified_again(row, scenario, settings, stored, here))
+        reasons = list(_certified_again(row, scenario, settings, stored, here, adversary))
     return Simulated(tuple(reasons), drifted and not reasons)
 
 
@@ -80,26 +88,31 @@ def _repeated(trial: Trial, rollout: Rollout, stored: dict[str, Check], here: bo
         except NoOracle:
             found = Check(name, False, "the witness does not hold, and this machine has no oracle", {}, {})
         yield from _against(found, stored[name], here)
-        if not found.passed:
+        if not found.passed and not found.waived:
             return
 
 
 def _certified_again(
-    row: PoolRow, scenario: Scenario, settings: CertifySettings, stored: dict[str, Check], here: bool
+    row: PoolRow,
+    scenario: Scenario,
+    settings: CertifySettings,
+    stored: dict[str, Check],
+    here: bool,
+    adversary: Adversary | None,
 ) -> Iterator[str]:
-    again = certify(scenario, row.horizon, settings, row.embodiment)
+    again = certify(scenario, row.horizon, settings, row.embodiment, adversary=adversary)
     if again.certificate.verdict != "certified":
         yield f"certified again it is {again.certificate.verdict}: {again.certificate.reason}"
         return
     same_oracle = np.array_equal(again.witness, row.witness)
     for check in again.certificate.checks:
-        depends = check.name in ("solved", "robust", "numerics", "ablations", "witness")
+        depends = check.name in ("solved", "robust", "numerics", "ablations", "witness", "attack")
         yield from _against(check, stored[check.name], here and (same_oracle or not depends))
 
 
 def _against(found: Check, stored: Check, exact: bool) -> Iterator[str]:
     """Where a check that was made again does not say what is stored."""
-    if not found.passed:
+    if not found.passed and not found.waived:
         yield f"check {found.name} fails: {found.reason}"
     elif exact and as_json(found.numbers) != as_json(stored.numbers):
         yield f"check {found.name} has other numbers when it is made again: {as_json(found.numbers)[:160]}"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
+from ..control.teleop import unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import GaveUp
 from ..samplers.keyed import normal, spread
@@ -37,6 +38,8 @@ class Rollout:
     actions: Actions
     digest: str
     """Hash of the final physics state."""
+    gave_up: str = ""
+    """Why the plan could not be carried out to its end; empty if it could, or if the episode ended before."""
 
     @property
     def solved(self) -> bool:
@@ -101,6 +104,7 @@ def run(
     settle: float = 1.0,
     jitter: Jitter | None = None,
     until_settled: bool = False,
+    raw: bool = False,
 ) -> Rollout:
     """Play a plan from the start of `world` until success, failure or the horizon.
 
@@ -111,10 +115,11 @@ def run(
         horizon: time limit for reaching the goal [s].
         until_settled: the episode may end once the plan has ended and everything is at rest, provided that the scene
             has no events of its own.
+        raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
     """
     world.reset()
     stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
-    return _live(scenario, world, _Planned(world, planner, jitter), horizon, settle, stillness)
+    return _live(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
 
 
 def replay(
@@ -131,10 +136,12 @@ def replay(
     return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
 
 
-def try_shortcut(scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0) -> Rollout:
+def try_shortcut(
+    scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0, raw: bool = False
+) -> Rollout:
     """Play a tempting plan as a certificate does: within the time limit, or where it must come to rest, beyond it."""
     patience = PATIENCE if shortcut.to_rest else 1.0
-    return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True)
+    return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True, raw=raw)
 
 
 def _uneventful(scenario: Scenario) -> bool:
@@ -142,10 +149,15 @@ def _uneventful(scenario: Scenario) -> bool:
 
 
 class _Planned:
-    """Filtered actions of a plan, with noise and latency if wanted."""
+    """Actions of a plan, filtered or raw, with noise and latency if wanted."""
 
-    def __init__(self, world: World, planner: Planner, jitter: Jitter | None):
-        self.world, self.plan, self.jitter = world, planner(world), jitter
+    def __init__(self, world: World, planner: Planner, jitter: Jitter | None, raw: bool):
+        self.plan, self.world, self.jitter, self.sent = (
+            planner(world),
+            world,
+            jitter,
+            unfiltered if raw else world.filter,
+        )
         self.ended, self.note, self.periods = False, "", 0
         self.late: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
 
@@ -156,7 +168,7 @@ class _Planned:
             self.late.append(self.jitter.shaken(action, self.periods))
             action = self.late.popleft()
         self.periods += 1
-        return self.world.filter(action)
+        return self.sent(action)
 
     def stop(self) -> None:
         """Called when the goal has been reached: the rest of the plan is not played."""
@@ -220,7 +232,7 @@ def _live(
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
         rows = np.array(actions, np.float32).reshape(-1, 7)
-        return Rollout(outcome, reason, round(at, 6), rows, world.digest)
+        return Rollout(outcome, reason, round(at, 6), rows, world.digest, source.note)
 
     while step() is None:
         if stillness and source.ended and not episode.held and stillness.lasts():

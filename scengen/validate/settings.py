@@ -39,6 +39,7 @@ class CertifySettings:
     rest: Rest = field(default_factory=Rest)
     settle: float = 1.0
     robust: Robust = field(default_factory=Robust)
+    attack: int = 0
 
     def check(self) -> None:
         """Raise `BadConfig` for a number with which a check would mean nothing or never end."""
@@ -62,6 +63,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "robust.friction": (0.0, 0.9, ""),
     "robust.noise": (0.0, 1.0, ""),  # the whole range of a channel on one side
     "robust.latency": (0, 100, " control periods"),  # one second
+    "attack": (0, 10_000, " rollouts"),
 }
 """Least and largest value of every setting, and its unit."""
 

@@ -11,6 +11,7 @@ from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from . import claims as claim
 from . import survey
+from .certify import Adversary
 from .claims import Claims
 from .identity import fingerprint, source_sha256, versions
 from .rebuilt import difference, rebuild
@@ -41,6 +42,8 @@ class Options:
     """Of one scenario; None to work in this process."""
     strict: bool = True
     """Whether a certificate that is older than the family's code is declined."""
+    adversary: Adversary | None = None
+    """Who attacks at level full where the certificates ask for it; see `certify.certify`."""
 
 
 @dataclass(frozen=True)
@@ -229,6 +232,7 @@ class Examiner:
     claims: Claims
     level: str
     expired: bool
+    adversary: Adversary | None
 
     def __call__(self, job: "Job") -> "Examination | dict[int, survey.Drawn]":
         if isinstance(job, range):
@@ -257,7 +261,7 @@ class Examiner:
         if reasons or not simulated:
             verdict: Verdict = "refuted" if reasons else "sound"
             return Examination(row.id, verdict, tuple(reasons), True, expired=self.expired)
-        done = simulate(row, scenario, text, claims.settings, self.level)
+        done = simulate(row, scenario, text, claims.settings, self.level, self.adversary)
         verdict = "refuted" if done.reasons else "sound"
         return Examination(row.id, verdict, done.reasons, True, True, self.expired, done.drifted)
 
@@ -298,7 +302,7 @@ def _rows(pool: Pool, claims: Claims, options: Options, found: _Found, progress:
         except PoolError as error:
             found.of_pool("shards", "refuted", str(error))
 
-    examiner = Examiner(claims, options.level, found.expired)
+    examiner = Examiner(claims, options.level, found.expired, options.adversary)
     seen: list[Examination] = []
     for one in each(examiner, jobs(), options.workers, options.limits, _lost):
         if isinstance(one, dict):
