@@ -154,7 +154,9 @@ def _line(text: str) -> None:
     from .printed import printable
 
     words = re.sub(r"\S{1000,}", lambda found: cut(found[0]), printable(text))
-    print(cut(words, LONGEST), file=sys.stderr, flush=True)
+    if len(words) > LONGEST:  # what would be right stands at the end
+        words = f"{words[: LONGEST // 2]} ... {words[-LONGEST // 2 :]}"
+    print(words, file=sys.stderr, flush=True)
 
 
 def _told(text: str, file: str = "") -> int:

@@ -7,6 +7,7 @@ rules of `scengen.schema`.
 import hashlib
 import json
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -84,6 +85,8 @@ SCHEMA = pa.schema(
 
 PROCESS = "process"
 """Stands for a check in the reasons where a scenario has ended its process, or was ended with it at a limit."""
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 NO_WITNESS: NDArray[np.float32] = np.zeros((0, 7), np.float32)
 """The witness of a row without one: it was not certified, or its witness was not asked for."""
@@ -346,6 +349,11 @@ def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept:
     text = json.dumps({"format": FORMAT, **about, "shards": shards, **extra}, indent=1, sort_keys=True) + "\n"
     _replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)
+
+
+def uncounted(reason: str) -> str:
+    """A reason without its numbers: rejections of the same kind have the same reason then, and can be counted."""
+    return _NUMBER.sub("#", reason)
 
 
 def sha256(content: str | bytes) -> str:

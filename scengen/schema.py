@@ -32,6 +32,10 @@ DEEPEST = 16
 """Levels of brackets in JSON; a manifest has 7."""
 MOST_SHARDS = 10_000
 MOST_INDICES = 1_000_000_000
+MOST_AXES = 200
+MOST_SEVERITIES = 100
+"""Of an axis. All of them are proved to leave training when a pool is opened for verification; a task has 8 with 5."""
+MOST_VERSIONS = 100
 MEMORY = 4_000_000_000
 """Bytes that reading a few rows may take in addition to what the process has: a column that is declared small can
 unpack to anything."""
@@ -139,9 +143,11 @@ def _check_task(task: Mapping[str, Any]) -> None:
     _horizon(task.get("horizon"))
     for name in ("id", "axes", "limits", "certify"):
         _require(isinstance(task.get(name) or {}, Mapping), f"config.task.{name} is no mapping")
-    for name, axis in (task.get("axes") or {}).items():
+    axes = task.get("axes") or {}
+    _require(len(axes) <= MOST_AXES, f"config.task has {len(axes)} axes; at most {MOST_AXES} are read")
+    for name, axis in axes.items():
         count = _mapping(f"axis {name[:40]}", axis).get("severities", 0)
-        _whole(f"severities of axis {name[:40]}", count, 1000)
+        _whole(f"severities of axis {name[:40]}", count, MOST_SEVERITIES)
 
 
 def _check_shard(shard: Any) -> None:
@@ -332,7 +338,8 @@ def _settling(value: Any) -> None:
 
 
 def _versions(value: Any) -> None:
-    for name, version in _mapping("versions", value).items():
+    _require(len(_mapping("versions", value)) <= MOST_VERSIONS, f"more than {MOST_VERSIONS} versions")
+    for name, version in value.items():
         _text("a version", name, 100)
         _text(f"the version of {name[:40]!r}", version, 100)
     for name in ("mujoco", "robosuite"):

@@ -20,6 +20,8 @@ from ..validate.recheck import LEVELS
 from ..validate.verify import Options, Report, verify
 from . import BAD_INPUT, FAILED, OK, Arguments, err, one, out, say, warn, write, write_json
 
+SHOWN = 20
+"""Differences and faults that are told; the files hold all."""
 STATUS = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
 
 
@@ -71,11 +73,15 @@ def command(arguments: Arguments) -> int:
 def _tell(pool: Pool, report: Report) -> None:
     if report.differences:
         table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
-        for d in report.differences:
+        for d in report.differences[:SHOWN]:
             table.add_row(*(Text(d[name]) for name in ("key", "pool", "installed")))
         out.print(table)
-    for failure in report.failed:
-        warn(f"{failure['verdict'].upper()} {failure['id']}: {failure['reason']}")
+        if (more := len(report.differences) - SHOWN) > 0:
+            say(f"and {more} more; json= writes them all")
+    for failure in report.failed[:SHOWN]:
+        warn(f"{failure['verdict'].upper()} {failure['id']}: {failure['reason'][:2000]}")
+    if (more := len(report.failed) - SHOWN) > 0:
+        warn(f"and {more} more faults; json= writes them all")
     for remark in report.remarks:
         say(remark)
     done = [
@@ -85,6 +91,7 @@ def _tell(pool: Pool, report: Report) -> None:
             (report.replayed, "replayed"),
             (report.rechecked, "checked again without an oracle"),
             (report.certified_again, "certified again"),
+            (report.left_out, "left out and failing again"),
             (report.expired, "expired"),
             (report.drifted, "end in other bits"),
         )

@@ -10,13 +10,14 @@ import numpy as np
 from ..certificate import CHECKS, Check, as_json
 from ..control.loop import Loop
 from ..control.teleop import ALPHA, LARGEST_CHANGE, MOTION
-from ..errors import Infeasible
+from ..errors import Infeasible, ScengenError
 from ..params import canonical
 from ..pool import Pool, PoolRow, sha256
 from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
 from .certify import ACTIONS, NO_ATTACK, NOT_TRIED, lower_bound, no_ablations
+from .rebuilt import rebuild
 from .rollout import AT_REST
 from .settings import CertifySettings
 
@@ -108,6 +109,8 @@ def wrong_names(row: PoolRow, scenario: Scenario) -> Iterator[str]:
 def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
     """Where a row is not what comes out when its index is drawn again."""
     task = claims.task
+    if row.index >= claims.indices:
+        return
     try:
         draw = task.draw(claims.split, claims.seed, row.index, task.design(claims.sampler))
     except Infeasible:
@@ -155,13 +158,14 @@ def _nothing_to_check(scenario: Scenario, settings: CertifySettings) -> dict[str
     return found if scenario.ablations() else {**found, "ablations": no_ablations(scenario)}
 
 
-def wrong_rejection(row: PoolRow, claims: Claims) -> Iterator[str]:
+def wrong_rejection(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
     """Where the certificate of a kept scenario that was not certified contradicts itself."""
     certificate, checks = row.certificate, row.certificate.checks
     if [check.name for check in checks] != list(CHECKS):
         yield f"the checks of this reject are not {', '.join(CHECKS)}, once each in this order"
         return
-    failed = next((check for check in checks if not check.passed), None)
+    nothing = _nothing_to_check(scenario, claims.settings)
+    failed = next((check for check in checks if not check.passed and check.reason != nothing.get(check.name)), None)
     if failed is None or failed.passed is None:
         yield "this reject has failed no check"
         return
@@ -173,6 +177,19 @@ def wrong_rejection(row: PoolRow, claims: Claims) -> Iterator[str]:
     if certificate.verdict not in claims.keep:
         yield f"this reject is {certificate.verdict}, and keep= does not ask for those"
     yield from _other_settings(checks[: place + 1], claims)
+
+
+def compiled(row: PoolRow) -> bool:
+    """Whether a certificate does not say that its scene does not compile."""
+    return not any(check.name == "compiles" and check.passed is False for check in row.certificate.checks)
+
+
+def scene_of_a_failure(scenario: Scenario) -> str:
+    """The text of a scene that does not compile, or cannot be loaded; empty if there is none."""
+    try:
+        return rebuild(scenario)
+    except (ScengenError, ValueError):
+        return ""
 
 
 def _other_settings(checks: Sequence[Check], claims: Claims) -> Iterator[str]:

@@ -3,7 +3,7 @@
 import re
 import xml.etree.ElementTree as ET
 
-from .verify import Report
+from .findings import Report
 
 _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold."""

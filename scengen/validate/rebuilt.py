@@ -8,8 +8,8 @@ from ..errors import BadConfig
 from ..scenario import Scenario
 from ..sim import scene_text
 
-SAME = 1e-9
-"""Largest difference of two numbers, relative or absolute, on machines that round otherwise."""
+SAME, ZERO = 1e-9, 1e-12
+"""Largest difference of two numbers, relative and absolute, on machines that round otherwise: an inertia has 1e-6."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?([eE][-+]?[0-9]+)?")
 """A number as MuJoCo reads and writes it; Python takes `0.0_6` and Arabic digits for numbers too."""
 OTHER = "the scene is not the one that the family builds from the parameters"
@@ -29,6 +29,8 @@ def difference(text: str, rebuilt: str, exact: bool) -> str:
     """
     if text == rebuilt:
         return ""
+    if not text or not rebuilt:
+        return f"{OTHER}: {'it' if rebuilt else 'that'} is empty"
     try:
         scene_text.check(text)
     except BadConfig as error:
@@ -56,6 +58,6 @@ def _close(a: str, b: str) -> bool:
         if x != y:
             if not (_NUMBER.fullmatch(x) and _NUMBER.fullmatch(y)):
                 return False
-            if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=SAME):
+            if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=ZERO):
                 return False
     return True

@@ -7,9 +7,10 @@ import numpy as np
 
 from ..certificate import Check, as_json
 from ..errors import NoOracle
-from ..pool import PoolRow
+from ..pool import PoolRow, uncounted
 from ..scenario import Scenario
 from .certify import Adversary, Trial, certify
+from .claims import Claims
 from .identity import fingerprint
 from .rollout import Rollout, replay
 from .settings import CertifySettings
@@ -65,6 +66,45 @@ def simulate(
     if not reasons and level == "full":
         reasons = list(_certified_again(row, scenario, settings, stored, here, adversary))
     return Simulated(tuple(reasons), drifted and not reasons)
+
+
+def fails_again(
+    row: PoolRow, scenario: Scenario, settings: CertifySettings, level: str, adversary: Adversary | None
+) -> Iterator[str]:
+    """Where a kept reject does not fail as its certificate says. On a machine that rounds otherwise it need not.
+
+    Args:
+        row: whose labels, names, settings and scene have been found right.
+        level: `recheck` repeats the checks without an oracle as far as they were made, `full` all of them.
+        adversary: see `certify`.
+    """
+    if level == "replay" or row.certificate.fingerprint != fingerprint():
+        return
+    last = None if level == "full" else FIRST[-1]
+    again = certify(scenario, row.horizon, settings, row.embodiment, last, adversary)
+    for check, stored in zip(again.certificate.checks, row.certificate.checks, strict=True):
+        if last and check.name not in FIRST:
+            return
+        if (check.passed, check.reason) != (stored.passed, stored.reason):
+            told = "is passed" if check.passed else f"fails: {check.reason}" if check.reason else "is not made"
+            yield f"check {check.name} of this reject {told} when it is made again"
+            return
+        if as_json(check.numbers) != as_json(stored.numbers):
+            yield f"check {check.name} of this reject has other numbers when it is made again"
+            return
+
+
+def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -> str:
+    """Why the scenario of an index is not certified, as a manifest counts it; empty if it is.
+
+    Args:
+        index: at which a feasible scenario is drawn.
+        adversary: see `certify`.
+    """
+    task = claims.task
+    draw = task.draw(claims.split, claims.seed, index, task.design(claims.sampler))
+    again = certify(draw.scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary)
+    return uncounted(again.certificate.reason)
 
 
 def _replayed(row: PoolRow, rollout: Rollout, here: bool) -> Iterator[str]:

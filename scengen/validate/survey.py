@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 from ..certificate import CHECKS, STAGES
 from ..errors import Infeasible
-from ..pool import PROCESS, Pool
+from ..pool import PROCESS, Pool, PoolRow, uncounted
 from .claims import Claims
 
 CHUNK = 50
 """Indices that one worker draws at a time."""
-MOST_PER_ROW = 2000
-"""Indices per certified scenario beyond which a manifest is too large to be drawn again; a run gives up far earlier."""
+MOST, MOST_PER_ROW = 10_000, 2000
+"""Draws beyond which a manifest is too large to be drawn again, and how many more for every certified scenario: a run
+gives up far earlier, and a draw takes 0.5 to 14 ms."""
+ROWS_IN_TIME = 1000
+"""For how many scenarios their indices may together be drawn in the time that verification gives to one."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,28 @@ def chunks(count: int) -> Iterator[range]:
 
 def too_large(pool: Pool) -> str:
     """Why the indices of a pool are not drawn again; empty if they are."""
-    most = 10_000 + MOST_PER_ROW * len(pool)
-    return f"{pool.indices} indices for {len(pool)} scenarios are too many to draw again" if pool.indices > most else ""
+    most = MOST + MOST_PER_ROW * len(pool)
+    for count, what in ((pool.indices, "indices"), (pool.funnel.get("proposed", 0), "draws")):
+        if count > most:
+            return f"{count} {what} for {len(pool)} scenarios are too many to draw again"
+    return ""
+
+
+def patience(pool: Pool, seconds: float) -> float:
+    """How long drawing all indices of a pool again may take [s].
+
+    Args:
+        seconds: what one scenario may take.
+    """
+    return seconds * (1 + len(pool) // ROWS_IN_TIME)
+
+
+def too_many(pool: Pool, drawn: Mapping[int, Drawn]) -> str:
+    """Why what has been drawn so far cannot be what a manifest counts; empty if it can."""
+    proposals, told = sum(d.proposals for d in drawn.values()), pool.funnel.get("proposed", 0)
+    if proposals <= told:
+        return ""
+    return f"the funnel tells of {told} draws; {len(drawn)} of its {pool.indices} indices alone give {proposals}"
 
 
 def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:
@@ -74,7 +97,7 @@ def wrong_funnel(pool: Pool, certified: Mapping[int, int], drawn: Mapping[int, D
         infeasible.update({f"feasible: {why}": times for why, times in d.infeasible.items()})
     told = {key: times for key, times in pool.reasons.items() if key.startswith("feasible: ")}
     if told != dict(infeasible):
-        yield f"the reasons of infeasible draws are not those that come out again, {dict(infeasible)}"
+        yield f"the reasons of infeasible draws are not those that come out again, {_told(infeasible)}"
     for key, times in pool.reasons.items():
         name = key.partition(": ")[0]
         if name not in (*CHECKS, PROCESS):
@@ -104,18 +127,55 @@ def wrong_subset(pool: Pool) -> Iterator[str]:
         yield "the funnel has other steps than those of a run"
 
 
-def wrong_rejects(pool: Pool, kept: Sequence[str]) -> Iterator[str]:
-    """Where the kept rejects are not as many as the reasons tell.
+@dataclass(frozen=True)
+class Reject:
+    """What is counted of a scenario that was kept although it was not certified."""
+
+    index: int
+    reason: str
+    """Why it was not, as the reasons of a manifest count it."""
+
+    @classmethod
+    def of(cls, row: PoolRow) -> "Reject":
+        """That of a row."""
+        return cls(row.index, uncounted(row.certificate.reason))
+
+
+def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Mapping[int, int]) -> Iterator[str]:
+    """Where the kept rejects are not those of the reasons.
 
     Args:
-        kept: the failed check of every reject.
+        certified: the indices of the rows, and more.
     """
-    if pool.chosen:
-        return
-    expected = Counter[str]()
-    for key, times in pool.reasons.items():
-        name = key.partition(": ")[0]
-        if name != "feasible" and CHECKS.get(name) in pool.manifest["config"]["keep"]:
-            expected[name] += times
-    if Counter(kept) != expected:
-        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {dict(expected)}"
+    indices = [reject.index for reject in kept]
+    if any(a >= b for a, b in itertools.pairwise(indices)):
+        yield "the rejects do not stand in the order of their indices, each once"
+    if both := certified.keys() & set(indices):
+        yield f"index {min(both)} is a reject, and certified too"
+    expected = {
+        key: times
+        for key, times in pool.reasons.items()
+        if not key.startswith("feasible: ") and CHECKS.get(key.partition(": ")[0]) in pool.manifest["config"]["keep"]
+    }
+    if Counter(reject.reason for reject in kept) != expected:
+        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {_told(expected)}"
+
+
+def wrong_losses(pool: Pool, again: Mapping[int, str]) -> Iterator[str]:
+    """Where the reasons of a manifest are not those for which its other feasible scenarios fail here.
+
+    A scenario that had ended its process, or reached a limit of its author's machine, may come to any end.
+
+    Args:
+        again: why each of them is not certified, by index; empty for one that is.
+    """
+    told = Counter({key: times for key, times in pool.reasons.items() if not key.startswith("feasible: ")})
+    lost = sum(told.pop(key) for key in list(told) if key.startswith(f"{PROCESS}: "))
+    found = Counter(again.values())
+    if (missing := told - found) or (found - told).total() > lost:
+        certified = f"; {found['']} of them are certified here" if found[""] else ""
+        yield f"certified again, scenarios that it left out fail otherwise than it tells, {_told(missing)}{certified}"
+
+
+def _told(counts: Mapping[str, int]) -> str:
+    return str(dict(itertools.islice(counts.items(), 5)))[:500]
