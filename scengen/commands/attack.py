@@ -15,14 +15,18 @@ from ..errors import BadConfig
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
+from ..targets import try_file, try_folder
 from . import FAILED, OK, Arguments, err, out, say, warn, write_json
 
 
 def command(arguments: Arguments) -> int:
     settings = read("attack", arguments, Settings)
     settings.check()
+    try_file(settings.json)
+    try_folder(settings.to)
     task, subjects = _chosen(arguments, settings)
     folder = Path(settings.to or f"generated/attack/{task.name}")
+    try_folder(folder)
     with ProgressBar(err, f"attack {task.name}", len(subjects)) as progress_bar:
 
         def progress(done: int, hits: int) -> None:
