@@ -7,6 +7,7 @@ from rich.table import Table
 
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
+from ..parallel import Limits
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
@@ -22,12 +23,14 @@ class Settings:
     limit: float
     json: str | None
     workers: int
+    limit_seconds: float
+    limit_mb: int
 
     def check(self) -> None:
         """Raise `BadConfig` for a value that means nothing."""
         if not 0.0 <= self.limit <= 1.0:
             raise BadConfig(f"limit = {self.limit:g}; it must lie in [0, 1]")
-        at_least(self, first=1, workers=1)
+        at_least(self, first=1, workers=1, limit_seconds=1, limit_mb=200)
 
 
 def command(arguments: Arguments) -> int:
@@ -41,8 +44,9 @@ def command(arguments: Arguments) -> int:
 
     from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
 
+    limits = Limits(settings.limit_seconds, settings.limit_mb)
     with ProgressBar(err, "robosuite", total) as progress_bar:
-        found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments))
+        found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments), limits)
     tasks = defaultdict(list)
     for comparison in found:
         tasks[comparison.task].append(comparison)

@@ -5,13 +5,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..episode import Actions, Outcome
-from ..parallel import each
+from ..parallel import Limits, each
 from ..pool import Pool, PoolRow
 from ..sim.world import Vec3, World
 from ..validate.rollout import replay
@@ -24,10 +25,11 @@ class Comparison:
 
     task: str
     id: str
-    ours: Outcome
-    theirs: Outcome
+    ours: Outcome | Literal["unknown"]
+    theirs: Outcome | Literal["unknown"]
+    """Both are unknown where the comparison has crashed, or has reached a limit."""
     reason: str
-    """Why robosuite's is no success; empty for a success."""
+    """Why robosuite's is no success, or why nothing is known; empty for a success."""
     apart: float
     """Largest distance of the two grip sites at equal times [m]."""
     later: float
@@ -35,7 +37,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        return self.ours == self.theirs
+        return self.ours == self.theirs != "unknown"
 
 
 def compare_all(
@@ -44,18 +46,20 @@ def compare_all(
     progress: Callable[[int], None],
     first: int | None = None,
     search: tuple[str, ...] = (),
+    limits: Limits | None = None,
 ) -> list[Comparison]:
     """Compare every scenario of some pools, or the `first` so many of each; ordered by task and id.
 
     Args:
         progress: told how many scenarios have been compared.
         search: folders of other packages with tasks, see `config.search_path`.
+        limits: of every scenario; None to work in this process.
 
     Raises:
         ScengenError: a pool is damaged, or was made with another version of MuJoCo or robosuite.
     """
     found = []
-    for comparison in each(partial(compare, search=search), _rows(pools, first), workers):
+    for comparison in each(partial(compare, search=search), _rows(pools, first), workers, limits, _lost):
         found.append(comparison)
         progress(len(found))
     return sorted(found, key=lambda comparison: (comparison.task, comparison.id))
@@ -81,6 +85,10 @@ def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
     apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=1)
     later = round(seconds - ours.seconds, 6) + 0.0  # never -0.0
     return Comparison(row.task, row.id, ours.outcome, theirs, reason, float(apart.max()), later)
+
+
+def _lost(row: PoolRow, reason: str) -> Comparison:
+    return Comparison(row.task, row.id, "unknown", "unknown", reason, 0.0, 0.0)
 
 
 @dataclass

@@ -8,8 +8,8 @@ from typing import Any
 
 from ..episode import Actions
 from ..errors import Infeasible
-from ..parallel import each
-from ..runs.log import Log
+from ..parallel import Limits, each
+from ..log import Log
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario
@@ -30,6 +30,10 @@ KINDS: dict[tuple[bool, bool], str] = {
     (True, False): BUG,
 }
 """What it means whether (the actions of the ID twin, the oracle) solves an OOD scenario."""
+
+
+LIMITS = Limits(600.0, 4000)
+"""Of one twin: two oracle runs and a replay take some seconds."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ def try_twins(
     identity = {"task": task.name, "split": split, "shifts": shifts, "seed": seed, "source": source_sha256(task.family)}
     with Log(folder / "behaviour.jsonl", identity) as log:
         todo = sorted(set(range(n)) - {r["index"] for r in log.records})
-        for trial in each(partial(_try_twin, task, split, seed), todo, workers):
+        for trial in each(partial(_try_twin, task, split, seed), todo, workers, LIMITS, _lost):
             log.add(trial)
             progress(len(log.records))
         records = sorted((r for r in log.records if r["index"] < n), key=lambda r: r["index"])
@@ -129,3 +133,8 @@ def _try_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     except Infeasible as error:
         found = False, False, str(error)
     return {"index": index, **dict(zip(("replay", "oracle", "reason"), found, strict=True))}
+
+
+def _lost(index: int, reason: str) -> dict[str, Any]:
+    """A twin that has crashed its process, or has reached a limit: nothing is known about it."""
+    return {"index": index, "replay": False, "oracle": False, "reason": reason}
