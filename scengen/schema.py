@@ -33,9 +33,10 @@ DEEPEST = 16
 MOST_SHARDS = 10_000
 MOST_INDICES = 1_000_000_000
 MOST_AXES = 200
-MOST_SEVERITIES = 100
-"""Of an axis. All of them are proved to leave training when a pool is opened for verification; a task has 8 with 5."""
+MOST_SEVERITIES = 1000
+"""Of all axes: each is proved to leave training when a pool is verified; a task has 8 axes with 5 each."""
 MOST_VERSIONS = 100
+MOST_HITS = 10_000
 MEMORY = 4_000_000_000
 """Bytes that reading a few rows may take in addition to what the process has: a column that is declared small can
 unpack to anything."""
@@ -45,11 +46,12 @@ _ID = re.compile(r"[0-9a-f]{12}")
 _SHORT_HASH = re.compile(r"[0-9a-f]{16}")
 _HASH = re.compile(r"[0-9a-f]{64}")
 _SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
+_HIT = re.compile(r"hits/[A-Za-z0-9_-]{1,200}\.npz")
 _SAMPLER = re.compile(r"iid|sobol|(lhs|grid):[0-9]{1,6}")
 _CONFIG = ("task", "certify", "split", "sampler", "seed", "keep")
 _VERDICTS = ("certified", "refuted", "unknown")
 _ENTRIES = ("config", "fingerprint", "first_draws", "format", "funnel", "indices", "n", "reasons", "shards")
-_MORE_ENTRIES = ("source_sha256", "versions", "rejected", "subset")
+_MORE_ENTRIES = ("source_sha256", "versions", "rejected", "subset", "attack")
 
 
 class Malformed(ValueError):
@@ -129,10 +131,31 @@ def check_manifest(manifest: Any) -> None:
     if "rejected" in entries:
         _require(entries["rejected"]["file"] == "rejected.parquet", "rejected names another file than rejected.parquet")
     _require(len({shard["file"] for shard in shards}) == len(shards), "a shard is listed twice")
+    if "attack" in entries:
+        _check_attack(_mapping("attack", entries["attack"]))
     if "subset" in entries:
         subset = _mapping("subset", entries["subset"])
         _matches("subset.of", subset.get("of"), _HASH)
         _text("subset.chosen", subset.get("chosen"), 1000)
+
+
+def _check_attack(attack: Mapping[str, Any]) -> None:
+    """What `scengen.attack.campaign.stored` writes, as far as it is read again."""
+    for name in ("rates", "hits"):
+        _require(isinstance(attack.get(name), list) and len(attack[name]) <= MOST_HITS, f"attack.{name} is no list")
+    for rate in attack["rates"]:
+        entry = _mapping("a rate of the attack", rate)
+        _text("the tier of a rate", entry.get("tier"), 100)
+        _require(isinstance(entry.get("raw"), bool), "a rate that does not say whether it is raw")
+        for name in ("rollouts", "hits"):
+            _whole(f"{name} of a rate", entry.get(name), MOST_INDICES)
+    for hit in attack["hits"]:
+        entry = _mapping("a hit", hit)
+        _matches("the file of a hit", entry.get("file"), _HIT)
+        _matches("sha256 of a hit", entry.get("sha256"), _HASH)
+        _text("the tier of a hit", entry.get("tier"), 100)
+        _require(isinstance(entry.get("raw"), bool), "a hit that does not say whether it is raw")
+    _require(len({hit["file"] for hit in attack["hits"]}) == len(attack["hits"]), "a hit is listed twice")
 
 
 def _check_task(task: Mapping[str, Any]) -> None:
@@ -145,9 +168,11 @@ def _check_task(task: Mapping[str, Any]) -> None:
         _require(isinstance(task.get(name) or {}, Mapping), f"config.task.{name} is no mapping")
     axes = task.get("axes") or {}
     _require(len(axes) <= MOST_AXES, f"config.task has {len(axes)} axes; at most {MOST_AXES} are read")
+    left = MOST_SEVERITIES
     for name, axis in axes.items():
         count = _mapping(f"axis {name[:40]}", axis).get("severities", 0)
-        _whole(f"severities of axis {name[:40]}", count, MOST_SEVERITIES)
+        _whole(f"severities of axis {name[:40]}", count, left)
+        left -= count
 
 
 def _check_shard(shard: Any) -> None:

@@ -45,12 +45,22 @@ def _drop_number(name: str, which: int = 0) -> Change:
     return change
 
 
-def _first_number(name: str, **numbers: Any) -> Change:
+def _first_number(name: str, *below: str, **numbers: Any) -> Change:
+    """Of the first shortcut, at one of its two tries, or of the first ablation."""
+
     def change(draft: Draft) -> None:
         found = draft.check(name)["numbers"]
-        found[sorted(found)[0]].update(numbers)
+        found = found[sorted(found)[0]]
+        for key in below:
+            found = found[key]
+        found.update(numbers)
 
     return change
+
+
+def _drop_try(draft: Draft) -> None:
+    numbers = draft.check("shortcuts")["numbers"]
+    del numbers[sorted(numbers)[0]]["raw"]
 
 
 def _swapped(draft: Draft) -> None:
@@ -102,6 +112,13 @@ def _promoted(draft: Draft) -> None:
     draft.config["keep"] = []
 
 
+def _left_out(draft: Draft) -> None:
+    """A scenario that was certified is said to have failed, with every count to match: the author did not like it."""
+    del draft.rows[0]
+    draft.manifest.update(n=1, first_draws=1, reasons={"robust: # of # jittered runs succeed; run #: dropped": 1})
+    draft.manifest["funnel"].update(robust=1, certified=1)
+
+
 CHECKS: dict[str, tuple[str, Change]] = {
     "one_check_listed": (r"checks|complete", _only("witness")),
     "no_check_listed": (r"checks|complete|settle", _only()),
@@ -111,6 +128,17 @@ CHECKS: dict[str, tuple[str, Change]] = {
     "check_twice": (r"checks|complete", _doubled),
     "check_invented": (r"checks|complete", _invented),
     "check_renamed": (r"checks|complete", _check("robust", name="sturdy")),
+    "attack_not_listed": (r"checks|complete", _without("attack")),
+    "attack_called_made": (r"attack", _check("attack", passed=True, reason="")),
+    "attack_called_made_with_numbers": (
+        r"attack",
+        _check("attack", passed=True, reason="", settings={"rollouts": 8}, numbers={"raw": {"rollouts": 8, "hits": 0}}),
+    ),
+    "attack_for_another_reason": (r"attack", _check("attack", reason="not checked: everybody knows")),
+    "ablations_called_nothing": (
+        r"ablation",
+        _check("ablations", passed=None, reason="not checked: the family has none", numbers={}),
+    ),
     "check_failed": (r"complete|robust|passed", _check("robust", passed=False, reason="0 of 4 jittered runs succeed")),
     "check_skipped": (r"complete|idle|passed", _check("idle", passed=None, reason="not asked for")),
     "passed_with_a_reason": (r"reason|robust", _check("robust", reason="2 of 4 jittered runs succeed")),
@@ -146,7 +174,9 @@ CHECKS: dict[str, tuple[str, Change]] = {
     "turn_beyond_its_limit": (r"rest|turn", _numbers("rest", turn=3.0)),
     "drift_is_nan": (r"rest|drift|finite|NaN|JSON|canonical", _numbers("rest", drift=float("nan"))),
     "idle_reached_the_goal": (r"idle", _numbers("idle", outcome="success", reason="")),
-    "shortcut_reached_the_goal": (r"shortcut", _first_number("shortcuts", outcome="success", reason="")),
+    "shortcut_reached_the_goal": (r"shortcut", _first_number("shortcuts", "filtered", outcome="success", reason="")),
+    "shortcut_reached_the_goal_raw": (r"shortcut", _first_number("shortcuts", "raw", outcome="success", reason="")),
+    "shortcut_tried_once": (r"shortcut", _drop_try),
     "shortcut_not_told": (r"shortcut", _drop_number("shortcuts")),
     "ablation_reached_the_goal": (r"ablation", _first_number("ablations", outcome="success", reason="")),
     "ablation_not_told": (r"ablation", _drop_number("ablations")),
@@ -181,8 +211,13 @@ RECHECKED: dict[str, tuple[str, str, Change]] = {
 """Refuted by repeating the checks that need no oracle."""
 
 CERTIFIED_AGAIN: dict[str, tuple[str, str, Change]] = {
+    "left_out": ("single_quick", r"certified here", _left_out),
     "failed_check_edited": ("single_kept", r"robust", _promoted),
-    "shortcut_fails_early": ("single_quick", r"shortcut", _first_number("shortcuts", seconds=0.01, reason="gave up")),
+    "shortcut_fails_early": (
+        "single_quick",
+        r"shortcut",
+        _first_number("shortcuts", "raw", seconds=0.01, reason="gave up"),
+    ),
 }
 """Refuted by certifying again with the oracle, and by nothing less."""
 

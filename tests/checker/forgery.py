@@ -36,6 +36,8 @@ class Draft:
     schema: pa.Schema
     family: str
     """Dotted path of the family's class, which ids depend on."""
+    listed_rows: int | None = None
+    """How many rows the manifest says that there are, if it lies."""
 
     @classmethod
     def of(cls, folder: Path) -> "Draft":
@@ -135,7 +137,8 @@ class Draft:
         folder.mkdir(parents=True)
         for row in [*self.rows, *self.rejected]:
             self._seal(row)
-        self.manifest["shards"] = [self._shard(folder, SHARD, self.rows)]
+        shard = self._shard(folder, SHARD, self.rows)
+        self.manifest["shards"] = [shard if self.listed_rows is None else {**shard, "rows": self.listed_rows}]
         if self.rejected:
             self.manifest["rejected"] = self._shard(folder, REJECTED, self.rejected)
         write_manifest(folder, self.manifest)

@@ -37,7 +37,9 @@ def _settle(value: Any) -> Change:
     def change(draft: Draft) -> None:
         draft.config["certify"]["settle"] = value
         for row in draft.rows:
-            row["certificate"]["checks"][-1]["settings"]["settle"] = value
+            for check in row["certificate"]["checks"]:
+                if "settle" in check["settings"]:
+                    check["settings"]["settle"] = value
 
     return change
 
@@ -191,12 +193,18 @@ def _mixture(depth: int) -> Change:
     return _entry(node, "config", "task", "id", "gap_ratio")
 
 
-def _hopeless(draft: Draft) -> None:
-    """Ten thousand indices, of which every one has to be drawn a hundred times in vain."""
-    draft.config["split"] = "hopeless"
-    draft.task["axes"]["hopeless"] = {"why": "", "replace": {"gap_ratio": ["uniform", 2.1, 2.4]}}
-    draft.manifest.update(indices=11_000, n=20_000, first_draws=0)
-    draft.every(split="hopeless", axes=["hopeless"])
+def _hopeless(indices: int, draws: int | None = None) -> Change:
+    """Thousands of indices, of which every one has to be drawn a hundred times in vain; the manifest may say so."""
+
+    def change(draft: Draft) -> None:
+        draft.config["split"] = "hopeless"
+        draft.task["axes"]["hopeless"] = {"why": "", "replace": {"gap_ratio": ["uniform", 2.1, 2.4]}}
+        draft.manifest.update(indices=indices, n=20_000, first_draws=0)
+        if draws is not None:
+            draft.manifest["funnel"]["proposed"] = draws
+        draft.every(split="hopeless", axes=["hopeless"])
+
+    return change
 
 
 MANIFESTS: dict[str, Change] = {
@@ -210,6 +218,8 @@ MANIFESTS: dict[str, Change] = {
     "axis_markup": _entry({"[/]": {"replace": {}}}, "config", "task", "axes"),
     "range_no_list": _entry("uniform", "config", "task", "id", "gap_ratio"),
     "axes_many": _axes(20_000),
+    "axes_some": _axes(150),
+    "axes_with_severities": _axes(150, severities=100),
     "severities_endless": _axes(1, severities=10**9),
     "choice_long": _entry(["choice", *range(-180, 180)] * 300, "config", "task", "id", "heading"),
     "mixture_deep": _mixture(300),
@@ -232,7 +242,9 @@ MANIFESTS: dict[str, Change] = {
     "funnel_markup": _entry(1, "funnel", "[/]"),
     "reasons_list": _manifest(reasons=["x"]),
     "indices_huge": _manifest(indices=10**15),
-    "indices_hopeless": _hopeless,
+    "indices_hopeless": _hopeless(11_000),
+    "indices_hopeless_and_counted": _hopeless(130, 13_000),
+    "indices_hopeless_and_many": _hopeless(20_000, 2_000_000),
     "indices_true": _manifest(indices=True),
     "versions_list": _manifest(versions=[]),
     "format_text": _manifest(format="two"),
@@ -267,11 +279,17 @@ def _yaml(folder: Path) -> None:
 
 
 def _case(prefix: str, name: str, change: Change) -> Case:
-    """One of the above. Many axes of one's own are no fault, as long as verification comes to an end."""
+    """One of the above. Some axes of one's own are no fault, as long as verification comes to an end."""
     damage = _yaml if name in WITH_A_MODULE else None
     says = SAYS.get(name.partition("_")[0], r"\w")
     return Case(
-        f"{prefix}__{name}", BASE, "end" if name == "axes_many" else "refuse", says, change, damage, quick=name in QUICK
+        f"{prefix}__{name}",
+        BASE,
+        "accept" if name == "axes_some" else "refuse",
+        says,
+        change,
+        damage,
+        quick=name in QUICK,
     )
 
 

@@ -104,6 +104,40 @@ def _drop_second(draft: Draft) -> None:
     del draft.rows[1]
 
 
+def _certified_too(draft: Draft) -> None:
+    """Instead of the scenario that failed the first certified one stands among the rejects."""
+    failed = draft.rejected[0]["certificate"]["checks"]
+    draft.rejected[0] = _from(draft)
+    draft.rejected[0]["certificate"].update(
+        checks=failed, verdict="unknown", reason=next(f"{c['name']}: {c['reason']}" for c in failed if not c["passed"])
+    )
+
+
+def _other_reason(draft: Draft) -> None:
+    """The certificate of a reject agrees with itself, and not with what the manifest counts."""
+    certificate = draft.rejected[0]["certificate"]
+    failed = next(check for check in certificate["checks"] if check["passed"] is False)
+    failed["reason"] = "the robot had a bad day"
+    certificate["reason"] = f"{failed['name']}: {failed['reason']}"
+
+
+def _other_check(draft: Draft) -> None:
+    """It has failed to be solved, and not to be robust; every count follows."""
+    certificate = draft.rejected[0]["certificate"]
+    names = [check["name"] for check in certificate["checks"]]
+    for check in certificate["checks"][names.index("solved") :]:
+        check.update(passed=None, reason="skipped after a failed check", settings={}, numbers={})
+    certificate["checks"][names.index("solved")].update(passed=False, reason="timeout")
+    certificate["reason"] = "solved: timeout"
+
+
+def _promises(draft: Draft) -> None:
+    """So many rows that a thousand million indices are none too many to draw again."""
+    draft.manifest.update(n=10**6, indices=10**9)
+    draft.manifest["funnel"] = dict.fromkeys(draft.manifest["funnel"], 10**9)
+    draft.listed_rows = 10**6
+
+
 def _versions(where: str, **changed: str) -> Change:
     def change(draft: Draft) -> None:
         if where in ("rows", "both"):
@@ -221,6 +255,17 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
     "keep_without_rejects": ("single_kept", r"reject|keep|kept", lambda d: d.rejected.clear()),
     "rejects_without_keep": ("single_kept", r"reject|keep|kept", _config(keep=[])),
     "reject_of_another_index": ("single_kept", r"reject|index|drawn", lambda d: d.rejected[0].update(index=40)),
+    "reject_of_a_certified_index": ("single_kept", r"reject|certified too", _certified_too),
+    "reject_twice": ("single_kept", r"reject", lambda d: d.rejected.append(copy.deepcopy(d.rejected[0]))),
+    "reject_for_another_reason": ("single_kept", r"reject|reasons", _other_reason),
+    "reject_of_another_check": ("single_kept", r"reject|reasons|funnel", _other_check),
+    "reject_certified": ("single_kept", r"reject|verdict", lambda d: d.rejected[0]["certificate"].update(reason="")),
+    "versions_many": (
+        "single_quick",
+        r"versions|damaged",
+        _versions("both", **{f"package_{k}": "1" for k in range(5000)}),
+    ),
+    "promises_a_million_rows": ("single_quick", r"promises|scenarios", _promises),
     "subset_of_nothing": ("single_quick", r"subset", _manifest(subset={"of": "no hash", "chosen": "max-min coverage"})),
 }
 
@@ -248,7 +293,7 @@ def _older_mujoco(draft: Draft) -> None:
     _versions("both", mujoco="3.3.0")(draft)
 
 
-REFUSED = ("sampler_unknown", "subset_of_nothing", "source_of_the_manifest")
+REFUSED = ("versions_many", "sampler_unknown", "subset_of_nothing", "source_of_the_manifest")
 """Those that a checker may decline: they do not follow the format, or may come from another version."""
 
 
