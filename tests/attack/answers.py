@@ -10,22 +10,7 @@ import numpy as np
 from scengen.scenario import Answer, Plan, Scenario
 from scengen.sim.world import World
 from scengen.tasks.domino_select import DominoSelect
-from scengen.tasks.galileo_ramp_drop import GalileoRampDrop
 from scengen.tasks.seesaw_balance import LEVEL, SeesawBalance
-
-
-def galileo(self: GalileoRampDrop) -> Answer:
-    """A share of the height of the near incline."""
-    ramp = self.ramp
-    top, wanted = ramp.height(self.brim), ramp.height(self.start)
-
-    def act(world: World, share: float) -> Plan:
-        yield from self.release_at(world, -ramp.at_height(share * top))
-
-    def right(share: float) -> bool:
-        return abs(share * top - wanted) <= ramp.band / 2
-
-    return Answer(tuple(np.linspace(0.3, 1.0, 29).round(3).tolist()), act, right)
 
 
 def seesaw(self: SeesawBalance) -> Answer:
@@ -52,7 +37,7 @@ def select(self: DominoSelect) -> Answer:
     return Answer(tuple(map(float, range(5))), act, lambda lane: round(lane) == self.intact, tries=1)
 
 
-ANSWERS = {GalileoRampDrop: galileo, SeesawBalance: seesaw, DominoSelect: select}
+ANSWERS = {SeesawBalance: seesaw, DominoSelect: select}
 
 
 @contextmanager

@@ -196,7 +196,13 @@ NARROW: Mapping[str, tuple[str, ...]] = {
         "task.id.target.mass=[uniform,0.20,0.25]",
         "task.id.weight.mass=[mixture,[uniform,0.13,0.15],[uniform,0.32,0.37]]",
     ),
-    "galileo_ramp_drop": ("task.id.ramp.level=[uniform,0.42,0.60]",),
+    "galileo_ramp_drop": (
+        "task.id.ramp.level=[uniform,0.42,0.60]",
+        "task.id.ramp.angle=[uniform,20.0,28.0]",
+        "~task.id.ramp.span",
+        "~task.id.ramp.bend",
+        "+task.id.ramp.band=0.006",
+    ),
 }
 BARS: Mapping[int, float] = {1: 0.10, 3: 0.20}
 """How many fresh draws one and three fixed answers may solve."""
