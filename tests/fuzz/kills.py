@@ -1,7 +1,7 @@
 """Kills generation runs in every way and compares their pools in the end: `python tests/fuzz/kills.py 50 [seed]`.
 
 A run is begun, killed after a random time, and continued until it ends. Its pool must have the bytes of one that was
-made without a break, and no process may stay.
+made without a break, and no process may stay. A kill that comes too late, after the end, is not counted.
 """
 
 import os
@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,8 +22,6 @@ WAYS = ("SIGKILL", "SIGTERM", "SIGINT", "worker", "disk")
 QUICKLY = ("certify.robust.runs=1", "certify.robust.bound=0.04")
 N = 3
 """Scenarios of a pool."""
-SECONDS = 12.0
-"""A run is killed within this time [s]: about as long as it takes on a free machine."""
 
 
 def start(pool: Path, workers: int, limit: int | None = None) -> subprocess.Popen[str]:
@@ -55,13 +54,15 @@ def group(leader: int) -> list[int]:
     return found
 
 
-def hit(pool: Path, way: str, after: float, workers: int) -> str:
-    """Begin or continue a run and kill it. What went wrong, or nothing."""
+def hit(pool: Path, way: str, after: float, workers: int) -> str | None:
+    """Begin or continue a run and kill it. What went wrong, or nothing; None if it had ended before."""
+    before = set(pool.parent.rglob("*.part"))
     process = start(pool, workers, limit=int(20_000 + 10_000 * after) if way == "disk" else None)
     if way != "disk":
         with suppress(subprocess.TimeoutExpired):
             process.wait(after)
-    if process.poll() is None:
+    late = process.poll() is not None
+    if not late:
         with suppress(ProcessLookupError):
             if way == "SIGKILL":
                 os.killpg(process.pid, signal.SIGKILL)
@@ -69,8 +70,10 @@ def hit(pool: Path, way: str, after: float, workers: int) -> str:
                 process.terminate()
             elif way == "SIGINT":
                 os.killpg(process.pid, signal.SIGINT)
-            elif way == "worker" and (workers_alive := group(process.pid)):
-                os.kill(workers_alive[-1], signal.SIGKILL)
+            elif way == "worker":
+                late = not (workers_alive := group(process.pid))
+                for worker in workers_alive[-1:]:
+                    os.kill(worker, signal.SIGKILL)
     _, told = process.communicate()
     time.sleep(0.3)
     if left := group(process.pid):
@@ -78,9 +81,9 @@ def hit(pool: Path, way: str, after: float, workers: int) -> str:
     lines = [line for line in told.splitlines() if line.startswith("scengen")]
     if "Traceback" in told or len(lines) > 1 or "damaged" in told:
         return f"said {told[-600:]!r}"
-    if list(pool.parent.rglob("*.part")) and way != "SIGKILL":
+    if way != "SIGKILL" and set(pool.parent.rglob("*.part")) - before:
         return "a .part is left"
-    return ""
+    return None if late or (way == "disk" and process.returncode == 0) else ""
 
 
 def finish(pool: Path) -> bytes:
@@ -92,23 +95,30 @@ def finish(pool: Path) -> bytes:
     return (pool / "manifest.json").read_bytes()
 
 
-def run(kills: int, seed: int, each: int = 5) -> list[str]:
-    """Kill runs, `each` times every pool; what went wrong."""
+def run(kills: int, seed: int, each: int = 3) -> list[str]:
+    """Kill runs, at most `each` times every pool, until so many kills have hit; what went wrong."""
     pick, wrong = random.Random(seed), []
+    hits: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
+        begun = time.monotonic()
         whole = finish(Path(folder, "whole"))
-        for number in range(0, kills, each):
-            pool = Path(folder, f"pool{number}")
-            for k in range(number, min(number + each, kills)):
-                way, after = WAYS[k % len(WAYS)], pick.uniform(0.2, SECONDS)
-                if fault := hit(pool, way, after, workers=pick.choice((1, 2))):
+        seconds, pools = time.monotonic() - begun, 0
+        while hits.total() < kills:
+            pools += 1
+            pool = Path(folder, f"pool{pools}")
+            for _ in range(min(each, kills - hits.total())):
+                way, after = min(WAYS, key=lambda name: (hits[name], name)), pick.uniform(0.1, seconds)
+                fault = hit(pool, way, after, workers=pick.choice((1, 2)))
+                hits[way] += fault is not None
+                if fault:
                     wrong.append(f"{way} after {after:.1f} s: {fault}")
             try:
                 if finish(pool) != whole:
-                    wrong.append(f"pool {number}: other bytes")
+                    wrong.append(f"pool {pools}: other bytes")
             except RuntimeError as error:
-                wrong.append(f"pool {number}: {error}")
-            print(f"{min(number + each, kills)} of {kills} kills, {len(wrong)} ended badly", flush=True)
+                wrong.append(f"pool {pools}: {error}")
+            print(f"{hits.total()} of {kills} kills, {len(wrong)} ended badly", flush=True)
+    print(f"{pools} pools; {', '.join(f'{count} by {way}' for way, count in sorted(hits.items()))}")
     return wrong
 
 
