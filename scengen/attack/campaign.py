@@ -1,28 +1,32 @@
 """An attack on several scenarios of a task: subjects, jobs in parallel, and the report."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+import json
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..episode import Actions
-from ..errors import BadConfig, Infeasible, UnknownName, at_least
+from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
+from ..log import Log
 from ..parallel import each
-from ..pool import Pool
-from ..runs.log import Log
+from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..sim import scene_text
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.rollout import run
-from .evidence import Hit, Rate, rates
+from .evidence import Hit, Rate, rates, unsound
 from .play import Arena
 from .priors import Judge, Prior, by_statics, fit, has_statics
 from .search import PRIOR, TIERS, Attack, Result, Untried
 
 GRAMMAR = 1
 """Version of macros and tiers: reports of different ones are not comparable."""
+HITS = "hits"
+"""Folder of the hits in a pool."""
 TRIES = 4
 """How many draws are tried for every scenario wanted."""
 STATICS, ROLLOUTS = 300, 8
@@ -80,6 +84,8 @@ class Report:
     hits: tuple[Hit, ...]
     priors: tuple[Prior, ...]
     untried: tuple[Untried, ...]
+    folder: Path
+    """Where the hits are stored."""
     cpu: float
     """Processor time of the adversary's rollouts [s]; differs from run to run."""
 
@@ -93,7 +99,7 @@ class Report:
         return [hit for hit in self.hits if hit.refutes]
 
     def plain(self) -> dict[str, Any]:
-        """Everything but actions and processor time."""
+        """Everything but actions, places and processor time."""
         return {
             "task": self.task,
             "grammar": GRAMMAR,
@@ -126,7 +132,11 @@ class Job:
 
 
 def attack(
-    task: Task, subjects: Sequence[Subject], settings: Settings, folder: Path, progress: Callable[[int, int], None]
+    task: Task,
+    subjects: Sequence[Subject],
+    settings: Settings,
+    folder: Path,
+    progress: Callable[[int, int], None] = lambda done, hits: None,
 ) -> Report:
     """Attack every subject, continuing what stands in `folder`; hits are stored there.
 
@@ -149,7 +159,7 @@ def attack(
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
         for result in each(job, todo, settings.workers):
             for hit in result.hits:
-                hit.store(folder)
+                replace(hit, task=task.name).store(folder)
             log.add(_record(result))
             progress(len(log.records), sum(len(record["hits"]) for record in log.records))
         return _report(task, subjects, log, folder, priors)
@@ -178,15 +188,49 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
     return found
 
 
-def pooled(task: Task, pool: Pool, n: int) -> list[Subject]:
-    """The first `n` scenarios of a pool."""
-    found = []
-    for row in pool.rows():
-        if len(found) == n:
-            break
-        scenario = task.scenario(row.params)
-        found.append(Subject(scenario, row.scene_xml, row.embodiment, row.horizon, row.witness))
-    return found
+def certified(task: Task, rows: Iterable[PoolRow]) -> list[Subject]:
+    """Certified scenarios, with their witnesses."""
+    return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness) for r in rows]
+
+
+def stored(report: Report, folder: Path) -> dict[str, Any]:
+    """What the manifest of a pool in `folder` says of an attack on it; hits are copied there.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    files = []
+    for hit in report.hits:
+        (folder / HITS).mkdir(parents=True, exist_ok=True)
+        content = (report.folder / f"{hit.name}.npz").read_bytes()
+        (folder / HITS / f"{hit.name}.npz").write_bytes(content)
+        files.append({"file": f"{HITS}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
+    return {**report.plain(), "hits": files}
+
+
+def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
+    """Where the hits that a manifest tells of are not what it says: the name of each, and why."""
+    told = pool.manifest.get("attack", {})
+    counts = Counter((hit["tier"], hit["raw"]) for hit in told.get("hits", []))
+    for rate in told.get("rates", []):
+        if rate["hits"] != counts.pop((rate["tier"], rate["raw"]), 0):
+            yield rate["tier"], "the attack counts other hits than it lists"
+    if counts:
+        yield next(iter(counts))[0], "the attack lists hits of a tier that it does not count"
+    ids = {id_ for (id_,) in pool.columns("id")}
+    for entry in told.get("hits", []):
+        try:
+            path = pool.folder / entry["file"]
+            found = Hit.load(path)
+            listed = {key: value for key, value in entry.items() if key not in ("file", "sha256")}
+            if sha256(path.read_bytes()) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
+                yield entry["file"], "the hit is not the one that the manifest lists"
+            elif found.refutes and found.scenario in ids:
+                yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
+            elif why := unsound(found, task):
+                yield entry["file"], why
+        except ScengenError as error:
+            yield entry["file"], str(error)
 
 
 def arena_of(subject: Subject) -> Arena:
@@ -246,7 +290,7 @@ def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, pri
     hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
     untried = tuple(Untried(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
-    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, cpu)
+    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, folder, cpu)
 
 
 def _sorted(counts: Sequence[Rate]) -> list[Rate]:

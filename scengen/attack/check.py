@@ -24,5 +24,5 @@ def attacked(trial: Trial) -> Finding:
         for rate in result.rates
     }
     around = next((hit for hit in result.hits if hit.refutes), None)
-    reason = f"there is a way {around}" if around else ""
+    reason = f"a way around, {around}" if around else ""
     return {"rollouts": trial.settings.attack}, numbers, reason

@@ -1,16 +1,23 @@
 """Evidence of an attack: hits that replay bit for bit, what they lack, and rates with bounds."""
 
 import json
-from collections.abc import Sequence
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
 from ..episode import Actions
-from ..errors import BadConfig, NoOracle
+from ..errors import BadConfig, NoOracle, cut
+from ..params import Value, values
+from ..samplers.task import Task
+from ..schema import column_witness, memory_bounded, read_json
+from ..sim import scene_text
 from ..sim.world import World
+from ..targets import refused
 from ..validate.certify import lower_bound
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
@@ -40,7 +47,11 @@ class Hit:
     """Causal contacts of the witness that it does without."""
     unmoved: tuple[str, ...]
     """Bodies that the witness moves, and it does not."""
+    params: Mapping[str, Value] = field(repr=False, compare=False)
+    """Of the scenario, by name."""
     actions: Actions = field(repr=False, compare=False)
+    task: str = ""
+    """Name of the task; whoever attacks a family that belongs to none leaves it open."""
 
     @property
     def refutes(self) -> bool:
@@ -53,13 +64,12 @@ class Hit:
         return f"{self.scenario}-{self.tier}-{'raw' if self.raw else 'filtered'}-{self.digest[:6]}"
 
     def __str__(self) -> str:
-        without = ", ".join(f"{one} - {other}" for one, other in self.lacks)
-        kind = "raw" if self.raw else "filtered"
-        return f"without {without or 'lacking anything'} ({self.tier}, {kind}): {self.plan}"
+        contacts = " without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
+        return f"by {self.tier}, {'raw' if self.raw else 'filtered'},{contacts}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
-        """Everything but the actions."""
-        kept = {key: value for key, value in vars(self).items() if key != "actions"}
+        """Everything but actions and parameters."""
+        kept = {key: value for key, value in vars(self).items() if key not in ("actions", "params")}
         return {**kept, "lacks": [list(pair) for pair in self.lacks], "unmoved": list(self.unmoved)}
 
     def store(self, folder: Path) -> None:
@@ -71,17 +81,43 @@ class Hit:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with open(folder / f"{self.name}.npz", "wb") as file:
-                np.savez_compressed(file, actions=self.actions, about=json.dumps(self.plain()))
+                about = {**self.plain(), "params": dict(self.params)}
+                np.savez_compressed(file, actions=self.actions, about=json.dumps(about))
         except OSError as error:
-            raise BadConfig(f"{folder} cannot be written: {error.strerror}; choose another to=") from None
+            raise refused(folder, error) from None
 
     @classmethod
     def load(cls, path: Path) -> "Hit":
-        """Read what `store` has written."""
-        with np.load(path, allow_pickle=False) as stored:
-            about, actions = json.loads(str(stored["about"])), np.asarray(stored["actions"], np.float32)
-        about["lacks"] = tuple((one, other) for one, other in about["lacks"])
-        return cls(**{**about, "unmoved": tuple(about["unmoved"])}, actions=actions)
+        """Read what `store` has written.
+
+        Raises:
+            BadConfig: it is something else. Nothing in it is executed.
+        """
+        try:
+            with memory_bounded(), np.load(path, allow_pickle=False) as stored:
+                about, actions = read_json(str(stored["about"])), column_witness(stored["actions"])
+            about["lacks"] = tuple((str(one), str(other)) for one, other in about["lacks"])
+            about["unmoved"] = tuple(map(str, about["unmoved"]))
+            return cls(**about, actions=actions)
+        except FileNotFoundError:
+            raise BadConfig(f"{path} does not exist; name a hit that scengen attack has stored") from None
+        except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
+            why = cut(" ".join(str(error).split()))
+            raise BadConfig(f"{path} is no hit of scengen attack, or is damaged: {why}") from None
+
+
+def unsound(hit: Hit, task: Task) -> str:
+    """Why a stored hit is none: its scene is built from its parameters, and its actions are played; empty if it holds.
+
+    Raises:
+        ScengenError: the parameters are not those of the task.
+    """
+    scenario = task.scenario(hit.params)
+    if scenario.id != hit.scenario:
+        return "the scenario's id does not belong to its parameters"
+    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    again = replay(scenario, world, hit.actions, task.horizon, SETTLE)
+    return "" if again.solved else f"its actions do not reach the goal: {again.reason}"
 
 
 def causal(arena: Arena) -> frozenset[Pair]:
@@ -134,6 +170,7 @@ def hit(
         played.digest,
         tuple(sorted(needed - left.pairs)),
         tuple(sorted(arena.trace.signature.moved - left.moved)),
+        values(arena.scenario),
         played.actions,
     )
 

@@ -2,16 +2,16 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
-from rich.table import Table
-
 from .. import config
-from ..attack.campaign import Report, Settings, Subject, attack, drawn, pooled
-from ..attack.evidence import Hit, Rate
+from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
+from ..attack.evidence import Hit
 from ..attack.priors import Prior
 from ..config import read, search_path
 from ..errors import BadConfig
+from ..pictures.report import attack_table
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
@@ -33,7 +33,7 @@ def command(arguments: Arguments) -> int:
             progress_bar.show(done, f"{hits} hits")
 
         report = attack(task, subjects, settings, folder, progress)
-    out.print(_table(report))
+    out.print(attack_table(report))
     for line in _remarks(report):
         say(line)
     for hit in report.refuting:
@@ -59,24 +59,9 @@ def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Su
         return task, drawn(task, settings.split, settings.n, settings.seed)
     pool = Pool.open(str(settings.pool)).check()
     task = config.task(pool.task, search_path(arguments))
-    if not (subjects := pooled(task, pool, settings.n)):
+    if not (subjects := certified(task, islice(pool.rows(), settings.n))):
         raise BadConfig(f"{pool.folder} holds no scenario; nothing can be attacked")
     return task, subjects
-
-
-def _table(report: Report) -> Table:
-    table = Table("tier", "actions", title=f"attack on {report.task}", title_justify="left")
-    for column in ("rollouts", "hits", "rate", "95 % bound", "refuting"):
-        table.add_column(column, justify="right")
-    for rate in report.rates:
-        table.add_row(*_cells(rate))
-    return table
-
-
-def _cells(rate: Rate) -> list[str]:
-    """One line of the table in words."""
-    kind, counts = "raw" if rate.raw else "filtered", (str(rate.rollouts), str(rate.hits))
-    return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]
 
 
 def _remarks(report: Report) -> list[str]:

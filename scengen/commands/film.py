@@ -1,15 +1,17 @@
-"""a film strip or a video of a witness, or of a shortcut that fails"""
+"""a film strip or a video of a witness, of a shortcut that fails, or of what the adversary did"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from .. import config
+from ..attack.evidence import Hit
 from ..config import read, search_path
 from ..envs.observations import CAMERAS
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
+from ..sim import scene_text
 from ..targets import try_file
 from . import OK, Arguments, one, say, write
 
@@ -21,10 +23,12 @@ STRIP = 100_000_000
 class Settings:
     """Settings of `scengen film`; meanings stand in conf/command/film.yaml."""
 
-    pool: str | list[str]
-    id: str
+    pool: str | list[str] | None
+    id: str | None
+    hit: str | None
     to: str
     of: str
+    raw: bool
     camera: str | None
     frames: int
     fps: int
@@ -38,6 +42,8 @@ class Settings:
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that make no sense."""
+        if (self.hit is None) == (self.pool is None or self.id is None):
+            raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; name a .png file for a film strip, an .mp4 file for a video")
         at_least(self, frames=1, fps=1, width=1, height=1)
@@ -50,13 +56,7 @@ def command(arguments: Arguments) -> int:
     settings = read("film", arguments, Settings)
     settings.check()
     try_file(settings.to)
-    row = Pool.open(one(settings.pool)).check().row(settings.id)
-    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
-    take = Take.witness(row, scenario)
-    if settings.of != WITNESS:
-        take, rollout = shortcut(row, scenario, settings.of)
-        told = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
-        say(f"{settings.of}: {told}")
+    take = _hit(settings, arguments) if settings.hit else _of_pool(settings, arguments)
     target, size = Path(settings.to), (settings.width, settings.height)
     if target.suffix == ".png":
         write(target, encode(strip(take, settings.frames, *size, settings.eye), "png"))
@@ -64,3 +64,24 @@ def command(arguments: Arguments) -> int:
         movie(take, target, settings.fps, *size, settings.eye)
     say(f"wrote {target}: {take.seconds:g} s")
     return OK
+
+
+def _of_pool(settings: Settings, arguments: Arguments) -> Take:
+    """The witness of a scenario in a pool, or one of its shortcuts."""
+    row = Pool.open(one(settings.pool)).check().row(str(settings.id))
+    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
+    if settings.of == WITNESS:
+        return Take.witness(row, scenario)
+    take, rollout = shortcut(row, scenario, settings.of, settings.raw)
+    told = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
+    say(f"{settings.of}: {told}")
+    return take
+
+
+def _hit(settings: Settings, arguments: Arguments) -> Take:
+    """What the adversary did."""
+    hit = Hit.load(Path(str(settings.hit)))
+    task = config.task(hit.task, search_path(arguments))
+    scenario = task.scenario(hit.params)
+    say(str(hit))
+    return Take(scenario, scene_text.emit(scenario.build())[0], task.embodiment, hit.actions)

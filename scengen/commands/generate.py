@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from ..config import read_task
-from ..pictures.report import funnel_table, summary_lines
+from ..pictures.report import attack_table, funnel_table, summary_lines
 from ..runs.generate import Settings, generate
 from ..runs.progress import ProgressBar
 from . import FAILED, OK, Arguments, err, out, say, warn
@@ -19,6 +19,8 @@ def command(arguments: Arguments) -> int:
 
         summary = generate(task, certify_settings, settings, progress)
     out.print(funnel_table(summary.funnel, summary.reasons))
+    if summary.attack is not None:
+        out.print(attack_table(summary.attack))
     for line in summary_lines(summary):
         say(line)
     if summary.certified < settings.n:

@@ -1,19 +1,22 @@
 """check what a pool claims: rebuild, draw again, replay, and repeat its checks"""
 
 import secrets
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rich.table import Table
 from rich.text import Text
 
 from .. import config
+from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
+from ..attack.evidence import Hit, unsound
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..parallel import Limits
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..samplers.task import Task
 from ..targets import try_file
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
@@ -29,7 +32,8 @@ STATUS = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
 class Settings:
     """Settings of `scengen verify`; meanings stand in conf/command/verify.yaml."""
 
-    pool: str | list[str]
+    pool: str | list[str] | None
+    hits: str | None
     level: str
     sample: int | None
     seed: int | None
@@ -49,6 +53,10 @@ def command(arguments: Arguments) -> int:
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
     try_file(settings.json)
     try_file(settings.junit)
+    if (settings.pool is None) == (settings.hits is None):
+        raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
+    if settings.hits is not None:
+        return _hits(settings, arguments)
     pool = Pool.open(one(settings.pool))
     task = config.task(pool.task, search_path(arguments))
     options = Options(
@@ -61,13 +69,34 @@ def command(arguments: Arguments) -> int:
         attacked,
     )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        report = verify(pool, task, config.levels(task), options, progress_bar.show)
+        report = _with_hits(verify(pool, task, config.levels(task), options, progress_bar.show), pool, task)
     if settings.json:
         write_json(settings.json, {"pool_sha256": pool.sha256, **asdict(report)})
     if settings.junit:
         write(Path(settings.junit), junit(str(pool.folder), report))
     _tell(pool, report)
     return STATUS[report.verdict]
+
+
+def _with_hits(report: Report, pool: Pool, task: Task) -> Report:
+    """The report, with what is wrong about the attack that the manifest tells of."""
+    wrong = [{"id": name, "verdict": "refuted", "reason": why} for name, why in wrong_hits(pool, task)]
+    return replace(report, failed=[*report.failed, *wrong], verdict="refuted") if wrong else report
+
+
+def _hits(settings: Settings, arguments: Arguments) -> int:
+    """Replay hits of the adversary: files, or all of a folder."""
+    paths = sorted(Path(settings.hits).glob("*.npz")) if Path(settings.hits).is_dir() else [Path(settings.hits)]
+    if not paths:
+        raise BadConfig(f"hits = {settings.hits}; the folder holds no hits (*.npz) of scengen attack")
+    wrong = 0
+    for path in paths:
+        hit = Hit.load(path)
+        reason = unsound(hit, config.task(hit.task, search_path(arguments)))
+        wrong += bool(reason)
+        say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
+    say(f"{len(paths) - wrong} of {len(paths)} hits replay")
+    return FAILED if wrong else OK
 
 
 def _tell(pool: Pool, report: Report) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 from ..envs.gym import PoolEnv
 from ..envs.observations import check_names
 from ..errors import BadConfig, ScengenError, at_least
+from ..log import Log
 from ..parallel import each
 from ..pool import Pool, PoolRow
-from ..runs.log import Log
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, rate

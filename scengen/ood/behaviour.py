@@ -8,8 +8,8 @@ from typing import Any
 
 from ..episode import Actions
 from ..errors import Infeasible
-from ..parallel import Limits, each
 from ..log import Log
+from ..parallel import Limits, each
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario

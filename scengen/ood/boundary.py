@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadConfig, OutOfBounds
+from ..log import Log
 from ..params import Value, with_values
-from ..runs.log import Log
 from ..samplers.axis import Axis
 from ..samplers.dists import Choice, Fixed
 from ..samplers.keyed import unit

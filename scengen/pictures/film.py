@@ -56,7 +56,7 @@ class Take:
             yield period
 
 
-def shortcut(row: PoolRow, scenario: Scenario, name: str) -> tuple[Take, Rollout]:
+def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> tuple[Take, Rollout]:
     """One of the tempting plans of a scenario, and what comes of it: what its certificate saw.
 
     Raises:
@@ -66,7 +66,7 @@ def shortcut(row: PoolRow, scenario: Scenario, name: str) -> tuple[Take, Rollout
     if name not in shortcuts:
         raise UnknownName("shortcut", name, [WITNESS, *shortcuts])
     world = World.load(row.scene_xml, row.embodiment)
-    rollout = try_shortcut(scenario, world, shortcuts[name], row.horizon, row.certificate.settle or 0.0)
+    rollout = try_shortcut(scenario, world, shortcuts[name], row.horizon, row.certificate.settle or 0.0, raw)
     return Take(scenario, row.scene_xml, row.embodiment, rollout.actions), rollout
 
 

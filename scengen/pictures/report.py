@@ -9,6 +9,8 @@ from typing import Any
 import jinja2
 from rich.table import Table
 
+from ..attack.campaign import Report as AttackReport
+from ..attack.evidence import Rate
 from ..certificate import STAGES
 from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
@@ -46,6 +48,22 @@ def summary_lines(summary: Summary) -> list[str]:
     if n:
         lines.append(f"processor time per certified scenario: {summary.cpu / n:.1f} s")
     return [*lines, f"pool sha256: {pool.sha256}"]
+
+
+def attack_table(report: AttackReport) -> Table:
+    """How often each tier of the adversary reached the goal."""
+    table = Table("tier", "actions", title=f"attack on {report.task}", title_justify="left")
+    for column in ("rollouts", "hits", "rate", "95 % bound", "refuting"):
+        table.add_column(column, justify="right")
+    for rate in report.rates:
+        table.add_row(*_cells(rate))
+    return table
+
+
+def _cells(rate: Rate) -> list[str]:
+    """One line of the table in words."""
+    kind, counts = "raw" if rate.raw else "filtered", (str(rate.rollouts), str(rate.hits))
+    return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]
 
 
 def pool_table(pool: Pool) -> Table:

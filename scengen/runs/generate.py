@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import pool
+from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
@@ -39,12 +40,13 @@ class Settings:
     limit: int | None = None
     limit_seconds: float = 600.0
     limit_mb: int = 4000
+    attack: int = 0
 
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         task.shifts(self.split)
         task.design(self.sampler)
-        at_least(self, n=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200)
+        at_least(self, n=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200, attack=0)
         for verdict in self.keep:
             if verdict not in ("refuted", "unknown"):
                 raise BadConfig(f"keep = {verdict}; it must be refuted, unknown, or both")
@@ -62,6 +64,8 @@ class Summary:
     """Rejections by "check: reason"."""
     first_draws: int
     """Indices whose very first draw was certified."""
+    attack: attacks.Report | None
+    """What the adversary has found, if it was asked for."""
     cpu: float
     """Processor time of all indices that count, in this run or earlier ones [s]."""
 
@@ -138,8 +142,9 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
     try:
         records = journal.records()
         _extend(job, settings, records, journal, progress)
+        report = _attack(job, settings, records, journal, progress) if settings.attack else None
         try:
-            return _finish(folder, identity, settings, records, journal)
+            return _finish(folder, identity, settings, records, journal, report)
         except OSError as error:
             why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"
             raise PoolError(why) from None
@@ -194,6 +199,8 @@ def funnel(records: list[Record]) -> dict[str, int]:
     return counts
 
 
+_WITHOUT_ROW = ("feasible", pool.PROCESS, "attack")
+"""Rejections that leave no certificate that tells of them."""
 _CHECK = {pool.PROCESS: "compiles"}
 """What the funnel counts a scenario as that has ended its process: feasible, and through nothing else."""
 
@@ -236,14 +243,47 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
         progress(verdicts["certified"], len(records), verdicts)
 
 
+def _attack(
+    job: Job, settings: Settings, records: dict[int, Record], journal: Journal, progress: Progress
+) -> attacks.Report:
+    """Attack the scenarios that go into the pool; those that turn out to have a way around do not go into it."""
+    chosen = _chosen(records, settings.n)
+    subjects = attacks.certified(job.task, journal.rows(chosen))
+    wanted = attacks.Settings(
+        split=settings.split, budget=settings.attack, seed=settings.seed, workers=settings.workers
+    )
+    about = pool.sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
+
+    def told(done: int, hits: int) -> None:
+        progress(len(chosen), len(records), {f"attacked, {hits} hits": done})
+
+    report = attacks.attack(job.task, subjects, wanted, journal.folder / f"attack-{about[:12]}", told)
+    around = {hit.scenario: hit for hit in reversed(report.refuting)}
+    for index, one in zip(chosen, subjects, strict=True):
+        if hit := around.get(one.scenario.id):
+            reason = f"a way around, {hit}"
+            records[index] = replace(records[index], verdict="refuted", check="attack", reason=reason)
+    return report
+
+
+def _chosen(records: Mapping[int, Record], n: int) -> list[int]:
+    """The first n certified indices."""
+    return [i for i in sorted(records) if records[i].verdict == "certified"][:n]
+
+
 def _finish(
-    folder: Path, identity: Mapping[str, Any], settings: Settings, records: Mapping[int, Record], journal: Journal
+    folder: Path,
+    identity: Mapping[str, Any],
+    settings: Settings,
+    records: Mapping[int, Record],
+    journal: Journal,
+    report: attacks.Report | None,
 ) -> Summary:
     """Write the first n certified indices, and count up to the last of them."""
-    certified = [i for i in sorted(records) if records[i].verdict == "certified"][: settings.n]
+    certified = _chosen(records, settings.n)
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
-    kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in ("feasible", pool.PROCESS)]
+    kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in _WITHOUT_ROW]
     reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
@@ -257,9 +297,11 @@ def _finish(
         "indices": len(counted),
         "first_draws": first,
     }
+    if report is not None:
+        manifest["attack"] = attacks.stored(report, folder)
     written = pool.write(folder, manifest, journal.rows(certified), list(journal.rows(kept)))
     cpu = math.fsum(r.cpu for r in counted)
-    return Summary(written, len(certified), len(counted), counts, dict(reasons), first, cpu)
+    return Summary(written, len(certified), len(counted), counts, dict(reasons), first, report, cpu)
 
 
 _NUMBER = re.compile(r"\d+(\.\d+)?")

@@ -13,9 +13,9 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..errors import PoolError
+from ..log import different
 from ..pool import MANIFEST, PoolRow
 from ..targets import refused, try_folder
-from .log import different
 
 
 @dataclass(frozen=True)

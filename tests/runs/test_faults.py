@@ -18,10 +18,10 @@ from pools import QUICKLY, make
 
 from scengen import cli
 from scengen.errors import ScengenError
+from scengen.log import Log
 from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.runs.journal import Journal, Record
-from scengen.runs.log import Log
 
 RECORD = Record(0, "refuted", "rest", "it falls", 1, {}, None, 0.1)
 

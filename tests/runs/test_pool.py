@@ -300,7 +300,7 @@ def test_a_scenario_that_occurs_twice_is_found(mine):
     assert sum("the id occurs twice" in f["reason"] for f in failures(mine)) == 2
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 2}', '{"format": 2, "shards": []}', "\x00"])
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 3}', '{"format": 3, "shards": []}', "\x00"])
 def test_a_damaged_manifest_is_one_clear_error(mine, text):
     (mine / "manifest.json").write_text(text)
     with pytest.raises(PoolError, match="is damaged; restore it"):
@@ -341,7 +341,7 @@ def gap_in_a_certificate(columns):
         (uncanonical, "from row 1 on .*no mapping in canonical JSON"),
         (gap, "column instruction has gaps"),
         (gap_in_a_certificate, "from row 1 on .*the certificate lacks source_sha256"),
-        (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 2"),
+        (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 3"),
     ],
 )
 def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says):

@@ -8,8 +8,8 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from ..errors import BadConfig
-from ..targets import refused
+from .errors import BadConfig
+from .targets import refused
 
 
 class Log:
