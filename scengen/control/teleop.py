@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import UnknownName
+
 ALPHA = 0.8
 """Weight of the new value in the moving average: paper, appendix "Teleoperation hardware and protocol"."""
 LARGEST_CHANGE = 0.15
@@ -49,6 +51,19 @@ class Filter:
         if given.shape != (MOTION,) or not (np.abs(given) <= 1.0).all():
             raise ValueError(f"a filter's state is {MOTION} numbers in [-1, 1], not {given.tolist()}")
         self._state[:] = given
+
+
+TELEOP = "teleop"
+"""Name of the filter for environments, which otherwise pass actions on as they are.
+
+The paper's interface for policies is without it: the filter smooths what people and scripted solutions ask for, and the
+recorded actions that policies learn from are those behind it. Filtered a second time they would come out slower."""
+
+
+def check_filter(name: str | None) -> None:
+    """Raise `UnknownName` unless this is what environments know: `TELEOP`, or None for no filter."""
+    if name not in (None, TELEOP):
+        raise UnknownName("action_filter", str(name), [TELEOP, "None"])
 
 
 def unfiltered(action: ArrayLike) -> NDArray[np.float32]:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import config
 from ..control.loop import ACTION, Loop
-from ..episode import Episode
+from ..control.teleop import check_filter, unfiltered
+from ..episode import Episode, Outcome
 from ..errors import BadConfig, PoolError, UnknownName
 from ..params import Value
 from ..pictures.render import Camera
@@ -34,12 +35,14 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
-    closed), at 100 Hz. They go to the controller as they are; oracles and people pass theirs through
-    `scengen.control.teleop.Filter` first. Values outside [-1, 1] are clipped.
+    closed), at 100 Hz. They go to the controller as they are, clipped to [-1, 1], which is the paper's interface for
+    policies; `action_filter="teleop"` puts the filter of people and oracles in between (`scengen.control.teleop`).
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
 
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
+    With `settle` a reached goal counts as in a certificate: it must still hold after the robot was left idle for a
+    second, which is simulated within the last step.
     `info` holds `scenario`, `scene_sha256`, `split`, `axes`, `success`, `is_success`, and `reason` once it is over.
     """
 
@@ -54,6 +57,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         width: int = 256,
         height: int = 256,
         camera: str = "agentview",
+        action_filter: str | None = None,
+        settle: bool = False,
     ):
         """Open the pools.
 
@@ -65,12 +70,16 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             width: of all pictures [pixels].
             height: of all pictures [pixels].
             camera: what `render` shows: one of the paper's cameras (`CAMERAS`) or any camera of the model.
+            action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
+            settle: whether a reached goal has to last as in the certificate.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
+        check_filter(action_filter)
+        self.action_filter, self.settle = action_filter, settle
         self.task: Task = config.task(task)
         if observations is None:
             observations = proprioception(self.task.embodiment)
@@ -149,10 +158,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         given = np.asarray(action, np.float32)
         if given.shape != (ACTION,) or not np.isfinite(given).all():
             raise ValueError(f"an action is {ACTION} finite numbers in [-1, 1], not {np.array2string(given)}")
-        outcome = self._episode.step(np.clip(given, -1.0, 1.0))
-        success = outcome == "success"
+        outcome, reason = self._advance(given), self._episode.reason
         terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
-        return self._observe(), float(success), terminated, truncated, self._info(self._episode.reason, success)
+        if outcome == "success" and self.settle:
+            outcome, reason = self._settled()
+        success = outcome == "success"
+        return self._observe(), float(success), terminated, truncated, self._info(reason, success)
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
@@ -172,6 +183,16 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._row = row
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon)
+
+    def _advance(self, action: NDArray[np.floating]) -> Outcome | None:
+        return self._episode.step(self.world.filter(action) if self.action_filter else unfiltered(action))
+
+    def _settled(self) -> tuple[Outcome, str]:
+        """Whether the goal lasts while the robot is idle, as in the certificate; what came of it, and the reason."""
+        for _ in range(round((self._row.certificate.settle or 0.0) / Loop.PERIOD)):
+            if self._advance(self.world.idle) != "success":
+                break
+        return self._episode.settled()
 
     @property
     def _sees(self) -> bool:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .. import config
 from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
+from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError
 from ..pool import Pool, PoolRow
@@ -76,6 +77,7 @@ class RobosuiteEnv(ManipulationEnv):
         gripper_types: str = "default",
         control_freq: int = 100,
         horizon: int | None = None,
+        action_filter: str | None = None,
         **arguments: Any,
     ):
         """Choose scenarios and build the first.
@@ -89,11 +91,17 @@ class RobosuiteEnv(ManipulationEnv):
             gripper_types: "default" is the hand that the task asks for; no other is accepted.
             control_freq: actions in a second.
             horizon: actions in an episode; default: the task's time limit.
+            action_filter: None, the paper's interface for policies; or "teleop" for the filter that the actions of
+                people and oracles pass, which is defined for 100 Hz.
             arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
 
         Raises:
             ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite.
         """
+        check_filter(action_filter)
+        if action_filter and control_freq != round(1 / Loop.PERIOD):
+            raise BadConfig(f"action_filter = {action_filter}; it is defined for control_freq=100, not {control_freq}")
+        self.action_filter = action_filter
         self.task = config.task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
         hand = GRIPPERS[self.task.embodiment]
@@ -119,6 +127,10 @@ class RobosuiteEnv(ManipulationEnv):
         observations = super().reset()
         self.episode.begin()
         return observations
+
+    def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
+        """robosuite's step, behind the filter that was asked for."""
+        return super().step(self.world.filter(action) if self.action_filter else action)
 
     def _check_success(self) -> bool:
         """Whether the goal has been reached, and nothing forbidden has happened since."""
@@ -170,6 +182,7 @@ class RobosuiteEnv(ManipulationEnv):
         for controller in self.robots[0].part_controllers.values():
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
+        self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon), 0
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..envs.observations import check_names
 from ..errors import BadConfig, ScengenError, at_least
@@ -43,6 +44,7 @@ class Settings:
     to: str | None = None
     version: str | None = None
     fresh: bool = False
+    action_filter: str | None = None
 
     @property
     def folders(self) -> list[str]:
@@ -57,6 +59,7 @@ class Settings:
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
         check_names(self.observations or [])
+        check_filter(self.action_filter)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
 
 
@@ -212,7 +215,8 @@ def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
 
 def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     """What the outcome of a rollout depends on. More seeds or rollouts continue the same run."""
-    chosen = {name: getattr(settings, name) for name in ("policy", "version", "observations", "width", "height")}
+    names = ("policy", "version", "observations", "width", "height", "action_filter")
+    chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
@@ -278,7 +282,15 @@ class PolicyPlayer:
         if not self._running:
             settings = self.settings
             folders = [f for f in settings.folders if (task,) in Pool.open(f).columns("task")]
-            env = PoolEnv(task, folders, settings.observations, width=settings.width, height=settings.height)
+            env = PoolEnv(
+                task,
+                folders,
+                settings.observations,
+                width=settings.width,
+                height=settings.height,
+                action_filter=settings.action_filter,
+                settle=True,
+            )
             memory = list(_training(folders)) if settings.policy == REPLAY else []
             self._running = env, made(settings.policy, find(settings.policy, memory), env)
         return self._running

@@ -2,6 +2,7 @@
 
 import shutil
 import warnings
+from unittest import mock
 
 import gymnasium
 import mujoco
@@ -11,6 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE, pictures_are_possible
 
 from scengen import config
+from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
 from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError, UnknownName
@@ -56,6 +58,30 @@ def test_doing_nothing_is_cut_off_at_the_time_limit(env):
         over, steps = terminated or truncated, steps + 1
     assert truncated and not terminated and reward == 0.0 and not info["success"]
     assert steps == round(config.task("domino_single").horizon * 100) and "was not reached" in info["reason"]
+
+
+def test_the_filter_of_people_and_oracles_is_there_on_request():
+    jerk, asked = np.array([1.0, 0, 0, 0, 0, 0, -1.0], np.float32), []
+    for action_filter in (None, "teleop"):
+        env = PoolEnv("domino_single", REFERENCE, action_filter=action_filter)
+        env.reset(seed=0)
+        with mock.patch.object(env.world, "apply", side_effect=lambda action: asked.append(action.tolist())):
+            env.step(jerk)
+    assert asked == [jerk.tolist(), [pytest.approx(LARGEST_CHANGE), 0, 0, 0, 0, 0, -1.0]]
+
+
+@pytest.mark.parametrize("settle", [False, True])
+def test_a_goal_that_does_not_last_counts_only_without_settling(settle, monkeypatch):
+    """The slab counts as away for half a second only."""
+    env = PoolEnv("domino_single", REFERENCE, settle=settle)
+    env.reset(seed=0)
+    monkeypatch.setattr(type(env.scenario), "success", lambda self, world: 0.2 < world.time < 0.7)
+    over = False
+    while not over:
+        _, reward, terminated, truncated, info = env.step(IDLE)
+        over = terminated or truncated
+    assert terminated and info["success"] is not settle and reward == float(not settle)
+    assert ("did not last" in info["reason"]) is settle
 
 
 def test_a_rule_broken_ends_the_episode_with_its_reason(env):

@@ -4,6 +4,7 @@ import json
 import logging
 from dataclasses import replace
 from functools import cache
+from unittest import mock
 
 import mujoco
 import numpy as np
@@ -14,6 +15,7 @@ from pools import certificate_of
 from scengen import config
 from scengen.certificate import Certificate
 from scengen.cli import run as scengen
+from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import agreement
 from scengen.envs.agreement import Comparison, compare, compare_all
 from scengen.envs.robosuite import RobosuiteEnv, env_class
@@ -29,6 +31,7 @@ from scengen.validate.identity import versions
 
 # isort: split
 import robosuite
+from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 
 BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
 LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}
@@ -148,6 +151,16 @@ def test_a_witness_succeeds_in_robosuite(row):
     assert (found.ours, found.theirs, found.reason) == ("success", "success", "")
     assert found.apart <= 1e-3
     assert abs(found.later) <= 0.1
+
+
+def test_the_filter_is_there_on_request(row):
+    env, received = made(row, action_filter="teleop"), []
+    with mock.patch.object(ManipulationEnv, "step", lambda self, action: received.append(action[0])):
+        for _ in range(3):
+            env.step(np.array([1.0, 0, 0, 0, 0, 0, -1.0]))
+    assert received == pytest.approx([LARGEST_CHANGE, 2 * LARGEST_CHANGE, 3 * LARGEST_CHANGE])
+    with pytest.raises(BadConfig, match="defined for control_freq=100, not 20"):
+        made(row, action_filter="teleop", control_freq=20)
 
 
 def test_contacts_are_latched_in_robosuite_as_here(row, env):

@@ -10,6 +10,7 @@ import pytest
 
 from scengen import cli
 from scengen.evaluate.rollouts import Settings, evaluate, table
+from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
 
@@ -22,6 +23,17 @@ def run(folder, policy, **changes):
 def test_the_oracle_succeeds_and_idleness_fails(tmp_path):
     assert [e["success"] for e in run(tmp_path / "oracle", "oracle")] == [True] * 3
     assert [e["success"] for e in run(tmp_path / "idle", "idle")] == [False] * 3
+
+
+@pytest.mark.parametrize("action_filter", [None, "teleop"])
+def test_the_oracle_is_filtered_once(tmp_path, action_filter):
+    assert [e["success"] for e in run(tmp_path, "oracle", seeds=1, action_filter=action_filter)] == [True]
+
+
+def test_a_goal_has_to_last_as_in_a_certificate(tmp_path, monkeypatch):
+    monkeypatch.setattr(DominoSingle, "success", lambda self, world: 0.2 < world.time < 0.7)
+    (episode,) = run(tmp_path, "idle", seeds=1)
+    assert not episode["success"] and "did not last" in episode["reason"]
 
 
 def test_random_actions_are_the_same_for_the_same_rollout_only(tmp_path):
