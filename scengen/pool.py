@@ -6,7 +6,6 @@ rules of `scengen.schema`.
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -15,74 +14,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from . import schema
+from . import schema, shards
 from .certificate import StoredCertificate, as_json, from_json
 from .errors import PoolError, UnknownName
 from .params import Value
+from .shards import FORMAT, SCHEMA
 
 MANIFEST = "manifest.json"
-FORMAT = 3
 SHARD_ROWS = 100_000
 REJECTED = "rejected.parquet"
-GROUP_ROWS = 1000
-BATCH_ROWS = 20
-"""Rows that are read at a time; each may have a scene of some MB."""
-LARGEST_GROUP = 2_000_000_000
-"""Bytes of a group of rows, unpacked; a thousand scenarios have 50 MB."""
-
-CHECK = pa.struct(
-    [
-        ("name", pa.string()),
-        ("passed", pa.bool_()),
-        ("reason", pa.string()),
-        ("settings", pa.string()),
-        ("numbers", pa.string()),
-    ]
-)
-CERTIFICATE = pa.struct(
-    [
-        ("verdict", pa.string()),
-        ("reason", pa.string()),
-        ("settings", pa.string()),
-        ("checks", pa.list_(CHECK)),
-        ("scene_sha256", pa.string()),
-        ("witness_sha256", pa.string()),
-        ("final_state", pa.string()),
-        ("fingerprint", pa.string()),
-        ("source_sha256", pa.string()),
-        ("versions", pa.string()),
-    ]
-)
-SCHEMA = pa.schema(
-    [
-        ("id", pa.string()),
-        ("task", pa.string()),
-        ("code", pa.string()),
-        ("category", pa.string()),
-        ("split", pa.string()),
-        ("axes", pa.list_(pa.string())),
-        ("shifted", pa.string()),
-        ("seed", pa.int64()),
-        ("index", pa.int64()),
-        ("attempt", pa.int64()),
-        ("id_twin", pa.string()),
-        ("instruction", pa.string()),
-        ("horizon", pa.float64()),
-        ("params", pa.string()),
-        ("embodiment", pa.string()),
-        ("scene_xml", pa.string()),
-        ("scene_sha256", pa.string()),
-        ("witness", pa.list_(pa.list_(pa.float32(), 7))),
-        ("witness_sha256", pa.string()),
-        ("certificate", CERTIFICATE),
-    ]
-)
-"""Columns of a shard; `shifted`, `params`, `versions` and a check's `settings` and `numbers` hold JSON."""
-
 PROCESS = "process"
 """Stands for a check in the reasons where a scenario has ended its process, or was ended with it at a limit."""
 
@@ -196,7 +138,7 @@ class Pool:
     @property
     def sha256(self) -> str:
         """Hash of the manifest, which holds the hash of every shard: equal hashes mean equal pools."""
-        return _sha(self.folder / MANIFEST)
+        return shards.sha_of(self.folder / MANIFEST)
 
     def __len__(self) -> int:
         return sum(shard["rows"] for shard in self.manifest["shards"])
@@ -273,7 +215,7 @@ class Pool:
                 wrong[shard["file"]] = why
             elif path.stat().st_size != shard["bytes"]:
                 wrong[shard["file"]] = f"has {path.stat().st_size} bytes instead of {shard['bytes']}: truncated"
-            elif _sha(path) != shard["sha256"]:
+            elif shards.sha_of(path) != shard["sha256"]:
                 wrong[shard["file"]] = "has another sha256 than the manifest says"
         return wrong
 
@@ -293,7 +235,7 @@ class Pool:
             PoolError: a shard cannot be read.
         """
         for shard in self.manifest["shards"]:
-            yield from _read_rows(self.folder / shard["file"], witness)
+            yield from _rows(self.folder / shard["file"], witness)
 
     def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
         """A few columns of all scenarios in index order, with the values of `PoolRow`'s fields; quicker than `rows`.
@@ -303,10 +245,10 @@ class Pool:
             PoolError: a shard cannot be read.
         """
         for name in names:
-            if name not in _LIGHT:
-                raise UnknownName("light column of a pool", name, _LIGHT)
+            if name not in shards.LIGHT:
+                raise UnknownName("light column of a pool", name, shards.LIGHT)
         for shard in self.manifest["shards"]:
-            for values in _read(self.folder / shard["file"], names):
+            for values in shards.read(self.folder / shard["file"], names):
                 yield tuple(values[name] for name in names)
 
     def row(self, prefix: str) -> PoolRow:
@@ -325,7 +267,7 @@ class Pool:
     @cached_property
     def rejected(self) -> list[PoolRow]:
         """Scenarios that were kept although they were not certified (`keep=`)."""
-        return list(_read_rows(self.folder / REJECTED, witness=True)) if "rejected" in self.manifest else []
+        return list(_rows(self.folder / REJECTED, witness=True)) if "rejected" in self.manifest else []
 
 
 def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept: Sequence[PoolRow] = ()) -> Pool:
@@ -337,18 +279,28 @@ def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept:
         kept: scenarios that were not certified.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    shards, batch = [], []
+    found, batch = [], []
     for row in rows:
         batch.append(row)
         if len(batch) == SHARD_ROWS:
-            shards.append(_write_shard(folder, f"scenarios-{len(shards):05d}.parquet", batch))
+            found.append(_written(folder / f"scenarios-{len(found):05d}.parquet", batch))
             batch = []
-    if batch or not shards:
-        shards.append(_write_shard(folder, f"scenarios-{len(shards):05d}.parquet", batch))
-    extra = {"rejected": _write_shard(folder, REJECTED, kept)} if kept else {}
-    text = json.dumps({"format": FORMAT, **about, "shards": shards, **extra}, indent=1, sort_keys=True) + "\n"
-    _replace(folder / MANIFEST, text.encode())
+    if batch or not found:
+        found.append(_written(folder / f"scenarios-{len(found):05d}.parquet", batch))
+    extra = {"rejected": _written(folder / REJECTED, kept)} if kept else {}
+    text = json.dumps({"format": FORMAT, **about, "shards": found, **extra}, indent=1, sort_keys=True) + "\n"
+    shards.replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)
+
+
+def _written(path: Path, rows: Sequence[PoolRow]) -> dict[str, Any]:
+    """Write one shard, and say what a manifest says of it."""
+    return shards.write(path, [row.plain() for row in rows], [row.witness for row in rows])
+
+
+def _rows(path: Path, witness: bool) -> Iterator[PoolRow]:
+    for values in shards.read(path, SCHEMA.names if witness else shards.LIGHT):
+        yield PoolRow(**{"witness": NO_WITNESS, **values})
 
 
 def uncounted(reason: str) -> str:
@@ -359,124 +311,3 @@ def uncounted(reason: str) -> str:
 def sha256(content: str | bytes) -> str:
     """Hash of a text or of bytes, in hex."""
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
-
-
-def _write_shard(folder: Path, name: str, rows: Sequence[PoolRow]) -> dict[str, Any]:
-    table = _table(rows)
-    sink = pa.BufferOutputStream()
-    pq.write_table(
-        table,
-        sink,
-        compression="zstd",
-        compression_level=3,
-        row_group_size=GROUP_ROWS,
-        write_page_checksum=True,
-    )
-    content = sink.getvalue().to_pybytes()
-    _replace(folder / name, content)
-    return {"file": name, "rows": len(rows), "bytes": len(content), "sha256": sha256(content)}
-
-
-def _table(rows: Sequence[PoolRow]) -> pa.Table:
-    plain = pa.Table.from_pylist([{**row.plain(), "witness": None} for row in rows], schema=SCHEMA)
-    recordings = [np.asarray(row.witness, np.float32).reshape(-1, 7) for row in rows]
-    offsets = np.cumsum([0, *map(len, recordings)], dtype=np.int32)
-    flat = np.concatenate(recordings).ravel() if recordings else np.zeros(0, np.float32)
-    column = pa.ListArray.from_arrays(offsets, pa.FixedSizeListArray.from_arrays(pa.array(flat), 7))
-    where = SCHEMA.get_field_index("witness")
-    return plain.set_column(where, SCHEMA.field(where), column.cast(SCHEMA.field(where).type))
-
-
-_LIGHT = tuple(name for name in SCHEMA.names if name != "witness")
-
-
-def _read_rows(path: Path, witness: bool) -> Iterator[PoolRow]:
-    for values in _read(path, SCHEMA.names if witness else _LIGHT):
-        yield PoolRow(**{"witness": NO_WITNESS, **values})
-
-
-def _read(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Some columns of one Parquet file, row by row, as the values of `PoolRow`'s fields.
-
-    Raises:
-        PoolError: the file cannot be read, or holds something else than a pool of this format.
-    """
-    count = 0
-    try:
-        if why := schema.why_no_plain_file(path):
-            raise ValueError(f"it {why}")
-        with pq.ParquetFile(
-            path,
-            page_checksum_verification=True,
-            thrift_string_size_limit=schema.LARGEST_MANIFEST,
-            thrift_container_size_limit=1_000_000,
-        ) as file:
-            if not file.schema_arrow.equals(SCHEMA):
-                raise ValueError(f"its columns are not those of pool format {FORMAT}")
-            _check_groups(file.metadata)
-            for table in _batches(file, names):
-                for values in _values(table):
-                    yield values
-                    count += 1
-    except (OSError, pa.ArrowException, ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:
-        why = " ".join(str(error).split())[:120] or type(error).__name__
-        raise PoolError(f"{path} cannot be read from row {count} on ({why}); restore it") from None
-
-
-def _check_groups(metadata: pq.FileMetaData) -> None:
-    """Refuse groups of rows that would not fit into memory, before any is unpacked."""
-    for group in map(metadata.row_group, range(metadata.num_row_groups)):
-        size = max(
-            group.total_byte_size, sum(group.column(i).total_uncompressed_size for i in range(group.num_columns))
-        )
-        if size > LARGEST_GROUP:
-            raise ValueError(f"a group of rows has {size} bytes when it is unpacked, at most {LARGEST_GROUP} are read")
-
-
-def _batches(file: pq.ParquetFile, names: Sequence[str]) -> Iterator[pa.Table]:
-    """A few rows at a time, each read with a bound on memory: what a file says about its sizes may be false."""
-    batches = file.iter_batches(BATCH_ROWS, columns=list(names), use_threads=False)
-    while True:
-        with schema.memory_bounded():
-            batch = next(batches, None)
-        if batch is None:
-            return
-        yield pa.Table.from_batches([batch])
-
-
-def _values(table: pa.Table) -> Iterator[dict[str, Any]]:
-    for name in table.column_names:
-        if table.column(name).null_count:
-            raise ValueError(f"column {name} has gaps")
-    columns = [_column(table.column(name), name) for name in table.column_names]
-    for values in zip(*columns, strict=True):
-        yield dict(zip(table.column_names, values, strict=True))
-
-
-def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
-    """Values one by one. A witness becomes an array at once: a list of numbers would need fifty times the memory."""
-    if name == "witness":
-        for actions in column:
-            yield schema.column_witness(actions.values.flatten().to_numpy(zero_copy_only=False))
-    else:
-        check = schema.COLUMNS[name]
-        for scalar in column:
-            yield check(name, scalar.as_py())
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file so that it is either the old one or the new one, whenever the process dies."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with open(part, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _sha(path: Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
