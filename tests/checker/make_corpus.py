@@ -61,6 +61,11 @@ def _base(name: str, others: Path, target: Path) -> None:
     source = make_base.found(name, others)
     if name not in make_base.KEPT and make_base.expired(source):
         make_base.make(name, source)
+    sealed(source, target)
+
+
+def sealed(source: Path, target: Path) -> None:
+    """Copy a pool; if its certificates rest on other code than there is now, it says that they do not."""
     if make_base.expired(source):
         from scengen import config
         from scengen.validate.identity import source_sha256

@@ -104,7 +104,7 @@ def _apart(work: Callable[[], None]) -> None:
         sys.exit("the corpus could not be made")
 
 
-def _warm() -> None:
+def warm() -> None:
     """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
     from scengen import cli, config  # noqa: F401
     from scengen.commands import verify  # noqa: F401
@@ -148,7 +148,7 @@ def main() -> int:
         shutil.rmtree(asked.pools, ignore_errors=True)
         make = partial(write, chosen, asked.pools, FOLDER / "base")
         make() if asked.quick else _apart(make)
-    _warm()
+    warm()
     scores, results, judged = [], {}, []
     for checker in asked.checker:
         outcomes = put(checker, chosen, asked.pools, lambda o: print(o) if asked.verbose else None)
