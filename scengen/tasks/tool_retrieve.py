@@ -85,8 +85,7 @@ class ToolRetrieve(Scenario):
         return raised >= LIFTED and held(world, "cube") and "hook" not in world.touching_bodies(ROBOT)
 
     def failure(self, world: World) -> str | None:
-        lost = fallen(world, *world.free_bodies)
-        return f"the {lost} fell off the table" if lost else None
+        return "the cube fell off the table" if fallen(world, "cube") else None
 
     # --- oracle ---------------------------------------------------------------------------
 
