@@ -7,24 +7,22 @@
 
 Bottleneck: the place of the counterweight follows from three masses that nobody can see. The tilt tells.
 
-The seesaw is a balance, not a plank on an edge (assets/seesaw.py): axle above the deck, stops at 10 deg. Between the
-stops its tilt is proportional to the excess moment, and the counterweight may stand within
-
-    margin = tan(5 deg) * stiffness / (mass of the counterweight),    some 8 to 25 mm,
-
-of the balancing place.
+The seesaw is a balance, not a plank on an edge (assets/seesaw.py): between stops at 10 deg its tilt is proportional to
+the excess moment. The counterweight may stand within tan(5 deg) * stiffness / (its mass), in training some 5 to 8 mm,
+of the balancing place, which lies anywhere on an arm of 0.36 m. Chance: a guess levels the deck in 7 % of training,
+one of three in 19 %, at best, for who sees the geometry and knows how masses are distributed; so does who weighs.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 
 * All masses are hidden; blocks and beam look the same whatever they weigh. What can be seen, may be used: geometry,
-  and which side is down. The oracle starts from the masses that one would expect and learns only from tilts.
+  and which side is down. The oracle starts in the middle of the raised arm and learns only from tilts.
 * A place that anybody would try first must not balance: the mirror image of the target's, and the one that follows
-  if blocks that look alike weigh alike. Therefore a counterweight is clearly lighter or heavier than the target.
-* The beam weighs in: its middle lies off the axle. It can even outweigh the target, so that the counterweight
-  belongs on the target's own arm.
-* Level counts only hands off, with both blocks standing on the deck and nowhere else, the target where it was: else the
-  hand could hold the beam, the counterweight could prop it up from the table, or both blocks could be moved to the
-  axle, where they weigh nothing. It must last: the beam also sweeps through level on its way from stop to stop.
+  if blocks that look alike weigh alike.
+* The beam weighs in: its middle lies off the axle. It can even outweigh the target, and then both blocks belong on
+  the same arm.
+* Level counts only hands off, with both blocks standing on the deck and nowhere else: else the hand could hold the
+  beam, or the counterweight could prop it up from the table. It must last: the beam also sweeps through level on its
+  way from stop to stop. Who touches the target has lost: moved by a few mm it would level what a guess has missed.
 """
 
 import math
@@ -43,7 +41,7 @@ from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat, wait
@@ -53,23 +51,22 @@ LEVEL = math.radians(5.0)
 SURELY = math.radians(4.5)
 """Tilt with which the oracle is content [rad]: a beam that looks at rest at 0.01 rad/s may creep by another 0.4 deg."""
 CLEARLY = math.radians(7.0)
-"""Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by some 4 mm can change."""
+"""Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by 2 mm can change."""
 STAYS = 0.015
 """How far the target may be from where it stood on the deck [m]. A heavy counterweight that is let go far out throws
 the deck against its stop, and the target hops by up to 10 mm."""
-MOVED = 0.017
-"""By how much the target may be moved without levelling the deck, the counterweight in its mirror image [m]."""
-ROOM = 0.016
-"""Least deck on which the counterweight balances [m]: 8 mm to either side, twice the error of a careful placement."""
+ROOM = 0.008
+"""Least deck on which the counterweight balances [m]: 4 mm to either side, three times the error of a placement."""
+AMISS = 0.006
+"""How far from balance, at least, a counterweight is that puts the deck on its stop [m]: 1.5 of the least margin."""
 INNER, BESIDE = 0.055, 0.056
-"""Least distance of the middle of a block from the axle, at which the palm passes the posts by 5 mm where this arm is
-down; and of the middles of two blocks [m]."""
+"""Least distance of the middle of a block from the axle, where the palm passes the posts; of two blocks [m]."""
 RIM, AIR = 0.004, 0.006
 """Least deck beyond a block; least air between a deck and the palm of a hand that takes a block beside it [m]."""
-EXPECTED = {"seesaw.mass": 0.28, "target.mass": 0.22, "weight.mass": 0.22}
+EXPECTED = {"seesaw.mass": 0.25, "target.mass": 0.30, "weight.mass": 0.30}
 """What one would expect without having tried [kg]: a common beam, and blocks that look alike weighing alike."""
 TRANSIT = TABLE_TOP + 0.25
-"""Height of the hand when it carries a block across [m]: 40 mm over a block on the raised end of the longest arm."""
+"""Height of the hand when it carries a block across [m]: 20 mm over a block that stands 0.35 m out on a raised arm."""
 BEAM = "seesaw/beam"
 
 
@@ -79,7 +76,7 @@ class SeesawBalance(Scenario):
 
     HOLD = 3.0
     """How long the deck must stay level [s]. On its way to 6 deg on the other side it creeps through +-5 deg in
-    (damping / stiffness) ln(11 / 1) = 0.16 / 0.26 x 2.4 = 1.5 s, for the softest seesaw of the task file."""
+    (damping / stiffness) ln(11 / 1) = 0.16 / 0.15 x 2.4 = 2.6 s, for the softest seesaw of training."""
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
@@ -117,9 +114,10 @@ class SeesawBalance(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
-        if world.touched("target", "table"):
-            return "the target fell off the seesaw"
-        return "a block fell off the table" if fallen(world, *world.free_bodies) else None
+        others = {ROBOT, *world.free_bodies} - {"target"}
+        if any(world.touched(other, "target") for other in others):
+            return "the target was touched"
+        return "a block fell" if world.touched("target", "table") or fallen(world, *world.free_bodies) else None
 
     def along(self, world: World, block: str) -> float:
         """Where a block is, measured along the deck from the axle [m]."""
@@ -129,51 +127,42 @@ class SeesawBalance(Scenario):
         """Tilt of the deck, positive where +s is down [rad]."""
         return -math.asin(float(world.rot(BEAM)[2, 0]))
 
-    def up(self, world: World) -> int:
-        """The arm that is up, -1 or 1."""
-        return -1 if self.tilt(world) > 0 else 1
-
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Guess, put, let go, look; then narrow the stretch that is left, until the deck is level. Reads no mass."""
-        side = self.up(world)
-        spans = self.spans(side)
-        low, high, along = spans[0][0], spans[-1][1], self.guess(side)
+        """Put, let go, look; then narrow the stretch of the arm that is left, until the deck is level. Reads no mass.
+
+        A deck on its stop says which way to go, and `AMISS` how far at least. Between the stops the tilt is
+        proportional to the error, by a factor that is half to twice the one that one would expect.
+        """
+        low, high = (self.nearest(self.raised, end) for end in (-1.0, 1.0))
+        along = (low + high) / 2
         while True:
-            yield from self.put_at(world, along)
+            yield from self.put_at(world, self.nearest(self.raised, along))
             tilt, stood = self.tilt(world), self.along(world, "weight")
             if abs(tilt) <= SURELY:
                 return
-            low, high = (low, min(high, stood)) if tilt > 0 else (max(low, stood), high)
+            stopped = abs(tilt) > self.seesaw.steepest - math.radians(0.5)
+            past = stood - math.copysign(AMISS if stopped else 0.0, tilt)
+            low, high = (low, min(high, past)) if tilt > 0 else (max(low, past), high)
             if high - low < 0.004:
                 raise GaveUp("the balancing place was not found")
-            along = self.nearest(side, self._next(low, high, stood, tilt))
+            there = stood - math.tan(tilt) / math.tan(LEVEL) * with_values(self, EXPECTED).margin
+            along = (low + high) / 2 if stopped or not low < there < high else there
 
-    def _next(self, low: float, high: float, stood: float, tilt: float) -> float:
-        """The next place to try between `low` and `high` [m], from the tilt with the counterweight at `stood` [rad].
-
-        A deck on its stop says only which way to go. Between the stops the tilt is proportional to the error, and the
-        factor that one would expect is off by a factor of two at most.
-        """
-        middle = (low + high) / 2
-        if abs(tilt) > self.seesaw.steepest - math.radians(0.5):
-            return middle
-        there = stood - math.tan(tilt) / math.tan(LEVEL) * with_values(self, EXPECTED).margin
-        return there if low < there < high else middle
-
-    def put_at(self, world: World, along: float) -> Plan:
-        """Put the counterweight on the deck from wherever it stands, let go, and see whether the deck stays level."""
-        arm, at = world.arm, world.com("weight")
+    def put_at(self, world: World, along: float, block: str = "weight") -> Plan:
+        """Put a block on the deck from wherever it stands, let go, and see whether the deck stays level."""
+        arm, at = world.arm, world.com(block)
         high = TRANSIT - at[2]
         yield from go_to(arm, at + high * UP, self.down, COARSE, OPEN)
-        yield from pick(arm, at, closing=world.rot("weight")[:, 1], above=high, lift=high, pace=STEADY)
+        yield from pick(arm, at, closing=world.rot(block)[:, 1], above=high, lift=high, pace=STEADY)
         spot = self.on_deck(along, self.tilt(world))
         yield from go_to(arm, [*spot[:2], TRANSIT], self.down, COARSE)
-        yield from put(arm, "weight", spot + world.com("weight") - world.pos("weight"), on=BEAM, hover=0.02)
+        yield from put(arm, block, spot + world.com(block) - world.pos(block), on=BEAM, hover=0.02)
         yield from retreat(arm, 0.08)
-        yield from hold(arm, 0.2)
-        yield from wait(arm, lambda: np.abs(world.velocity(BEAM)[:3]).max() < 0.01, give_up=4.0)
+        for _ in range(2):  # where it bounces off its stop it is at rest for a moment
+            yield from hold(arm, 0.2)
+            yield from wait(arm, lambda: np.abs(world.velocity(BEAM)[:3]).max() < 0.01, give_up=4.0)
         if world.tilt(BEAM) <= SURELY:
             yield from hold(arm, self.HOLD)
 
@@ -182,20 +171,37 @@ class SeesawBalance(Scenario):
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
             "mirror_the_target": Shortcut(lambda world: self.put_at(world, self.mirror)),
-            "put_it_once": Shortcut(lambda world: self.put_at(world, self.guess(self.up(world)))),
+            "put_it_once": Shortcut(lambda world: self.put_at(world, self.guess)),
             "hold_the_deck_level": Shortcut(self._hold_level),
+            "shift_the_target": Shortcut(self._shift),
         }
 
     def _hold_level(self, world: World) -> Plan:
         """Put the counterweight in the mirror image and hold the deck level by hand: level it is, but not balanced."""
         yield from self.put_at(world, self.mirror)
-        arm, side = world.arm, self.up(world)
+        arm, side = world.arm, -1 if self.tilt(world) > 0 else 1
         spot = self.on_deck(side * (self.seesaw.arm(side) - 0.02), self.tilt(world))
-        yield from go_to(arm, [*arm.hand[:2], TRANSIT], pace=COARSE, grip=CLOSED)
-        yield from go_to(arm, [*spot[:2], TRANSIT], pace=COARSE)
+        yield from go_to(arm, [*spot[:2], TRANSIT], pace=COARSE, grip=CLOSED)
         yield from push(arm, -0.08 * UP, until=lambda: side * self.tilt(world) > 0)
         yield from hold(arm, 1.2 * self.HOLD)
         yield from retreat(arm, 0.08)
+
+    def _shift(self, world: World) -> Plan:
+        """Miss the balancing place by a little, and level the deck by moving the target instead."""
+        miss = 1.2 * self.margin
+        moved = min(STAYS - 0.003, miss * self.weight.mass / self.target.mass)
+        yield from self.put_at(world, self.balance - math.copysign(miss, self.balance))
+        yield from self.put_at(world, self.offset + math.copysign(moved, self.balance), "target")
+
+    def answer(self) -> Answer:
+        """A place on the raised arm: by how much farther out than the target [m]. No share of the target's offset or
+        of the arm, no distance from the axle and no lever law with fixed ratios of masses balances more of training."""
+
+        def at(beyond: float) -> float:
+            return self.nearest(self.raised, self.raised * (abs(self.offset) + beyond))
+
+        beyond = tuple(round(0.01 * k, 2) for k in range(-12, 21))
+        return Answer(beyond, lambda w, b: self.put_at(w, at(b)), lambda b: abs(self.tilt_at(at(b))) <= LEVEL)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         scene = self.build()
@@ -210,42 +216,38 @@ class SeesawBalance(Scenario):
         far = deck.arm(1 if self.offset > 0 else -1) - self.target.width / 2 - RIM
         yield require(INNER <= lever <= far, "the target has no room on its arm", offset=lever, farthest=far)
         yield on_table("the stand or the counterweight", [self.foot, self.start], margin=0.05)
-        dip, under = deck.dip, deck.height - deck.thickness
-        yield require(dip <= under, "the deck strikes the table before its stop", dip=dip, height=under)
-        beside = abs(float(heading(self.heading + 90.0) @ (self.start - self.foot)))
-        fits = beside >= (need := PALM_ALONG + AIR + deck.width / 2)
-        yield require(fits, "the hand cannot take the counterweight beside the seesaw", beside=beside, needed=need)
+        air = deck.height - deck.thickness - deck.dip
+        yield require(air >= 0.0, "the deck strikes the table before its stop", air=air)
+        beside = abs(float(heading(self.heading + 90.0) @ (self.start - self.foot))) - deck.width / 2 - PALM_ALONG
+        yield require(beside >= AIR, "the hand cannot take the counterweight beside the seesaw", beside=beside)
         grip, need = max(deck.friction, min(self.target.friction, self.weight.friction)), 1.5 * math.tan(deck.steepest)
         yield require(grip >= need, "blocks slide on the tilted deck", friction=grip, needed=need)
-
-        at, margin, up = self.balance, self.margin, -1 if self.balance < 0 else 1
-        spans = self.spans(up)
-        yield require(bool(spans), "the raised arm has no room", arm=deck.arm(up))
+        at, margin, spans = self.balance, self.margin, self.spans(self.raised)
+        yield require(bool(spans), "the raised arm has no room", arm=deck.arm(self.raised))
         room = max(min(high, at + margin) - max(low, at - margin) for low, high in spans)
-        why = "no place on the deck balances with room to spare"
-        yield require(room >= ROOM, why, balance=at, margin=margin, room=room, needed=ROOM)
+        yield require(room >= ROOM, "no place on the deck balances with room to spare", balance=at, room=room)
         yield within_reach("a place of the counterweight", self.on_deck(at, 0.0) + self.weight.height * UP, self.start)
-
-        alone, stop = abs(self.tilt_at(None)), deck.steepest
-        yield require(alone >= stop, "the seesaw is not on its stop at the start", tilt=alone, stop=stop)
-        tilt = abs(self.tilt_at(self.mirror))
-        yield require(tilt >= CLEARLY, "the mirror image of the target's place balances", tilt=tilt, needed=CLEARLY)
-        low, high = self.tilt_at(self.mirror, -MOVED), self.tilt_at(self.mirror, MOVED)
-        never = low > LEVEL or high < -LEVEL
-        yield require(never, "the mirror image balances once the target is nudged", low=low, high=high)
-        tilt = abs(self.tilt_at(self.guess(up)))
-        yield require(tilt >= CLEARLY, "the first guess balances", tilt=tilt, needed=CLEARLY)
+        alone = abs(self.tilt_at(None))
+        yield require(alone >= deck.steepest, "the seesaw is not on its stop at the start", tilt=alone)
+        for what, along in ("mirror image of the target's place", self.mirror), ("first guess", self.guess):
+            tilt = abs(self.tilt_at(along))
+            yield require(tilt >= CLEARLY, f"the {what} balances", tilt=tilt, needed=CLEARLY)
 
     def features(self) -> Mapping[str, float]:
         """The torque to be balanced by that of the counterweight in the mirror image, and where it balances [m]."""
         return {"torque_ratio": -self.balance / self.offset, "place_of_balance": self.balance}
 
-    # --- statics --------------------------------------------------------------------------
+    # --- statics and geometry -------------------------------------------------------------
 
-    def tilt_at(self, along: float | None, moved: float = 0.0) -> float:
-        """Tilt with the counterweight at `along`, or without it, and the target moved by `moved` along s [m] [rad]."""
-        target = standing(self.target, self.offset + moved)
+    def tilt_at(self, along: float | None) -> float:
+        """Tilt with the counterweight at `along` [m], or without it [rad]."""
+        target = standing(self.target, self.offset)
         return self.seesaw.rest([target] if along is None else [target, standing(self.weight, along)])
+
+    @property
+    def raised(self) -> int:
+        """The arm that is up at the start and has to carry the counterweight, -1 or 1."""
+        return -1 if self.balance < 0 else 1
 
     @property
     def balance(self) -> float:
@@ -255,14 +257,13 @@ class SeesawBalance(Scenario):
     @property
     def margin(self) -> float:
         """How far from `balance` the counterweight may stand for the tilt to stay within `LEVEL` [m]."""
-        loads = [standing(self.target, self.offset), standing(self.weight, self.balance)]
-        return math.tan(LEVEL) * self.seesaw.stiffness(loads) / self.weight.mass
+        stiffness = self.seesaw.stiffness([standing(block, 0.0) for block in (self.target, self.weight)])
+        return math.tan(LEVEL) * stiffness / self.weight.mass
 
-    def guess(self, side: int) -> float:
-        """The place on one arm that would balance, were all masses as one expects; as far as it reaches [m]."""
-        return self.nearest(side, with_values(self, EXPECTED).balance)
-
-    # --- geometry -------------------------------------------------------------------------
+    @property
+    def guess(self) -> float:
+        """The place on the raised arm that would balance, were all masses as one expects; as far as it reaches [m]."""
+        return self.nearest(self.raised, with_values(self, EXPECTED).balance)
 
     @property
     def down(self) -> Mat3:

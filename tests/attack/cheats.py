@@ -95,7 +95,7 @@ def shake_level(self, world: World) -> Plan:
 def hold_the_weight_down(self, world: World) -> Plan:
     """Put the counterweight in the mirror image and press on it, or on the target, until the deck is level."""
     yield from self.put_at(world, self.mirror)
-    arm, side = world.arm, self.up(world)
+    arm, side = world.arm, -1 if self.tilt(world) > 0 else 1
     block = min(world.free_bodies, key=lambda name: -side * self.along(world, name))
     yield from go_to(arm, [*arm.hand[:2], world.com(block)[2] + 0.12], pace=COARSE, grip=CLOSED)
     yield from go_to(arm, world.com(block) + 0.08 * UP, pace=STEADY)

@@ -191,8 +191,8 @@ def narrow(task: str) -> Iterator[Mutant]:
 NARROW: Mapping[str, tuple[str, ...]] = {
     "seesaw_balance": (
         "task.id.offset=[uniform,0.12,0.15]",
+        "task.id.seesaw.drop=0.06",
         "task.id.seesaw.pivot_offset=[uniform,-0.01,0.01]",
-        "task.id.seesaw.mass=[uniform,0.20,0.35]",
         "task.id.target.mass=[uniform,0.20,0.25]",
         "task.id.weight.mass=[mixture,[uniform,0.13,0.15],[uniform,0.32,0.37]]",
     ),
@@ -240,8 +240,7 @@ def _mirror_balances(self: Any) -> Any:
 
 
 def _guess_balances(self: Any) -> Any:
-    guess = self.guess(-1 if self.balance < 0 else 1)
-    return replace(self, weight=replace(self.weight, mass=self.weight.mass * abs(self.balance / guess)))
+    return replace(self, weight=replace(self.weight, mass=self.weight.mass * abs(self.balance / self.guess)))
 
 
 VALUES: Mapping[str, Mapping[str, Change]] = {

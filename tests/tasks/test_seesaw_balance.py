@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from controls import ablated, load, not_certified, play, play_shortcut, refuted, replayed, unchecked
+from controls import ablated, load, not_certified, play, play_shortcut, refuted, replayed, unchecked, unguarded
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,10 +13,11 @@ from scengen import config
 from scengen.assets.box import Block
 from scengen.assets.prop import place, table
 from scengen.assets.seesaw import Seesaw
-from scengen.params import parameters
+from scengen.attack.priors import fit
+from scengen.params import parameters, with_values
 from scengen.sim import scene_text
 from scengen.sim.world import IDLE, World
-from scengen.tasks.seesaw_balance import BEAM, LEVEL, MOVED, STAYS, SeesawBalance
+from scengen.tasks.seesaw_balance import BEAM, LEVEL, STAYS, SeesawBalance
 
 TASK = config.task("seesaw_balance")
 SPLITS = ["id", *TASK.axes]
@@ -51,7 +52,7 @@ def test_the_balancing_place_is_the_textbooks():
 
 
 @pytest.mark.parametrize(("share", "level"), [(0.0, True), (-0.8, True), (0.8, True), (-1.25, False), (1.25, False)])
-@pytest.mark.parametrize("split", ["id", "far_pivot", "heavy_beam", "other_arm"])
+@pytest.mark.parametrize("split", ["id", "far_pivot", "heavy_beam", "own_arm"])
 def test_within_the_margin_of_the_balancing_place_the_goal_holds_and_beyond_it_does_not(split, share, level):
     scenario = TASK.draw(split, 0, 3).scenario
     assert scenario.success(settled(scenario, scenario.balance + share * scenario.margin)) == level
@@ -61,14 +62,6 @@ def test_level_with_the_target_elsewhere_is_not_the_goal():
     moved = HEAVY.offset - STAYS - 0.005
     world = settled(HEAVY, replace(HEAVY, offset=moved).balance, moved)
     assert world.tilt(BEAM) < LEVEL and not HEAVY.success(world)
-
-
-@pytest.mark.parametrize(("mass", "level"), [(0.20, True), (0.19, False)])
-def test_where_it_is_refuted_that_a_nudge_levels_the_deck_it_does(mass, level):
-    """The counterweight in the mirror image, the target brought as near to the axle as `MOVED` says."""
-    scenario = SeesawBalance(weight=Block(mass=mass))
-    world = settled(scenario, scenario.mirror, scenario.offset - MOVED)
-    assert (world.tilt(BEAM) < LEVEL) == level == (scenario.infeasible() is not None)
 
 
 @pytest.mark.parametrize(("mass", "place"), [(0.06, 0), (0.9, -1)])
@@ -95,6 +88,26 @@ def test_whatever_is_within_bounds_is_refuted_with_numbers_or_has_room_to_balanc
         return
     assert math.isclose(scenario.tilt_at(scenario.balance), 0.0, abs_tol=1e-9)
     assert abs(scenario.tilt_at(scenario.balance + scenario.margin)) == pytest.approx(LEVEL, rel=1e-6)
+
+
+def test_no_fixed_place_balances_a_tenth_of_training_and_no_three_a_fifth():
+    """Told which arm is up and how far out the target stands; fitted on 400 draws, measured on as many others."""
+    scenarios = [TASK.draw("id", 0, i).scenario for i in range(800)]
+    one, two, three = fit(scenarios[:400], fresh=scenarios[400:])
+    assert 0.0 < one.fresh <= one.bound <= 0.10 and one.fresh < two.fresh < three.fresh <= three.bound <= 0.20
+
+
+def test_who_weighs_the_counterweight_knows_no_more():
+    """The lever law with the true mass of the counterweight, and the middle of training for all that is not weighed."""
+    scenarios = [TASK.draw("id", 1, i).scenario for i in range(400)]
+    known = [replace(s, seesaw=replace(s.seesaw, mass=0.26), target=Block(mass=0.35)).balance for s in scenarios]
+    balanced = [abs(s.balance - at) <= s.margin for s, at in zip(scenarios, known, strict=True)]
+    assert 0.0 < np.mean(balanced) <= 0.10
+
+
+def test_the_target_stands_to_the_left_and_to_the_right_in_training():
+    sides = [math.copysign(1.0, TASK.draw("id", 0, i).scenario.heading) for i in range(60)]
+    assert 20 < sides.count(1.0) < 40
 
 
 # --- hidden masses ----------------------------------------------------------------------
@@ -204,7 +217,16 @@ def test_without_the_counterweight_the_witness_levels_nothing():
 
 
 def test_dropping_the_target_loses():
-    assert SeesawBalance().failure(settled(SeesawBalance(), -0.1, 0.33)) == "the target fell off the seesaw"
+    assert SeesawBalance().failure(settled(SeesawBalance(), -0.1, 0.33)) == "a block fell"
+
+
+@pytest.mark.parametrize("index", range(2))
+def test_moving_the_target_would_level_what_a_guess_has_missed_and_loses(index):
+    scenario = TASK.draw("id", 0, index).scenario
+    open_to_it = with_values(unguarded(SeesawBalance)(), {p.name: p.nominal for p in parameters(scenario)})
+    assert play_shortcut(TASK, open_to_it, "shift_the_target").solved
+    ended = play_shortcut(TASK, scenario, "shift_the_target")
+    assert (ended.outcome, ended.reason) == ("failure", "the target was touched")
 
 
 # --- scenes that must not be certified --------------------------------------------------
@@ -223,7 +245,7 @@ class Impatient(SeesawBalance):
     """The oracle puts the counterweight once and is done."""
 
     def oracle(self, world):
-        yield from self.put_at(world, self.guess(-1))
+        yield from self.put_at(world, self.guess)
 
     def shortcuts(self):
         return {}
@@ -238,9 +260,8 @@ REFUTED = {
     "the raised arm has no room": replace(HEAVY, seesaw=Seesaw(length=0.25, pivot_offset=-0.1)),
     "the target has no room on its arm": SeesawBalance(offset=0.3),
     "the mirror image of the target's place": SeesawBalance(weight=Block(mass=0.25)),
-    "once the target is nudged": SeesawBalance(weight=Block(mass=0.20)),
     "the first guess balances": SeesawBalance(
-        target=Block(mass=0.22), weight=Block(mass=0.22), seesaw=Seesaw(mass=0.28, pivot_offset=-0.045)
+        target=Block(mass=0.25), weight=Block(mass=0.25), seesaw=Seesaw(mass=0.25, pivot_offset=-0.045)
     ),
     "not on its stop at the start": SeesawBalance(
         target=Block(mass=0.25), seesaw=Seesaw(mass=0.5, pivot_offset=0.058), weight=Block(mass=0.05)
