@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test fuzz kills check types format certify axes docs reference bench clean checker checker-base
+.PHONY: setup demo test fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base
 
 setup: $(READY)
 
@@ -60,6 +60,11 @@ certify: setup
 TASKS ?=
 axes: setup
 	$(BIN)/python tools/all_axes.py $(N) $(TASKS)
+
+# The adversary on every task, and docs/attacks.md: some 40 minutes. BUDGET rollouts each; TASKS=packing takes some.
+BUDGET ?= 500
+attacks: setup
+	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
 
 # A page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
 docs: setup

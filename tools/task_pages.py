@@ -22,6 +22,7 @@ from scengen.validate.certify import Certified, certify
 
 FOLDER = Path("docs/tasks")
 AXES = Path("docs/axes.md")
+ATTACKS = Path("docs/attacks.md")
 SCENARIO = 0
 """Index of the training scenario that is shown."""
 FRAMES, WIDTH, HEIGHT = 8, 320, 240
@@ -55,6 +56,7 @@ def page(task: Task, certified: Certified, seconds: float) -> str:
             *_parameters(task),
             *_axes(task),
             *_plans(certified),
+            *_attacks(task),
             "",
         ]
     )
@@ -96,10 +98,21 @@ def _axes(task: Task) -> Iterator[str]:
         goes = "; ".join(f"`{name}`: {spell(dist)}" for name, dist in axis.replace.items())
         rows.append((f"`{axis.name}`", goes, " ".join(axis.why.split()), axis.source))
     yield from _table(("axis", "goes to", "why", "source"), rows)
-    lines = AXES.read_text().splitlines() if AXES.is_file() else []
+    yield from _measured(AXES, task)
+
+
+def _attacks(task: Task) -> Iterator[str]:
+    """What the adversary came to."""
+    yield from ("## Attacked", "")
+    yield from _measured(ATTACKS, task)
+
+
+def _measured(page: Path, task: Task) -> Iterator[str]:
+    """The lines of a task in the table of another page, if there are any."""
+    lines = page.read_text().splitlines() if page.is_file() else []
     head = next((i for i, line in enumerate(lines) if line.startswith("| task |")), None)
     if head is not None and (mine := [line for line in lines if line.startswith(f"| {task.name} |")]):
-        yield "Measured ([what the columns mean](../axes.md)):"
+        yield f"Measured ([what the columns mean](../{page.name})):"
         yield ""
         yield from (*lines[head : head + 2], *mine, "")
 
@@ -108,13 +121,16 @@ def _plans(certified: Certified) -> Iterator[str]:
     """What came of shortcuts and ablations in the scenario that is shown."""
     certificate = certified.certificate
     yield from ("## Shortcuts that must fail", "")
-    yield from _table(("shortcut", "ends in", "because", "after"), _ends(certificate["shortcuts"].numbers))
+    told = certificate["shortcuts"].numbers
+    rows = [(f"`{name}`", how, *_end(end)) for name, both in told.items() for how, end in both.items()]
+    yield from _table(("shortcut", "actions", "ends in", "because", "after"), rows)
     yield from ("## Ablations in which the witness must fail", "")
-    yield from _table(("without", "ends in", "because", "after"), _ends(certificate["ablations"].numbers))
+    rows = [(f"`{name}`", *_end(end)) for name, end in certificate["ablations"].numbers.items()]
+    yield from _table(("without", "ends in", "because", "after"), rows)
 
 
-def _ends(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    return [(f"`{name}`", end["outcome"], end["reason"], f"{end['seconds']:g} s") for name, end in numbers.items()]
+def _end(numbers: Mapping[str, Any]) -> tuple[str, ...]:
+    return numbers["outcome"], numbers["reason"], f"{numbers['seconds']:g} s"
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
