@@ -10,7 +10,7 @@ from typing import Any
 from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
 from ..log import Log
-from ..parallel import each
+from ..parallel import Limits, each
 from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
@@ -46,6 +46,8 @@ class Settings:
     seed: int = 0
     tiers: str | list[str] | None = None
     workers: int = 1
+    limit_seconds: float = 3600.0
+    limit_mb: int = 4000
     to: str | None = None
     json: str | None = None
 
@@ -57,7 +59,7 @@ class Settings:
 
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
-        at_least(self, n=1, budget=1, seed=0, workers=1)
+        at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
         for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
             if tier not in TIERS:
                 raise UnknownName("tier", tier, TIERS)
@@ -84,6 +86,8 @@ class Report:
     hits: tuple[Hit, ...]
     priors: tuple[Prior, ...]
     untried: tuple[Untried, ...]
+    lost: tuple[str, ...]
+    """Scenarios whose attack crashed or reached a limit, each with the reason: nothing is known of them."""
     folder: Path
     """Where the hits are stored."""
     cpu: float
@@ -108,6 +112,7 @@ class Report:
             "rates": [rate.plain() for rate in self.rates],
             "priors": [{**asdict(prior), "bound": prior.bound} for prior in self.priors],
             "not_tried": [asdict(one) for one in self.untried],
+            "lost": list(self.lost),
             "hits": [{"name": hit.name, "refutes": hit.refutes, **hit.plain()} for hit in self.hits],
         }
 
@@ -129,6 +134,10 @@ class Job:
         arena.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
         attack = Attack(arena, self.seed, number, len(self.subjects), self.priors)
         return attack.run(self.budget, self.tiers)
+
+    def lost(self, number: int, reason: str) -> Result:
+        """The result of a scenario whose attack has crashed its process, or has reached a limit."""
+        return Result(self.subjects[number].scenario.id, [], [], 0.0, [], reason)
 
 
 def attack(
@@ -157,7 +166,8 @@ def attack(
     with Log(folder / "attack.jsonl", identity) as log:
         done = {record["scenario"] for record in log.records}
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
-        for result in each(job, todo, settings.workers):
+        limits = Limits(settings.limit_seconds, settings.limit_mb)
+        for result in each(job, todo, settings.workers, limits, job.lost):
             for hit in result.hits:
                 replace(hit, task=task.name).store(folder)
             log.add(_record(result))
@@ -280,7 +290,8 @@ def _record(result: Result) -> dict[str, Any]:
     counts = [asdict(rate) for rate in result.rates]
     untried = [asdict(one) for one in result.untried]
     hits = [hit.name for hit in result.hits]
-    return {"scenario": result.scenario, "rates": counts, "hits": hits, "untried": untried, "cpu": result.cpu}
+    told = {"rates": counts, "hits": hits, "untried": untried, "cpu": result.cpu, "lost": result.lost}
+    return {"scenario": result.scenario, **told}
 
 
 def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> Report:
@@ -290,7 +301,10 @@ def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, pri
     hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
     untried = tuple(Untried(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
-    return Report(task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, folder, cpu)
+    lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
+    return Report(
+        task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, lost, folder, cpu
+    )
 
 
 def _sorted(counts: Sequence[Rate]) -> list[Rate]:

@@ -10,11 +10,12 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from ..columns import witness_of
 from ..episode import Actions
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
 from ..samplers.task import Task
-from ..schema import column_witness, memory_bounded, read_json
+from ..schema import memory_bounded, read_json
 from ..sim import scene_text
 from ..sim.world import World
 from ..targets import refused
@@ -95,7 +96,7 @@ class Hit:
         """
         try:
             with memory_bounded(), np.load(path, allow_pickle=False) as stored:
-                about, actions = read_json(str(stored["about"])), column_witness(stored["actions"])
+                about, actions = read_json(str(stored["about"])), witness_of(stored["actions"])
             about["lacks"] = tuple((str(one), str(other)) for one, other in about["lacks"])
             about["unmoved"] = tuple(map(str, about["unmoved"]))
             return cls(**about, actions=actions)

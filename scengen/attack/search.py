@@ -46,6 +46,8 @@ class Result:
     cpu: float
     """Processor time of the rollouts of the adversary [s]."""
     untried: list[Untried]
+    lost: str = ""
+    """Why the attack did not come to its end: the process crashed, or reached a limit."""
 
 
 @dataclass(frozen=True)

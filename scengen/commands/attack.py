@@ -16,7 +16,7 @@ from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..targets import try_file, try_folder
-from . import FAILED, OK, Arguments, err, out, say, warn, write_json
+from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
 
 
 def command(arguments: Arguments) -> int:
@@ -42,7 +42,7 @@ def command(arguments: Arguments) -> int:
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
         write_json(settings.json, report.plain())
-    return FAILED if report.refuting else OK
+    return FAILED if report.refuting else BAD_INPUT if report.lost else OK
 
 
 def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Subject]]:
@@ -70,7 +70,7 @@ def _remarks(report: Report) -> list[str]:
         f"not tried {times} times: {name} ({'raw' if raw else 'filtered'}): {reason}"
         for (name, raw, reason), times in counts.items()
     ]
-    return [*map(_fixed, report.priors), *untried]
+    return [*map(_fixed, report.priors), *untried, *(f"unknown: the attack on {one}" for one in report.lost)]
 
 
 def _fixed(prior: Prior) -> str:

@@ -250,7 +250,12 @@ def _attack(
     chosen = _chosen(records, settings.n)
     subjects = attacks.certified(job.task, journal.rows(chosen))
     wanted = attacks.Settings(
-        split=settings.split, budget=settings.attack, seed=settings.seed, workers=settings.workers
+        split=settings.split,
+        budget=settings.attack,
+        seed=settings.seed,
+        workers=settings.workers,
+        limit_seconds=settings.limit_seconds,
+        limit_mb=settings.limit_mb,
     )
     about = pool.sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
 

@@ -1,6 +1,7 @@
 """Attacks as part of certificates and pools, and the hits that they leave behind."""
 
 import json
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -87,3 +88,10 @@ def test_a_file_that_is_no_hit_is_one_clear_error(tmp_path, content, capsys):
     (tmp_path / "hit.npz").write_bytes(content)
     assert cli.run(["verify", f"hits={tmp_path / 'hit.npz'}"]) == 2
     assert "is no hit of scengen attack" in capsys.readouterr().err
+
+
+def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("scengen.attack.campaign.arena_of", lambda subject: os._exit(3))
+    argv = ["attack", "task=domino_single", "n=1", "budget=2", "tiers=[random]", f"to={tmp_path}"]
+    assert cli.run(argv) == 2
+    assert "unknown: the attack on" in capsys.readouterr().out
