@@ -9,7 +9,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -264,10 +263,19 @@ class Pool:
             raise UnknownName(f"{what} in {self.folder}", prefix, ids[:20] + (["..."] if len(ids) > 20 else []))
         return next(row for row in self.rows() if row.id == found[0])
 
-    @cached_property
-    def rejected(self) -> list[PoolRow]:
-        """Scenarios that were kept although they were not certified (`keep=`)."""
-        return list(_rows(self.folder / REJECTED, witness=True)) if "rejected" in self.manifest else []
+    @property
+    def promised_rejects(self) -> int:
+        """How many scenarios were kept although they were not certified, by the manifest."""
+        return self.manifest["rejected"]["rows"] if "rejected" in self.manifest else 0
+
+    def rejects(self) -> Iterator[PoolRow]:
+        """Scenarios that were kept although they were not certified (`keep=`), in index order.
+
+        Raises:
+            PoolError: their file cannot be read.
+        """
+        if "rejected" in self.manifest:
+            yield from _rows(self.folder / REJECTED, witness=True)
 
 
 def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept: Sequence[PoolRow] = ()) -> Pool:

@@ -73,9 +73,11 @@ def too_many(pool: Pool, drawn: Mapping[int, Drawn]) -> str:
 
 
 def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:
-    """Where the indices of the rows cannot be those of a run, or their number."""
-    if any(a >= b for a, b in itertools.pairwise(indices)):
-        yield "the rows do not stand in the order of their indices, each once"
+    """Where the indices of the rows cannot be those of a run, or their number.
+
+    Args:
+        indices: in the order of the rows, each larger than the one before.
+    """
     if len(indices) != len(pool):
         yield f"the manifest promises {len(pool)} scenarios, the shards hold {len(indices)}"
     if len(indices) > pool.manifest["n"]:

@@ -23,6 +23,9 @@ from .stored import settings_of, task_of_manifest
 LIMITS = Limits(300.0, 4000)
 """Of one scenario: the slowest of the seven tasks takes 40 s at level full, and 300 MB."""
 
+MOST_FAULTS = 100
+"""Refuted scenarios after which the others are not looked at: the pool is refuted, however many it has."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -100,6 +103,10 @@ class _Run:
     rejected: list[survey.Reject] = field(default_factory=list)
     drawn: dict[int, survey.Drawn] = field(default_factory=dict)
     """What came of the indices that were drawn again."""
+    faults: int = 0
+    """Refuted scenarios."""
+    whole: bool = False
+    """Whether all rows and rejects have been read."""
 
     def examine(self, examiner: Examiner, progress: Callable[[int], None]) -> None:
         """Let workers look at everything, and collect what they find."""
@@ -112,6 +119,7 @@ class _Run:
                 self._note(one)
             else:
                 seen.append(one)
+                self.faults += one.verdict == "refuted"
                 progress(min(len(seen), len(self.pool)))
         order = {id_: place for place, id_ in enumerate(self.ids)}
         twice = {id_ for id_, times in Counter(self.ids).items() if times > 1}
@@ -127,15 +135,33 @@ class _Run:
                 self.indices.append(row.index)
                 self.ids.append(row.id)
                 self.certified[row.index] = row.attempt
+                if self._hopeless():
+                    return
                 yield row, self.chosen is None or place in self.chosen, True
-            for row in self.pool.rejected:
+            for row in self.pool.rejects():
                 self.rejected.append(survey.Reject.of(row))
+                if self._hopeless():
+                    return
                 yield row, self.options.sample is None, False
         except PoolError as error:
             self.found.of_pool("shards", "refuted", str(error))
             return
+        self.whole = True
         if not self.pool.chosen and len(self.indices) == len(self.pool):
             yield from self._pieces()
+
+    def _hopeless(self) -> bool:
+        """Whether so much is false already that nobody needs to know about the rest; the report says so."""
+        if self.faults >= MOST_FAULTS:
+            why = f"{self.faults} scenarios are refuted; those after them were not looked at"
+        elif len(self.indices) > len(self.pool) or len(self.rejected) > self.pool.promised_rejects:
+            why = "the shards hold more scenarios than the manifest promises"
+        elif len(self.indices) > 1 and self.indices[-1] <= self.indices[-2]:
+            why = f"index {self.indices[-1]} stands twice, or after a later one; the rows behind it were not looked at"
+        else:
+            return False
+        self.found.of_pool(MANIFEST, "refuted", why)
+        return True
 
     def _pieces(self) -> Iterator[range]:
         """The indices of the run, as long as what has been drawn can be what the manifest counts, and in time."""
@@ -178,6 +204,8 @@ class _Run:
             self.found.of_pool(MANIFEST, "refuted", what)
 
     def _miscounted(self) -> Iterator[str]:
+        if not self.whole:
+            return
         yield from survey.wrong_order(self.indices, self.pool)
         if self.pool.chosen:
             yield from survey.wrong_subset(self.pool)

@@ -296,8 +296,10 @@ def test_a_forged_row_is_found_by_its_id(mine, damage, says):
 
 def test_a_scenario_that_occurs_twice_is_found(mine):
     first = next(Pool.open(mine).rows())
-    rewritten(mine, lambda row: first if row.index == 1 else None)
+    rewritten(mine, lambda row: replace(first, index=1) if row.index == 1 else None)
     assert sum("the id occurs twice" in f["reason"] for f in failures(mine)) == 2
+    rewritten(mine, lambda row: first if row.index == 1 else None)
+    assert any("index 0 stands twice" in f["reason"] for f in failures(mine))
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 3}', '{"format": 3, "shards": []}', "\x00"])

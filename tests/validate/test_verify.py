@@ -376,7 +376,7 @@ def test_rows_in_another_order_or_twice_are_noticed(mine):
     of = Pool.open(mine)
     made = list(of.rows())
     pool.write(mine, of.about, [*made[1:], made[0]])
-    assert any("order of their indices" in f["reason"] for f in report(mine).failed)
+    assert any("stands twice, or after a later one" in f["reason"] for f in report(mine).failed)
     pool.write(mine, of.about, [made[0], made[0], *made[2:]])
     assert any("the id occurs twice" in f["reason"] for f in report(mine).failed)
 
