@@ -16,7 +16,6 @@ from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
-from answers import answering
 from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 
@@ -42,7 +41,7 @@ def main(budget: str = "300", *tasks: str) -> None:
     PAGE.parent.mkdir(exist_ok=True)
     records = [json.loads(line) for line in PAGE.read_text().splitlines()] if PAGE.is_file() else []
     done = {(record["task"], record["mutant"]) for record in records}
-    with open(PAGE, "a") as page, answering():
+    with open(PAGE, "a") as page:
         for mutant in mutants():
             if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
                 continue

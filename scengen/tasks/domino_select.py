@@ -20,6 +20,9 @@ Decisions:
 * One try: the robot may touch one first tile and nothing else, and topple it but not carry it; all else is a latched
   failure. Touching a wrong first tile is none: nothing can be won any more, and so every wrong chain is judged by
   physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until all is still.
+* Chance: the intact chain is in any lane alike, and the others are dealt at random. A blind guess is right in 1 of 5
+  scenes; who sees nothing but colours, in 1 of as many as there are red slabs, which are 4 in two of three training
+  scenes and 3 in the others: 28 %. Where a decoy stands tells no more.
 * How hard a first tile is pushed does not matter: it gets 2 rad/s from the oracle and 8 from the fastest hand, but 11
   from its own fall over a gap of 0.6 heights.
 """
@@ -40,7 +43,7 @@ from ..geometry import UP, Vec3, about_z, heading
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER, TIP
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import go_to, push, retreat, wait
@@ -145,6 +148,11 @@ class DominoSelect(Scenario):
         yield from pick(world.arm, tile + 0.7 * self.tile.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
         yield from go_to(world.arm, slab + (self.slab.height + TIP + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
+
+    def answer(self) -> Answer:
+        """The number of the intact chain's lane; after one try nothing can be won any more."""
+        lanes = tuple(float(k) for k in range(LANES))
+        return Answer(lanes, lambda w, k: self.topple(w, f"tile_{round(k)}_0"), lambda k: k == self.intact, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the intact chain its first tile falls on nothing; one tile less might be bridged by the others."""
