@@ -1,9 +1,10 @@
-"""Holed cuboid cage: a thin-walled box with one circular hole on a face of your choice, and a low sill on its floor.
+"""Holed cuboid cage: a thin-walled box with one round hole, two low sills on its floor, and a trap under its end.
 
        ________________
-      |  _             |      side view; the hole is where the floor ends near +x
-      | (_)   |        |
-      |_______|____   _|      the sill is the low bar on the floor
+      |     _          |      side view; the hole is where the floor ends near +x
+      |    (_)|        |      the sills are the low bars on the floor; the trap is the pit under the end at -x,
+      |   |___|____   _|      as wide as the cage
+      |___|
 
 Collision geometry is an exact convex decomposition: plates are boxes, and the part of the holed plate around the hole
 is cut by rays from the hole's centre into wedges whose inner faces touch the circle from outside. So the hole is a
@@ -19,7 +20,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geometry import Mat3, Vec3
+from ..geometry import UP, Mat3, Vec3
 from ..params import param
 from .prop import BOX, Prop, Rgba, show, shown, solid
 
@@ -34,6 +35,9 @@ SEGMENTS = 64
 
 SHORTEST = 1e-6
 """Sills lower and strips of plate narrower than this are left out [m]: MuJoCo refuses boxes without extent."""
+
+TRAP: Rgba = (0.30, 0.12, 0.45, 0.45)
+"""Colour of the trap: violet, which nothing else is."""
 
 BOTTOM, END, SIDE, TOP = range(4)
 """Values of `face`. The other end and the other side are these in a cage that is turned round."""
@@ -50,7 +54,8 @@ class HoledCage(Prop):
     """A closed box with one round hole. x is the long axis; the origin is the centre of its foot.
 
     The paper gives no lengths (App. C: "one circular hole on a configurable face"). Ours fit the task's hand: the
-    width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of 3 mm acrylic (86 cm^3 at 1.19 g/cm^3).
+    width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of the box without its trap in 3 mm acrylic
+    (86 cm^3 at 1.19 g/cm^3).
     """
 
     length: float = param(0.130, "m", 0.08, 0.20)
@@ -62,10 +67,16 @@ class HoledCage(Prop):
     """Radius of the hole."""
     offset: float = param(0.043, "m", -0.08, 0.08)
     """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
-    sill: float = param(0.003, "m", 0.0, 0.015)
+    sill: float = param(0.0041, "m", 0.0, 0.015)
     """Height of the bar across the floor; it is as thick as the walls. At 0 there is none."""
-    sill_x: float = param(-0.026, "m", -0.08, 0.08)
+    sill_x: float = param(-0.004, "m", -0.08, 0.08)
     """Where the sill stands, from the middle of the floor."""
+    trap: float = param(0.016, "m", 0.002, 0.03)
+    """How far the floor steps down at the end at -x."""
+    trap_x: float = param(-0.0285, "m", -0.08, 0.08)
+    """Where the wall of that step stands, from the middle of the floor; it is as thick as the others."""
+    trap_sill: float = param(0.0012, "m", 0.0, 0.015)
+    """Height of the bar on that wall, above the floor."""
     mass: float = param(0.100, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     closed: bool = False
@@ -106,17 +117,26 @@ class HoledCage(Prop):
         """Least distance from the rim of the hole to what stands on its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]
         free = [self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2]
-        if self.face == BOTTOM and self._sill():
-            free.append(abs(self.offset - self.sill_x) - self.wall / 2)
+        if self.face == BOTTOM:
+            free += [abs(self.offset - x) - self.wall / 2 for x in (self.sill_x, self.trap_x)]
         return min(free) - self.hole
 
-    def tilt_over_sill(self, radius: float) -> float:
-        """Tilt of the floor at which a ball that lies against the sill rolls over it [rad].
+    @property
+    def trap_length(self) -> float:
+        """Inner edge of the trap along x [m]; negative: its wall stands outside the cage."""
+        return self.trap_x - self.wall / 2 + self.cavity[0] / 2
 
-        The ball turns about the sill's edge, and does so once the vertical through its centre passes that edge:
-        cos(tilt) = 1 - height / radius. Where the sill is as high as the centre no tilt below a right angle will do.
-        """
-        return math.acos(max(0.0, 1 - self.sill / radius))
+    def tilt_over_sill(self, radius: float) -> float:
+        """Tilt of the floor at which a ball that lies against the sill rolls over it, towards the hole [rad]."""
+        return _tilt_over(self.sill, radius)
+
+    def tilt_into_trap(self, radius: float) -> float:
+        """The same for the trap's sill, the other way [rad]."""
+        return _tilt_over(self.trap_sill, radius)
+
+    def tilt_out_of_trap(self, radius: float) -> float:
+        """Tilt at which a ball rolls out of the trap again [rad]."""
+        return _tilt_over(self.trap + self.trap_sill, radius)
 
     def least_tilt(self, radius: float) -> float:
         """Tilt that lets a ball roll over the sill and, where the hole is in an upright wall, over its rim [rad]."""
@@ -127,23 +147,41 @@ class HoledCage(Prop):
         return max(over_sill, math.acos(max(-1.0, 1 - rim / radius)))
 
     def pocket(self, radius: float) -> tuple[float, float]:
-        """Where the centre of a ball behind the sill may lie: least and largest x [m]."""
-        sill = min(self.sill, radius)
-        touching = self.wall / 2 + math.sqrt(2 * radius * sill - sill**2)
-        return radius - self.cavity[0] / 2, self.sill_x - touching
+        """Where the centre of a ball between the sills may lie: least and largest x [m]."""
+        return self.trap_x + self.beside(self.trap_sill, radius), self.sill_x - self.beside(self.sill, radius)
+
+    def traps(self, place: Vec3, radius: float) -> bool:
+        """Whether a ball with its centre at `place` has sunk into the trap by half of its radius."""
+        low, high = -self.length / 2, self.trap_x
+        inside = bool(low < place[0] < high and abs(place[1]) < self.width / 2)
+        return inside and -self.trap < place[2] < self.wall + radius / 2
+
+    def on_sill(self, place: Vec3, radius: float) -> bool:
+        """Whether a ball in the cage is above the sill: nearer to it than half of where it lies against it.
+
+        It stays there for 10 ms at least where it is slower than 1 m/s.
+        """
+        within = bool(np.all(np.abs(place - self.middle) < self.size / 2))
+        return within and abs(place[0] - self.sill_x) < self.beside(self.sill, radius) / 2
+
+    def beside(self, sill: float, radius: float) -> float:
+        """How far from the middle of a bar a ball lies that touches floor and bar [m]."""
+        height = min(sill, radius)
+        return self.wall / 2 + math.sqrt(2 * radius * height - height**2)
 
     # --- mass -----------------------------------------------------------------------------
 
     def inertial(self) -> tuple[Vec3, Mat3]:
         """Centre of mass [m] and inertia about it [kg m^2].
 
-        The body is cuboid - cavity - hole + sill, all of one density:
+        The body is cuboid - cavity - hole + sills, cuboid and cavity with those of the trap, all of one density:
         inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass;
         own = volume / 12 * (|e|^2 - e e^T, diagonal only) for a cuboid with edges e, and for the hole, a disc of radius
         R and thickness w, volume * R^2 / 2 about its axis and volume * (3 R^2 + w^2) / 12 across it.
         """
-        parts = [_cuboid(self.middle, self.size, 1.0), _cuboid(self.middle, self.cavity, -1.0)]
-        parts += [_cuboid(*box, 1.0) for box in self._sill()]
+        pit, hollow = self._trap()
+        parts = [_cuboid(*box, 1.0) for box in [(self.middle, self.size), pit, *self._sills()]]
+        parts += [_cuboid(*box, -1.0) for box in [(self.middle, self.cavity), hollow]]
         if not self.closed:
             axis = FACES[self.face][0]
             own = np.full(3, (3 * self.hole**2 + self.wall**2) / 12)
@@ -165,10 +203,11 @@ class HoledCage(Prop):
         for axis in range(3):
             for sign in (-1, 1):
                 if self.closed or FACES[self.face][:2] != (axis, sign):
-                    out, size = sign * np.eye(3)[axis], self.size.copy()
-                    size[axis] = self.wall
-                    plates.append((self.middle + (self.size[axis] - self.wall) / 2 * out, size))
-        return plates + self._sill() + ([] if self.closed else self._beside_patch())
+                    low, high = -self.size / 2, self.size / 2
+                    low[0] = self._plate_from(axis, sign)
+                    low[axis], high[axis] = sorted((sign * self.size[axis] / 2, sign * self.cavity[axis] / 2))
+                    plates.append(_box(self.middle + low, self.middle + high))
+        return plates + self._sills() + ([] if self.closed else self._beside_patch()) + self._trap_plates()
 
     def wedges(self) -> list[NDArray[np.float64]]:
         """Corners of the convex prisms around the hole [m], each of shape (n, 3)."""
@@ -185,25 +224,51 @@ class HoledCage(Prop):
             prisms.append(points)
         return prisms
 
-    def _sill(self) -> list[Box]:
-        if self.sill < SHORTEST:
-            return []
-        centre = np.array([self.sill_x, 0, self.wall + self.sill / 2])
-        return [(centre, np.array([self.wall, self.cavity[1], self.sill]))]
+    def _sills(self) -> list[Box]:
+        bars = [(self.sill_x, self.sill), (self.trap_x, self.trap_sill)]
+        return [
+            (np.array([x, 0, self.wall + height / 2]), np.array([self.wall, self.cavity[1], height]))
+            for x, height in bars
+            if height >= SHORTEST
+        ]
+
+    def _trap(self) -> tuple[Box, Box]:
+        """What the trap adds under the foot of the cage, and what is hollow in it, up to the floor."""
+        w, end, stop = self.wall, -self.length / 2, self.trap_x + self.wall / 2
+        out, within = self.size[1] / 2, self.cavity[1] / 2
+        hollow = _box([end + w, -within, w - self.trap], [stop - w, within, w])
+        return _box([end, -out, -self.trap], [stop, out, 0.0]), hollow
+
+    def _trap_plates(self) -> list[Box]:
+        """Floor, ends and sides of the trap, up to the upper side of the floor."""
+        w, end, stop, out = self.wall, -self.length / 2, self.trap_x + self.wall / 2, self.size[1] / 2
+        plates = [_box([end, -out, -self.trap], [stop, out, w - self.trap])]
+        plates += [_box([x, -out, -self.trap], [x + w, out, w]) for x in (end, stop - w)]
+        return plates + [_box([end, y, -self.trap], [stop, y + w, w]) for y in (-out, out - w)]
+
+    def _plate_from(self, axis: int, sign: int) -> float:
+        """Where a plate begins along x [m]: the floor at the wall of the trap, others at the end of the cage."""
+        return self.trap_x - self.wall / 2 if (axis, sign) == FACES[BOTTOM][:2] else -self.length / 2
 
     def _patch(self) -> tuple[float, float, float]:
         """The rectangle that is cut into wedges, seen from the hole: its two ends and its half width [m]."""
         axis, _, along = FACES[self.face]
-        half, reach = self.size[along] / 2, self.hole / math.cos(math.pi / WEDGES) + self.wall
-        ends = max(-half - self.offset, -reach), min(half - self.offset, reach)
+        (first, last), reach = self._ends(), self.hole / math.cos(math.pi / WEDGES) + self.wall
+        ends = max(first - self.offset, -reach), min(last - self.offset, reach)
         return *ends, self.size[3 - axis - along] / 2
+
+    def _ends(self) -> tuple[float, float]:
+        """From where to where the holed plate reaches, along the axis of `offset` [m]."""
+        axis, sign, along = FACES[self.face]
+        half = self.size[along] / 2
+        return (self._plate_from(axis, sign) if along == 0 else -half), half
 
     def _beside_patch(self) -> list[Box]:
         """What is left of the holed plate at both ends of the patch."""
         axis, _, along = FACES[self.face]
         start, stop, _ = self._patch()
-        half, boxes = self.size[along] / 2, []
-        for low, high in ((-half - self.offset, start), (stop, half - self.offset)):
+        (first, last), boxes = self._ends(), []
+        for low, high in ((first - self.offset, start), (stop, last - self.offset)):
             if high - low > SHORTEST:
                 centre, size = self.hole_centre.copy(), self.size.copy()
                 centre[along] += (low + high) / 2
@@ -235,9 +300,11 @@ class HoledCage(Prop):
         def block(centre: Vec3, size: Vec3) -> Manifold:
             return Manifold.cube(size.tolist(), True).translate(centre.tolist())
 
-        body = block(self.middle, self.size) - block(self.middle, self.cavity)
-        for centre, size in self._sill():  # let into floor and walls by half a wall, so that the parts are one
-            body += block(centre - self.wall / 4 * np.eye(3)[2], size + self.wall * np.array([0, 1, 0.5]))
+        (pit, size), hollow = self._trap()
+        body = block(self.middle, self.size) + block(pit + self.wall / 4 * UP, size + self.wall / 2 * UP)
+        body = body - block(self.middle, self.cavity) - block(*hollow)
+        for centre, size in self._sills():  # let into floor and walls by half a wall, so that the parts are one
+            body += block(centre - self.wall / 4 * UP, size + self.wall * np.array([0, 1, 0.5]))
         if self.closed:
             return body
         bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
@@ -254,19 +321,35 @@ class HoledCage(Prop):
         for i, corners in enumerate(self.wedges()):
             spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
             self._touchable(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
-        look = self.manifold().to_mesh()
-        spec.add_mesh(
-            name="look",
-            uservert=np.asarray(look.vert_properties, float)[:, :3].ravel().tolist(),
-            userface=np.asarray(look.tri_verts).ravel().tolist(),
-        )
-        shown(body, "look", self.rgba, type=MESH).meshname = "look"
+        above, below = self.manifold().split_by_plane(UP.tolist(), 0.0)
+        for name, part, rgba in (("look", above, self.rgba), ("trap", below, TRAP)):
+            look = part.to_mesh()
+            spec.add_mesh(
+                name=name,
+                uservert=np.asarray(look.vert_properties, float)[:, :3].ravel().tolist(),
+                userface=np.asarray(look.tri_verts).ravel().tolist(),
+            )
+            shown(body, name, rgba, type=MESH).meshname = name
 
     def _touchable(
         self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom, size: ArrayLike = (), pos: ArrayLike = (0, 0, 0)
     ) -> mujoco.MjsGeom:
         """A geom of the decomposition; group 3 is not drawn, the picture is the mesh's."""
         return solid(body, name, size, pos, type=type, friction=self.friction, mass=0.0, group=3)
+
+
+def _tilt_over(height: float, radius: float) -> float:
+    """Tilt of the floor at which a ball that lies against a bar or a step rolls over it [rad].
+
+    The ball turns about the bar's edge, and does so once the vertical through its centre passes that edge:
+    cos(tilt) = 1 - height / radius. Where the bar is as high as the centre no tilt below a right angle will do.
+    """
+    return math.acos(max(0.0, 1 - height / radius))
+
+
+def _box(low: ArrayLike, high: ArrayLike) -> Box:
+    """A cuboid between two corners."""
+    return (np.asarray(low, float) + high) / 2, np.subtract(high, low)
 
 
 def _cuboid(centre: Vec3, size: Vec3, sign: float) -> tuple[float, Vec3, Mat3]:

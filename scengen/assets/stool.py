@@ -17,7 +17,7 @@ BEECH = 700.0
 class Stool(Prop):
     """x is the long axis; the origin is the centre of its foot. The paper gives no lengths ("a narrow stool")."""
 
-    length: float = param(0.085, "m", 0.03, 0.25)
+    length: float = param(0.078, "m", 0.03, 0.25)
     width: float = param(0.040, "m", 0.03, 0.25)
     height: float = param(0.080, "m", 0.02, 0.20)
     friction: float = param(0.6, "1", 0.05, 1.5)

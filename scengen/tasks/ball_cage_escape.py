@@ -1,25 +1,27 @@
 """T22 ball-cage-escape: get a ball out of a cage whose only hole is blocked by the stool that it stands on.
 
       ________________
-     | (_)   |        |     seen from the side; the sill lies between the ball and the hole,
-     |_______|____ _ _|     which is in the floor near one end and rests on the stool
-              [=======]
-               |     |
+     |    (_)         |    seen from the side: the ball lies between two sills. Beyond one is the hole, in the floor,
+     |   |___|___ _ _|     on the stool; beyond the other one, which is lower, a trap
+     |___|[==========]
+            |     |
 
 Bottleneck: two things keep the ball in, and each hides the other. The stool blocks the hole, so that no tilt helps
-before the cage is lifted; the sill holds the ball, so that no lift helps before the cage is tilted, towards the right
-end, past the angle at which the ball rolls over the sill: cos(tilt) = 1 - sill / radius (36.9 deg nominally).
+before the cage is lifted; the sill holds the ball, so that no lift helps before the cage is tilted past the angle at
+which it rolls over: cos(tilt) = 1 - sill / radius (43.4 deg nominally). Towards the right end: over the other sill the
+ball rolls at 23.1 deg, into a pit that is deeper than its radius, so that no tilt brings it back. To which end the hole
+points has to be seen. It is a choice among two, and half of the guesses are right.
 
-Decisions. The paper gives the story, no numbers. (1) The sill is ours. On a bare floor the ball lies wherever the last
-jerk has left it, lifting alone empties the cage as soon as it rolls across the hole, and "the reorientation must
-account for the ball's position" would be an accident; with the sill it is a law with a number. It stands one
-centimetre before the ball: with more room the ball takes a run-up, and jumps a sill of 3 mm at half the angle. (2) The
-jaw holds the cage across its width, the one edge that it can span; walls are translucent so that cameras see ball and
-hole. (3) The stool is fixed: a tipping stool would be another task. (4) The ball must come to rest on the table. A ball
-on the floor is out of reach, hence a failure. It rolls like a felt ball (coefficient 0.04); a steel ball would leave
-every table. (5) The cage may not touch the table: knocked off its stool it tumbles, and a tumbling cage tilts without
-anybody having thought about it; whoever drops it or sets it down has given up the plan of the paper, "lift, tilt,
-reorient".
+Decisions. The paper gives the story, no numbers. (1) Sills and trap are ours. On a bare floor the ball lies wherever
+the last jerk has left it, lifting alone empties the cage, and a wrong tilt costs nothing. The ball has 5 mm of room
+between the sills: with more it takes a run-up and jumps at half the angle. (2) Tilting counts, shaking does not. A sill
+holds the ball up to an acceleration of g tan(tilt), 4.2 m/s^2 before the trap and 9.3 before the hole. A blind shake
+fills the trap first; one to a side, or of a cage that is half tilted, may free the ball. So it must pass the sill while
+the floor is tilted as the law says, less `GIVE`. (3) The jaw holds the cage across its width, the one edge that it can
+span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a tipping stool would be another task.
+(5) The ball must come to rest on the table; on the floor it is out of reach, hence lost. It rolls like a felt ball
+(coefficient 0.04); a steel ball would leave every table. (6) The cage may not touch the table: a cage that is knocked
+off its stool tumbles, and tilts without anybody having thought about it.
 """
 
 import dataclasses
@@ -39,20 +41,20 @@ from ..geometry import UP, Mat3, Vec3, about_z, shortest
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import pick, poke
-from ..skills.motion import WRIST_SPARE, Pace, can_turn, go_to, hand_yaw, hold, turn_about_vertical, turn_to, wait
+from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, turn_about_vertical, turn_to, wait
 
 STILL = 0.02
 """Speed below which the ball counts as lying [m/s]: at the nominal rolling friction it stops within 1 mm."""
 LEAST_HELD = math.radians(20.0)
-"""Least tilt that the sill must withstand [rad]. A hand that carries the cage level tilts it by up to 3 deg, and
+"""Least tilt that each sill must withstand [rad]. A hand that carries the cage level tilts it by up to 3 deg, and
 brakes at up to 2 m/s^2, which tilts the apparent gravity by 12 deg."""
 STEEPEST = math.radians(72.0)
 """Tilt that the hand reaches low over the table at every heading that `present` may choose [rad], tried on the model
 between x = -0.2 and 0 m."""
-SPARE = math.radians(13.0)
+SPARE = math.radians(10.0)
 """How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives some degrees."""
 HOLD_AT_END = 0.25
 """For a hole in a side: component of gravity that keeps the ball at the hole's end meanwhile, over the other ones."""
@@ -65,24 +67,29 @@ ASIDE = 0.19
 WIDEST = math.radians(55.0)
 """The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can
 lean far, and the ball has half a metre to run out."""
+CLEAR = 0.004
+"""Least air between trap and stool, and between trap and table [m]: nobody places a cage more exactly than 2 mm."""
+GIVE = math.radians(6.0)
+"""How far below the angle of the law the ball may pass the sill [rad]. As the floor turns at up to 2 rad/s, filtered or
+raw, the ball passes at 1.9 deg over it or more (160 rollouts); at 3 rad/s, 3 of 40 pass at 6 to 9 deg below."""
 LEVEL = Pace(0.20, 0.01)
 """With the cage in the hand: slow enough for the sill to hold the ball."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallCageEscape(Scenario):
-    """A cage on a stool, the ball behind the sill, the hole near the other end. Lengths are along the cage's axes."""
+    """A cage on a stool, the ball between two sills. Lengths are along the cage's axes."""
 
     HOLD: ClassVar[float] = 0.3
 
     x: float = param(-0.08, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    yaw: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
+    yaw: float = param(0.0, "deg", -120.0, 240.0, period=360.0)
     """Where the end with the hole points; at 0 straight away from the robot."""
-    ball_x: float = param(-0.042, "m", -0.1, 0.1)
+    ball_x: float = param(-0.0195, "m", -0.1, 0.1)
     ball_y: float = param(0.0, "m", -0.04, 0.04)
-    stool_x: float = param(0.0195, "m", -0.1, 0.1)
-    """Middle of the stool; 19.5 mm leave 1.5 mm of plate beyond the hole."""
+    stool_x: float = param(0.022, "m", -0.1, 0.1)
+    """Middle of the stool; 22 mm leave 0.5 mm of plate beyond the hole, and 10 mm of air before the trap."""
     rolling: float = param(0.04, "1", 0.0, 0.2)
     """Resistance to rolling of the felt-covered ball, as a share of the load."""
     cage: HoledCage = HoledCage()
@@ -110,6 +117,11 @@ class BallCageEscape(Scenario):
             return "the ball fell off the table"
         if world.touched("cage", "table") or fallen(world, "cage", below=0.0):
             return "the cage was dropped or set down"
+        place, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
+        if self.cage.traps(place, r):
+            return "the ball fell into the trap"
+        if self.cage.on_sill(place, r) and lean(world) < self.cage.tilt_over_sill(r) - GIVE:
+            return "the ball was shaken over the sill"
         return None
 
     def out(self, world: World) -> bool:
@@ -142,18 +154,17 @@ class BallCageEscape(Scenario):
         return [_towards_end(self.cage.tilt_over_sill(self.ball.radius) + SPARE), aside / np.linalg.norm(aside)]
 
     def pick_up(self, world: World) -> Plan:
-        """Take the cage by its width and lift it clear of the stool.
-
-        If joint 7 allows, the hand turns as the cage is turned: then it turns back in `present`.
-        """
-        turn = math.radians(self.yaw) - hand_yaw(world.arm)
-        turn = next(t for t in (turn, turn - math.pi, turn + math.pi) if can_turn(world.arm, t))
-        yield from turn_about_vertical(world.arm, turn)
+        """Take the cage by its width and lift it clear of the stool."""
         yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=0.05)
 
     def present(self, world: World, down: Vec3) -> Plan:
-        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down."""
-        arm, side, steep = world.arm, -1.0 if self.y > 0 else 1.0, math.acos(-down[2])
+        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
+
+        The place is towards the middle of the table, but to the left where the leaning end is to face about: joint 7
+        starts at 45 deg, and has room for half a turn one way only.
+        """
+        arm, steep, leaning = world.arm, math.acos(-down[2]), world.rot("cage") @ down
+        side = -1.0 if self.y > 0 and (leaning[0] > 0 or self.cage.face == SIDE) else 1.0
         low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
         spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
         yield from go_to(arm, [spot[0], spot[1], max(arm.hand[2], spot[2])], pace=LEVEL)
@@ -168,8 +179,8 @@ class BallCageEscape(Scenario):
         """
         heading, laps = math.atan2(leaning[1], leaning[0]), (-2 * math.pi, 0.0, 2 * math.pi)
         aside = {side * front - heading + lap: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
-        possible = [turn for turn in aside if can_turn(arm, turn, WRIST_SPARE / 2)]  # leaning relieves joint 7
-        return min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs)
+        possible = [turn for turn in aside if can_turn(arm, turn)]
+        return min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs, default=0.0)
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
@@ -178,35 +189,56 @@ class BallCageEscape(Scenario):
 
     def watch(self, world: World) -> Plan:
         """Wait until the ball has come to rest in the cage, or is out."""
-
-        def quiet() -> bool:
-            return float(np.linalg.norm((world.velocity("ball") - world.velocity("cage"))[3:])) < STILL
-
         yield from hold(world.arm, 0.3)
-        yield from wait(world.arm, lambda: self.out(world) or quiet(), give_up=3.0)
+        yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", STILL), give_up=3.0)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
+        half, steep = self.least_tilt / 2, self.least_tilt + SPARE
         return {
             "lift_it_off_the_stool": Shortcut(lambda world: self.tip_only(world, 0.0)),
-            "tip_it_half_as_far": Shortcut(lambda world: self.tip_only(world, self.least_tilt / 2)),
-            "tip_it_to_the_wrong_end": Shortcut(lambda world: self.tip_only(world, -self.least_tilt - SPARE)),
+            "tip_it_half_as_far": Shortcut(lambda world: self.tip_only(world, half)),
+            "tip_it_to_the_wrong_end": Shortcut(lambda world: self.tip_only(world, -steep)),
+            "tip_it_to_both_ends": Shortcut(lambda world: self.tip_only(world, -steep, steep)),
+            "shake_it_level": Shortcut(lambda world: self._shake(world)),
+            "shake_it_with_the_wrist": Shortcut(lambda world: self._shake(world, spin=1.0)),
+            "shake_it_half_tipped": Shortcut(lambda world: self._shake(world, half)),
             "knock_it_off_the_stool": Shortcut(self._knock_off),
         }
 
-    def tip_only(self, world: World, tilt: float) -> Plan:
-        """As the oracle, with another tilt [rad] and nothing after it."""
+    def tip_only(self, world: World, *tilts: float) -> Plan:
+        """As the oracle, with other tilts [rad], one after the other, and nothing after them."""
         yield from self.pick_up(world)
-        yield from self.present(world, _towards_end(tilt))
-        yield from self.tip(world, _towards_end(tilt), rate=0.5)
-        yield from hold(world.arm, 1.0)
+        yield from self.present(world, _towards_end(tilts[-1]))
+        for tilt in tilts:
+            yield from self.tip(world, _towards_end(tilt), rate=0.5)
+            yield from hold(world.arm, 1.0)
+
+    def _shake(self, world: World, tilt: float = 0.0, spin: float = 0.0) -> Plan:
+        """Shake it along its length as hard as the hand can, while the wrist turns to and fro, if `spin` is not 0."""
+        yield from self.tip_only(world, tilt)
+        end = world.time + 4.0
+        while world.time < end:
+            sign = 1.0 if world.time % 0.6 < 0.3 else -1.0
+            yield np.array([*(sign * world.rot("cage")[:, 0]), 0.0, 0.0, sign * spin, CLOSED])
 
     def _knock_off(self, world: World) -> Plan:
-        """Push the cage over the end of the stool with closed fingers, the holed end first."""
-        u = self.axes[:, 0]
-        behind = self.handle - (self.cage.length / 2 + FINGER + 0.04) * u
-        yield from poke(world.arm, behind, 0.15 * u, until=lambda: world.touched("cage", "table"))
+        """Push the cage across the stool, and off it, with closed fingers."""
+        across = self.axes[:, 1]
+        beside = self.handle - (self.cage.width / 2 + FINGER + 0.04) * across
+        yield from poke(world.arm, beside, 0.15 * across, until=lambda: world.touched("cage", "table"))
+
+    def answer(self) -> Answer:
+        """The heading in which the cage is leaned [deg], told without a look at which end has the hole."""
+
+        def right(heading: float) -> bool:
+            return math.cos(math.radians(heading - self.yaw)) > 0
+
+        def act(world: World, heading: float) -> Plan:
+            yield from self.tip_only(world, math.copysign(self.least_tilt + SPARE, right(heading) - 0.5))
+
+        return Answer(tuple(range(-90, 270, 15)), act, right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         closed = dataclasses.replace(self.cage, closed=True)
@@ -226,19 +258,25 @@ class BallCageEscape(Scenario):
         tilt = self.least_tilt + SPARE
         yield require(tilt <= STEEPEST, "the ball stays in at every tilt of the hand", tilt=tilt, steepest=STEEPEST)
 
-        # It stays in until the cage is tilted.
+        # It stays in until the cage is tilted, and a wrong tilt costs it.
         fits = 2 * r <= cage.cavity[2] and r + abs(self.ball_y) <= cage.cavity[1] / 2
         yield require(fits, "the ball does not fit between the walls", radius=r, y=self.ball_y)
         low, high = cage.pocket(r)
         behind = low <= self.ball_x <= high
-        yield require(behind, "the ball does not lie behind the sill", x=self.ball_x, least=low, largest=high)
-        tilt = cage.tilt_over_sill(r)
-        yield require(tilt >= LEAST_HELD, "the sill does not hold the ball", tilt=tilt, least=LEAST_HELD)
+        yield require(behind, "the ball does not lie between the sills", x=self.ball_x, least=low, largest=high)
+        tilt, other = cage.tilt_over_sill(r), cage.tilt_into_trap(r)
+        yield require(other >= LEAST_HELD, "the sill does not hold the ball", tilt=other, least=LEAST_HELD)
+        yield require(other < tilt, "the trap does not fill before the ball is free", trap=other, hole=tilt)
+        length, tilt = cage.trap_length, cage.tilt_out_of_trap(r)
+        yield require(2 * r <= length, "the trap does not take the ball", length=length, radius=r)
+        yield require(tilt > STEEPEST, "the ball rolls out of the trap again", tilt=tilt, steepest=STEEPEST)
 
         # The cage stands by itself, where the hand can take it.
         half, far = stool.length / 2, abs(cage.offset - self.stool_x) + cage.hole
         covered = cage.face != BOTTOM or (far <= half and cage.hole <= stool.width / 2)
         yield require(covered, "the stool does not cover the hole", far=far, hole=cage.hole, width=stool.width)
+        beside = min(self.stool_x - half - cage.trap_x - cage.wall / 2, stool.height - cage.trap)
+        yield require(beside >= CLEAR, "the trap has no room beside the stool", room=beside, least=CLEAR)
         load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
         lever = abs(load - self.stool_x)
         yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
@@ -275,3 +313,9 @@ class BallCageEscape(Scenario):
 def _towards_end(tilt: float) -> Vec3:
     """Where down is in a cage whose holed end is lowered by `tilt` [rad]."""
     return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
+
+
+def lean(world: World) -> float:
+    """Tilt of the floor towards the hole's end, as a ball feels it that is free to roll along the cage [rad]."""
+    along, _, across = world.rot("cage")[2]
+    return math.atan2(-along, across)

@@ -20,15 +20,17 @@ FACES = {"bottom": BOTTOM, "end": END, "side": SIDE, "top": TOP}
 
 
 def fitted(cage):
-    """The cage with its hole and sill moved to where they fit, within their own bounds."""
+    """The cage with its hole, its sill and the wall of its trap moved to where they fit, within their own bounds."""
     axis = {BOTTOM: 2, END: 0, SIDE: 1, TOP: 2}[cage.face]
     along = 1 if cage.face == END else 0
     room = cage.cavity / 2
     hole = max(0.005, min(cage.hole, 0.95 * room[3 - axis - along], 0.4 * room[along]))
-    sill_x = max(-0.08, cage.wall - 0.9 * room[0])
+    trap_x = max(-0.08, cage.wall - 0.9 * room[0])
+    sill_x = trap_x + cage.wall
     low = sill_x + cage.wall if cage.face == BOTTOM else -room[along]
     offset = min(max(cage.offset, low + hole), room[along] - hole, 0.08)
-    return replace(cage, hole=hole, offset=offset, sill_x=sill_x, sill=min(cage.sill, room[2]))
+    sill, trap_sill = min(cage.sill, room[2]), min(cage.trap_sill, room[2])
+    return replace(cage, hole=hole, offset=offset, sill_x=sill_x, sill=sill, trap_x=trap_x, trap_sill=trap_sill)
 
 
 def pieces(cage):
@@ -64,7 +66,9 @@ def test_no_collision_geometry_lies_in_the_cavity_or_in_the_hole(cage):
     assert cage.margin > -1e-9
     shrink = 1e-6  # MuJoCo keeps mesh vertices in single precision
     cavity = Manifold.cube((cage.cavity - 2 * shrink).tolist(), True).translate(cage.middle.tolist())
-    for centre, size in cage._sill():
+    centre, size = cage._trap()[1]
+    cavity += Manifold.cube((size - 2 * shrink).tolist(), True).translate(centre.tolist())
+    for centre, size in cage._sills():
         cavity -= Manifold.cube((size + 2 * shrink).tolist(), True).translate(centre.tolist())
     touched = union(cage)
     assert (touched ^ cavity).volume() < 1e-15
@@ -115,12 +119,13 @@ class Shaken:
         self.data = mujoco.MjData(self.model)
 
     def gets_out(self, force, seconds):
-        """Whether the ball's centre leaves the cuboid under `force(time)` [m/s^2]."""
+        """Whether the ball's centre leaves the cage and its trap under `force(time)` [m/s^2]."""
         while self.data.time < seconds:
             self.model.opt.gravity[:] = force(self.data.time)
             mujoco.mj_step(self.model, self.data)
-            away = np.abs(self.data.qpos[:3] - [0, 0, 2.0] - self.cage.middle) - self.cage.size / 2
-            if away.max() > 0:
+            place = self.data.qpos[:3] - [0, 0, 2.0]
+            boxes = [(self.cage.middle, self.cage.size), self.cage._trap()[0]]
+            if all((np.abs(place - centre) > size / 2).any() for centre, size in boxes):
                 return True
         return False
 
@@ -148,21 +153,47 @@ def test_the_walls_of_a_closed_cage_keep_the_smallest_ball():
     assert not Shaken(HoledCage(closed=True, sill=0.0), 0.008).gets_out(shaking, 8.0)
 
 
+def rolled(cage, radius, tilt, start, way):
+    """Where a ball is, in the cage's axes [m], after 2 s on a floor tilted [rad] towards `way`, which is 1 or -1."""
+    scene = table()
+    scene.option.gravity = [way * 9.81 * math.sin(tilt), 0, -9.81 * math.cos(tilt)]
+    place(scene, cage, "cage", [0, 0, 2.0], free=False)
+    place(scene, Ball(radius=radius), "ball", [start[0], 0, 2.0 + start[1]])
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 1000)
+    return data.qpos[:3] - [0, 0, 2.0]
+
+
 @pytest.mark.parametrize(("more", "rolls"), [(-1.5, False), (1.5, True)])
 @pytest.mark.parametrize(
     ("sill", "radius", "angle"), [(0.003, 0.015, 36.87), (0.005, 0.015, 48.19), (0.005, 0.012, 54.31)]
 )
 def test_a_ball_rolls_over_the_sill_where_its_centre_passes_the_edge(sill, radius, angle, more, rolls):
     """The vertical through the centre must pass the edge: cos(tilt) = 1 - sill / radius."""
-    cage, scene = HoledCage(sill=sill, closed=True), table()
+    cage = HoledCage(sill=sill, closed=True)
     tilt = cage.tilt_over_sill(radius)
     assert math.degrees(tilt) == pytest.approx(angle, abs=0.01)
-    down = tilt + math.radians(more)
-    scene.option.gravity = [9.81 * math.sin(down), 0, -9.81 * math.cos(down)]
-    place(scene, cage, "cage", [0, 0, 2.0], free=False)
-    against = cage.sill_x - cage.wall / 2 - math.sqrt(2 * radius * sill - sill**2)
-    place(scene, Ball(radius=radius), "ball", [against, 0, 2.0 + cage.wall + radius])
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 1000)
-    assert (data.qpos[0] > cage.sill_x) == rolls
+    against = cage.sill_x - cage.beside(sill, radius)
+    end = rolled(cage, radius, tilt + math.radians(more), (against, cage.wall + radius), 1.0)
+    assert (end[0] > cage.sill_x) == rolls
+
+
+@pytest.mark.parametrize(("more", "falls"), [(-1.5, False), (1.5, True)])
+@pytest.mark.parametrize(("sill", "angle"), [(0.0012, 23.07), (0.0020, 29.93)])
+def test_the_same_law_holds_for_the_sill_of_the_trap_and_the_ball_sinks_in(sill, angle, more, falls):
+    cage, radius = HoledCage(trap_sill=sill), 0.015
+    tilt = cage.tilt_into_trap(radius)
+    assert math.degrees(tilt) == pytest.approx(angle, abs=0.01)
+    against = cage.trap_x + cage.beside(sill, radius)
+    end = rolled(cage, radius, tilt + math.radians(more), (against, cage.wall + radius), -1.0)
+    assert cage.traps(end, radius) == falls and (end[0] < cage.trap_x) == falls
+
+
+@pytest.mark.parametrize(("trap", "angle", "tilt", "stays"), [(0.016, 90.0, 80.0, True), (0.005, 54.1, 57.0, False)])
+def test_out_of_a_trap_deeper_than_its_radius_no_ball_rolls_again(trap, angle, tilt, stays):
+    """The sill on top counts: of the shallow one it makes a step of 6.2 mm, and cos(54.1 deg) = 1 - 6.2 / 15."""
+    cage, radius = HoledCage(trap=trap, closed=True), 0.015
+    assert math.degrees(cage.tilt_out_of_trap(radius)) == pytest.approx(angle, abs=0.1)
+    start = (cage.trap_x - cage.wall / 2 - radius, cage.wall - trap + radius)
+    assert (rolled(cage, radius, math.radians(tilt), start, 1.0)[0] < cage.trap_x) == stays
