@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base
+.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base
 
 setup: $(READY)
 
@@ -27,6 +27,10 @@ demo: setup
 test: setup
 	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
 	$(BIN)/python -m pytest -n 2
+
+# Tests that simulate for minutes: coverage of intervals, power.
+slow: setup
+	$(BIN)/python -m pytest -n 2 -m slow
 
 # Mangled command lines: each must end with exit 0, 1 or 2 and one line with a remedy. FUZZ of them, from SEED.
 FUZZ ?= 2000

@@ -4,8 +4,8 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..parallel import each
 from ..pool import Pool, PoolRow
 from ..samplers.keyed import unit
 from ..samplers.split import ID
-from ..statistics import Difference, Rate, difference, rate
+from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
 from ..targets import refused, try_folder
 from .policies import REPLAY, Policy, blamed, find, identity, made
 
@@ -127,29 +127,38 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evalua
         done = len(wanted) - len(todo)
         progress(done, len(wanted))
         for count, episode in enumerate(each(player, todo, settings.workers), done + 1):
-            log.add({**about[episode["pool"], episode["scenario"]], **episode})
+            log.add({"task": about[episode["pool"], episode["scenario"]]["task"], **episode})
             progress(count, len(wanted))
         episodes = sorted(
-            (e for e in log.records if _id(e) in wanted),
+            ({**about[e["pool"], e["scenario"]], **e} for e in log.records if _id(e) in wanted),
             key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
         )
         return Evaluation(episodes, done)
 
 
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[Line]:
-    """The paper's table: one line for every task and OOD split, for every category, and for all together.
+    """The paper's table: one line for every task and OOD split, for every category, and for all tasks together.
 
-    A category's rate is over all its scenarios: with as many scenarios for each task, the mean of its tasks.
+    A scenario counts once, whatever the number of its rollouts. Scenario i of an axis is scenario i of training with
+    the axis moved: differences are taken within twins where training has at least half of them, and a line over several
+    axes takes the mean over them for each i first. Categories are means over their tasks, with equal weights on both
+    sides: tasks with many axes count no more than others.
     """
-    lines = []
+    lines, whole = [], []
     for task in _distinct(episodes, "task"):
-        mine = [e for e in episodes if e["task"] == task]
-        lines += [_line(task, split, mine) for split in _distinct(mine, "split") if split != ID] or [
-            _line(task, ID, mine)
-        ]
-    for category in _distinct(episodes, "category"):
-        lines.append(_line(category, "all", [e for e in episodes if e["category"] == category]))
-    return [*lines, _line("all", "all", episodes)]
+        cells = _cells(e for e in episodes if e["task"] == task)
+        training, axes = cells.pop(ID, {}), cells
+        lines += [_line(task, axis, training, [shares]) for axis, shares in axes.items()]
+        every = _line(task, "all", training, list(axes.values()))
+        if len(axes) > 1:
+            lines.append(every)
+        elif not axes:
+            lines.append(replace(every, split=ID))
+        category = next(e["category"] for e in episodes if e["task"] == task)
+        whole.append((category, every))
+    for category in dict.fromkeys(name for name, _ in whole):
+        lines.append(_mean_line(category, [line for name, line in whole if name == category]))
+    return [*lines, _mean_line("all", [line for _, line in whole])]
 
 
 def markdown(lines: Sequence[Line], settings: Settings) -> str:
@@ -171,21 +180,51 @@ def plain(lines: Sequence[Line]) -> list[dict[str, Any]]:
     return [asdict(line) for line in lines]
 
 
-def _line(what: str, split: str, episodes: Sequence[Mapping[str, Any]]) -> Line:
-    training = [e for e in episodes if e["split"] == ID]
-    shifted = [e for e in episodes if e["split"] != ID and split in ("all", e["split"])]
-    inside = rate(_clusters(training)) if training else None
-    outside = rate(_clusters(shifted)) if shifted else None
-    apart = difference(outside, inside) if inside and outside else None
+Cells = dict[tuple[int, int], list[bool]]
+"""Outcomes of the rollouts of each scenario of a split, by seed and index: twins have the same in all splits."""
+
+
+def _cells(episodes: Iterable[Mapping[str, Any]]) -> dict[str, Cells]:
+    """By split."""
+    found: dict[str, Cells] = {}
+    for e in episodes:
+        found.setdefault(e["split"], {}).setdefault((e["seed"], e["index"]), []).append(e["success"])
+    return found
+
+
+def _line(what: str, split: str, training: Cells, axes: Sequence[Cells]) -> Line:
+    """One task. Several axes are averaged over the scenarios that all of them have."""
+    inside = rate(list(training.values())) if training else None
+    shared = [key for key in axes[0] if all(key in axis for axis in axes)] if axes else []
+    if not shared:
+        return Line(what, split, inside, None, None)
+    outcomes = {key: [success for axis in axes for success in _equally(axis[key], axes, key)] for key in shared}
+    outside = rate(list(outcomes.values()))
+    twins = [key for key in shared if key in training]
+    if inside is None:
+        return Line(what, split, None, outside, None)
+    if 2 * len(twins) >= len(shared) and len(twins) > 1:
+        apart = paired([outcomes[key] for key in twins], [training[key] for key in twins])
+    else:
+        apart = difference(outside, inside)
     return Line(what, split, inside, outside, apart)
 
 
-def _clusters(episodes: Sequence[Mapping[str, Any]]) -> list[list[bool]]:
-    def key(episode: Mapping[str, Any]) -> tuple[str, str]:
-        return episode["pool"], episode["scenario"]
+def _equally(outcomes: list[bool], axes: Sequence[Cells], key: tuple[int, int]) -> list[bool]:
+    """As many rollouts of every axis, so that each has the same weight."""
+    return outcomes[: min(len(axis[key]) for axis in axes)]
 
-    ordered = sorted(episodes, key=key)
-    return [[e["success"] for e in group] for _, group in itertools.groupby(ordered, key)]
+
+def _mean_line(what: str, lines: Sequence[Line]) -> Line:
+    """The mean of some tasks, over those that have both sides if any has."""
+    both = [line for line in lines if line.difference is not None]
+    if not both:
+        inside = [line.id for line in lines if line.id is not None]
+        outside = [line.ood for line in lines if line.ood is not None]
+        return Line(what, "all", mean_rate(inside) if inside else None, mean_rate(outside) if outside else None, None)
+    parts = [(line.id, line.ood, line.difference) for line in both]
+    inside, outside, apart = ([part for part in column if part is not None] for column in zip(*parts, strict=True))
+    return Line(what, "all", mean_rate(inside), mean_rate(outside), mean_difference(apart))
 
 
 def _distinct(episodes: Sequence[Mapping[str, Any]], name: str) -> list[str]:
@@ -203,14 +242,12 @@ def _id(episode: Mapping[str, Any]) -> RolloutId:
 
 
 def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
-    """Task, category and split of the first scenarios of a pool, by the pool's folder and their ids."""
+    """What the table needs to know of the first scenarios of a pool, by the pool's folder and their ids."""
     if len(pool) < seeds:
         raise BadConfig(f"seeds = {seeds}, but {pool.folder} holds {len(pool)} scenarios; say seeds={len(pool)}")
-    rows = itertools.islice(pool.columns("id", "task", "category", "split"), seeds)
-    return {
-        (str(pool.folder), id_): {"task": task, "category": category, "split": split}
-        for id_, task, category, split in rows
-    }
+    names = ("task", "category", "split", "seed", "index")
+    rows = itertools.islice(pool.columns("id", *names), seeds)
+    return {(str(pool.folder), id_): dict(zip(names, told, strict=True)) for id_, *told in rows}
 
 
 def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:

@@ -61,7 +61,7 @@ def test_the_table_pairs_each_split_with_training(tmp_path):
     def episode(task, split, scenario, success):
         return {
             **{"task": task, "category": "P3", "split": split, "pool": split, "scenario": scenario},
-            **{"rollout": 0, "success": success},
+            **{"rollout": 0, "success": success, "seed": 0, "index": int(scenario)},
         }
 
     lines = table(
@@ -72,7 +72,33 @@ def test_the_table_pairs_each_split_with_training(tmp_path):
     told = {(line.what, line.split): line for line in lines}
     assert told["a", "far"].difference.value == pytest.approx(-0.75)
     assert told["b", "id"].ood is None and told["b", "id"].id.value == 0.5
-    assert told["P3", "all"].id.value == 0.75 and told["all", "all"].ood.value == 0.25
+    assert told["a", "far"].difference.twins == 4
+    assert told["all", "all"].difference.value == pytest.approx(-0.75), "task b has no other side, and weighs on none"
+
+
+def test_tasks_with_many_axes_weigh_no_more_than_others():
+    """Nothing is harder out of distribution; pooled, the task with nine axes would feign a drop of 13 points."""
+
+    def episodes(task, splits, share):
+        for split in splits:
+            for index in range(10):
+                about = {"task": task, "category": "P3", "split": split, "pool": split, "scenario": f"{split}{index}"}
+                yield {**about, "rollout": 0, "success": index < 10 * share, "seed": 0, "index": index}
+
+    hard = episodes("hard", ["id", *map(str, range(9))], 0.2)
+    easy = episodes("easy", ["id", *map(str, range(4))], 0.9)
+    lines = {(line.what, line.split): line for line in table([*hard, *easy])}
+    assert lines["all", "all"].difference.value == 0.0 and lines["all", "all"].id.value == pytest.approx(0.55)
+    assert lines["hard", "all"].ood.scenarios == 10, "scenario i of nine axes is one scenario"
+
+
+def test_sides_without_twins_are_compared_unpaired():
+    def episode(split, seed, index):
+        about = {"task": "a", "category": "P3", "split": split, "pool": split, "scenario": f"{seed}/{index}"}
+        return {**about, "rollout": 0, "success": index < 3, "seed": seed, "index": index}
+
+    (line, *_) = table([episode("id", 0, i) for i in range(6)] + [episode("far", 1, i) for i in range(6)])
+    assert line.difference.twins == 0 and line.difference.value == 0.0
 
 
 def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkeypatch, capsys):
