@@ -130,6 +130,13 @@ class Ramp(Prop):
         x = self.bend * math.sin(arc / self.bend) + (s - arc) * math.cos(self.slope)
         return np.array([x, 0.0, THICKNESS + self.height(s)])
 
+    def below(self, x: float) -> float:
+        """Where on the floor a point is that is `x` along the ramp, level, from the middle of the valley [m]."""
+        level = self.bend * math.sin(self.slope)
+        if abs(x) <= level:
+            return self.bend * math.asin(x / self.bend)
+        return math.copysign(self.foot + (abs(x) - level) / math.cos(self.slope), x)
+
     # --- motion of a ball -----------------------------------------------------------------
 
     @property

@@ -127,6 +127,13 @@ def test_the_floor_is_where_the_formulas_say_and_no_seam_stands_out(angle, bend,
     assert 1.0 - above == pytest.approx(point[2], abs=2e-5)
 
 
+@given(angle=st.floats(10.0, 60.0), bend=st.floats(0.05, 0.14), at=st.floats(-0.98, 0.98))
+@settings(max_examples=60, deadline=None)
+def test_the_place_below_a_point_is_found(angle, bend, at):
+    ramp = Ramp(angle=angle, bend=bend)
+    assert ramp.below(ramp.floor(at * ramp.top)[0]) == pytest.approx(at * ramp.top, abs=1e-9)
+
+
 @given(level=st.floats(0.3, 0.8), angle=angles, friction=st.floats(0.0, 0.5))
 @settings(max_examples=15, deadline=None)
 def test_the_height_of_release_leads_to_the_middle_of_the_patch(level, angle, friction):

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from scengen import config
 from scengen.assets.ball import Ball
 from scengen.assets.ramp import Ramp
-from scengen.params import with_values
+from scengen.params import parameters, with_values
 from scengen.tasks.galileo_ramp_drop import GalileoRampDrop
 
 TASK = config.task("galileo_ramp_drop")
@@ -100,6 +100,23 @@ def test_a_ball_that_falls_short_may_not_be_caught_and_let_go_again():
     episode = play_shortcut(TASK, NOMINAL, "catch_it_and_try_higher")
     assert episode.reason == "the ball was touched again after its run"
     assert play_shortcut(TASK, unguarded(GalileoRampDrop)(), "catch_it_and_try_higher").solved
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bouncing(GalileoRampDrop):
+    """The ball may fall on the ramp."""
+
+    def gap(self, point):
+        return 0.0
+
+
+def test_a_ball_may_not_fall_on_the_ramp():
+    """One that bounces may come down on the patch, from a place that looks at nothing."""
+    sound = TASK.draw("id", 0, 5).scenario
+    bouncing = with_values(Bouncing(), {p.name: p.nominal for p in parameters(sound)})
+    assert play_shortcut(TASK, bouncing, "let_it_bounce_across").solved
+    episode = play_shortcut(TASK, sound, "let_it_bounce_across")
+    assert episode.reason == "the ball was not let go on the floor of the ramp"
 
 
 @pytest.mark.parametrize("off", [-0.06, 0.06])
