@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from .control import native
 from .errors import ScengenError
@@ -35,6 +35,10 @@ class Limits:
     """Wall-clock time [s]."""
     megabytes: int
     """Memory beyond what a worker has when it starts [MB]."""
+
+
+SHOWN = Limits(300.0, 4000)
+"""Of one scenario of a pool that is shown, exported or recorded: it comes from a stranger. Seconds would do."""
 
 
 def each(
@@ -89,6 +93,23 @@ def each(
     finally:
         for worker in crew:
             worker.end()
+
+
+def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
+    """What a function makes of one item, in a process of its own that is ended at a limit.
+
+    Args:
+        what: is done, for the error: `filming 8ed4a4577fe0`.
+
+    Raises:
+        WorkerDied: the process has crashed, or has reached a limit.
+    """
+
+    def lost(item: A, reason: str) -> NoReturn:
+        raise WorkerDied(f"{what} {reason}; see scengen verify for what is wrong with the pool")
+
+    (result,) = each(function, [item], 1, limits, lost)
+    return result
 
 
 _NOTHING: Any = object()

@@ -14,6 +14,7 @@ from ..parallel import Limits, each
 from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
+from ..schema import why_no_plain_file
 from ..sim import scene_text
 from ..sim.world import World
 from ..validate.identity import source_sha256
@@ -231,6 +232,9 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
     for entry in told.get("hits", []):
         try:
             path = pool.folder / entry["file"]
+            if why := why_no_plain_file(path):
+                yield entry["file"], f"the hit {why}"
+                continue
             found = Hit.load(path)
             listed = {key: value for key, value in entry.items() if key not in ("file", "sha256")}
             if sha256(path.read_bytes()) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:

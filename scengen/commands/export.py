@@ -1,14 +1,16 @@
 """write scenes that open in plain MuJoCo from anywhere"""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ..config import read
 from ..export.mjcf import export
-from ..pool import Pool
+from ..parallel import SHOWN, each
+from ..pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
 from ..targets import try_folder
-from . import OK, Arguments, err, one, say
+from . import FAILED, OK, Arguments, err, one, say, warn
 
 
 @dataclass(frozen=True)
@@ -25,10 +27,18 @@ def command(arguments: Arguments) -> int:
     settings = read("export", arguments, Settings)
     try_folder(settings.to)
     pool = Pool.open(one(settings.pool)).check()
-    rows = [pool.row(settings.id)] if settings.id else list(pool.rows(witness=False))
-    with ProgressBar(err, f"export to {settings.to}", len(rows)) as progress_bar:
-        for count, row in enumerate(rows, 1):
-            export(row, Path(settings.to), settings.robot)
+    rows = [pool.row(settings.id)] if settings.id else pool.rows(witness=False)
+    count, lost = 0, []
+    with ProgressBar(err, f"export to {settings.to}", 1 if settings.id else len(pool)) as progress_bar:
+        work = partial(export, folder=Path(settings.to), robot=settings.robot)
+        for count, why in enumerate(each(work, rows, 1, SHOWN, _lost), 1):
+            lost += [why] if why else []
             progress_bar.show(count)
-    say(f"wrote {len(rows)} scenes to {settings.to}")
-    return OK
+    for why in lost:
+        warn(f"UNKNOWN {why}")
+    say(f"wrote {count - len(lost)} scenes to {settings.to}")
+    return FAILED if lost else OK
+
+
+def _lost(row: PoolRow, reason: str) -> str:
+    return f"{row.id}: its export {reason}"

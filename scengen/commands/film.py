@@ -13,6 +13,7 @@ from ..pictures.render import encode
 from ..pool import Pool
 from ..sim import scene_text
 from ..targets import try_file
+from ..validate.playable import check_row
 from . import OK, Arguments, one, say, write
 
 STRIP = 100_000_000
@@ -68,7 +69,7 @@ def command(arguments: Arguments) -> int:
 
 def _of_pool(settings: Settings, arguments: Arguments) -> Take:
     """The witness of a scenario in a pool, or one of its shortcuts."""
-    row = Pool.open(one(settings.pool)).check().row(str(settings.id))
+    row = check_row(Pool.open(one(settings.pool)).check().row(str(settings.id)))
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     if settings.of == WITNESS:
         return Take.witness(row, scenario)

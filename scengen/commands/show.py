@@ -9,6 +9,7 @@ from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
 from ..pool import Pool
 from ..targets import try_file
+from ..validate.playable import check_row
 from . import OK, Arguments, out, remark, say, several, write
 
 
@@ -49,7 +50,7 @@ def command(arguments: Arguments) -> int:
             out.print(table)
         if target:
             scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
-            write(target, render.encode(film.strip(film.Take.witness(row, scenario)), "png"))
+            write(target, render.encode(film.strip(film.Take.witness(check_row(row), scenario)), "png"))
     if target:
         say(f"wrote {target}")
     return OK

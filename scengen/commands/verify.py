@@ -13,11 +13,12 @@ from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
-from ..parallel import Limits
+from ..parallel import Limits, WorkerDied, apart
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..targets import try_file
+from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
 from ..validate.verify import Options, Report, verify
@@ -59,17 +60,19 @@ def command(arguments: Arguments) -> int:
         return _hits(settings, arguments)
     pool = Pool.open(one(settings.pool))
     task = config.task(pool.task, search_path(arguments))
+    limits = Limits(settings.limit_seconds, settings.limit_mb)
     options = Options(
         settings.level,
         settings.sample,
         secrets.randbelow(2**32) if settings.seed is None else settings.seed,
         settings.workers,
-        Limits(settings.limit_seconds, settings.limit_mb),
+        limits,
         settings.expired == "fail",
         attacked,
     )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        report = _with_hits(verify(pool, task, config.levels(task), options, progress_bar.show), pool, task)
+        report = verify(pool, task, config.levels(task), options, progress_bar.show)
+    report = _with_hits(report, pool, task, limits)
     if settings.json:
         write_json(settings.json, {"pool_sha256": pool.sha256, **asdict(report)})
     if settings.junit:
@@ -78,10 +81,21 @@ def command(arguments: Arguments) -> int:
     return STATUS[report.verdict]
 
 
-def _with_hits(report: Report, pool: Pool, task: Task) -> Report:
-    """The report, with what is wrong about the attack that the manifest tells of."""
-    wrong = [{"id": name, "verdict": "refuted", "reason": why} for name, why in wrong_hits(pool, task)]
-    return replace(report, failed=[*report.failed, *wrong], verdict="refuted") if wrong else report
+def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report:
+    """The report on a pool that holds so far, with what is wrong about the attack that its manifest tells of."""
+    if report.verdict != "sound" or "attack" not in pool.manifest:
+        return report
+    verdict: Verdict = "refuted"
+    try:
+        found = apart(_wrong_hits, (pool, task), limits, "replaying the hits of its attack")
+    except WorkerDied as error:
+        found, verdict = [("attack", str(error))], "declined"
+    wrong = [{"id": name, "verdict": verdict, "reason": why} for name, why in found]
+    return replace(report, failed=[*report.failed, *wrong], verdict=verdict) if wrong else report
+
+
+def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
+    return list(wrong_hits(*of))
 
 
 def _hits(settings: Settings, arguments: Arguments) -> int:

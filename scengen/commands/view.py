@@ -6,6 +6,7 @@ from .. import config
 from ..config import read, search_path
 from ..pictures.view import check_display, view
 from ..pool import Pool
+from ..validate.playable import check_row
 from . import OK, Arguments, one
 
 
@@ -23,5 +24,6 @@ def command(arguments: Arguments) -> int:
     row = Pool.open(one(settings.pool)).check().row(settings.id)
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     check_display()
+    check_row(row)
     view(row, scenario, settings.replay)
     return OK

@@ -18,6 +18,7 @@ from ..samplers.axis import spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task
 from ..targets import write
+from ..validate.playable import check_scene
 from . import render
 
 
@@ -154,6 +155,7 @@ def template(name: str) -> jinja2.Template:
 
 def thumbnail(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> str:
     """A picture of the start of a scenario, as a data address for HTML."""
+    check_scene(scene_xml, embodiment)
     with render.camera(scene_xml, embodiment, width, height) as view:
         return render.address(render.encode(view.take()), "webp")
 

@@ -1,0 +1,38 @@
+"""Whether what a stranger's pool holds can be played at all: tried where it can be ended, before it is looked at."""
+
+from contextlib import suppress
+
+from ..episode import Actions
+from ..errors import Unstable
+from ..parallel import SHOWN, apart
+from ..pool import NO_WITNESS, PoolRow
+from ..sim.world import World
+
+Played = tuple[str, str, Actions]
+"""A scene, its robot, and what is done in it."""
+
+
+def play(what: Played) -> str:
+    """Compile a scene and play actions in it, without looking at what comes of it. Returns nothing."""
+    scene_xml, embodiment, actions = what
+    world = World.load(scene_xml, embodiment)
+    world.reset()
+    with suppress(Unstable):  # whoever looks at it sees that too
+        for action in actions:
+            world.apply(action)
+    return ""
+
+
+def check_row(row: PoolRow) -> PoolRow:
+    """Refuse a scenario that crashes, or takes more than a scenario may.
+
+    Raises:
+        ScengenError: it does; or its scene does not compile.
+    """
+    apart(play, (row.scene_xml, row.embodiment, row.witness), SHOWN, f"playing {row.id}")
+    return row
+
+
+def check_scene(scene_xml: str, embodiment: str) -> None:
+    """The same of a scene at its start."""
+    apart(play, (scene_xml, embodiment, NO_WITNESS), SHOWN, "compiling a scene")
