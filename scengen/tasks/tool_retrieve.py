@@ -16,6 +16,8 @@ the cube in any posture, by a bound that ignores joint limits (`ik.TOUCH`), so t
 The goal. The paper's "lift the cube above the table" has no numbers. Here: 4 cm above its height on the table, as in
 robosuite's Lift; held by the robot and by nothing else, the hook let go ("set the hook down, then grasp the cube and
 lift"), for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule: a policy may push, sweep or throw.
+Where the cube stands is no secret either, since a hook swept along the far edge brings it from anywhere; so there is no
+`answer` to guess. A hook that falls off the table is not fetched again, but may have done what it was for.
 """
 
 import math
