@@ -199,8 +199,8 @@ class Pool:
 
     @property
     def about(self) -> dict[str, Any]:
-        """The manifest without what `write` adds to it."""
-        return {k: v for k, v in self.manifest.items() if k not in ("format", "shards", "rejected")}
+        """The manifest without what `write` adds to it, and without an attack, whose hits are files beside it."""
+        return {k: v for k, v in self.manifest.items() if k not in ("format", "shards", "rejected", "attack")}
 
     # --- the shards -------------------------------------------------------------------------
 

@@ -157,7 +157,8 @@ def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Mapping[int, in
     expected = {
         key: times
         for key, times in pool.reasons.items()
-        if not key.startswith("feasible: ") and CHECKS.get(key.partition(": ")[0]) in pool.manifest["config"]["keep"]
+        if (name := key.partition(": ")[0]) not in ("feasible", "attack")  # of which nothing is kept
+        and CHECKS.get(name) in pool.manifest["config"]["keep"]
     }
     if Counter(reject.reason for reject in kept) != expected:
         yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {_told(expected)}"
@@ -166,13 +167,15 @@ def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Mapping[int, in
 def wrong_losses(pool: Pool, again: Mapping[int, str]) -> Iterator[str]:
     """Where the reasons of a manifest are not those for which its other feasible scenarios fail here.
 
-    A scenario that had ended its process, or reached a limit of its author's machine, may come to any end.
+    A scenario that had ended its process, or reached a limit of its author's machine, may come to any end; so may one
+    that an attack on the finished pool has refuted, of which no certificate knows.
 
     Args:
         again: why each of them is not certified, by index; empty for one that is.
     """
     told = Counter({key: times for key, times in pool.reasons.items() if not key.startswith("feasible: ")})
-    lost = sum(told.pop(key) for key in list(told) if key.startswith(f"{PROCESS}: "))
+    free = (PROCESS, "attack") if "attack" in pool.manifest else (PROCESS,)
+    lost = sum(told.pop(key) for key in list(told) if key.partition(": ")[0] in free)
     found = Counter(again.values())
     if (missing := told - found) or (found - told).total() > lost:
         certified = f"; {found['']} of them are certified here" if found[""] else ""
