@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base
+.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -79,6 +79,11 @@ docs: setup
 CHECKER ?= scengen always parse hashes
 checker: setup
 	$(BIN)/python tests/checker/run_corpus.py --checker $(CHECKER) --json generated/checker/report.json
+
+# Sound pools with one value changed: what is accepted must be the author's word, or told. MUTANTS of them, from SEED.
+MUTANTS ?= 2000
+mutants: setup
+	$(BIN)/python tests/checker/mutants.py $(MUTANTS) $(SEED)
 
 # The sound pools that the corpus is made from; make them anew when a family changes.
 checker-base: setup
