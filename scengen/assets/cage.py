@@ -338,6 +338,16 @@ class HoledCage(Prop):
         return solid(body, name, size, pos, type=type, friction=self.friction, mass=0.0, group=3)
 
 
+def lowered(tilt: float) -> Vec3:
+    """Where down is, in the axes of a cage whose end at +x is lowered by `tilt` [rad]."""
+    return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
+
+
+def lean(rot: Mat3) -> float:
+    """How far the end at +x of a cage is lowered [rad], as a ball feels it that is free to roll along the cage."""
+    return math.atan2(-rot[2, 0], rot[2, 2])
+
+
 def _tilt_over(height: float, radius: float) -> float:
     """Tilt of the floor at which a ball that lies against a bar or a step rolls over it [rad].
 

@@ -6,11 +6,10 @@
      |___|[==========]
             |     |
 
-Bottleneck: two things keep the ball in, and each hides the other. The stool blocks the hole, so that no tilt helps
-before the cage is lifted; the sill holds the ball, so that no lift helps before the cage is tilted past the angle at
-which it rolls over: cos(tilt) = 1 - sill / radius (43.4 deg nominally). Towards the right end: over the other sill the
-ball rolls at 23.1 deg, into a pit that is deeper than its radius, so that no tilt brings it back. To which end the hole
-points has to be seen. It is a choice among two, and half of the guesses are right.
+Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted; the sill holds the ball, so that
+no lift helps before the cage is tilted past the angle at which it rolls over: cos(tilt) = 1 - sill / radius (43.4 deg
+nominally). Over the other sill it rolls at 23.1 deg, into a pit deeper than its radius, out of which no tilt leads. At
+which end the hole is has to be seen: it is a choice among two, and half of the guesses are right.
 
 Decisions. The paper gives the story, no numbers. (1) Sills and trap are ours. On a bare floor the ball lies wherever
 the last jerk has left it, lifting alone empties the cage, and a wrong tilt costs nothing. The ball has 5 mm of room
@@ -18,23 +17,21 @@ between the sills: with more it takes a run-up and jumps at half the angle. (2) 
 holds the ball up to an acceleration of g tan(tilt), 4.2 m/s^2 before the trap and 9.3 before the hole. A blind shake
 fills the trap first; one to a side, or of a cage that is half tilted, may free the ball. So it must pass the sill while
 the floor is tilted as the law says, less `GIVE`. (3) The jaw holds the cage across its width, the one edge that it can
-span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a tipping stool would be another task.
-(5) The ball must come to rest on the table; on the floor it is out of reach, hence lost. It rolls like a felt ball
-(coefficient 0.04); a steel ball would leave every table. (6) The cage may not touch the table: a cage that is knocked
-off its stool tumbles, and tilts without anybody having thought about it.
+span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a tipping one would be another task.
+(5) The ball must come to rest on the table. It rolls like felt (coefficient 0.04); a steel ball would leave the table.
+(6) The cage may not touch the table: knocked off its stool it tilts without anybody's thought.
 """
 
-import dataclasses
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
-from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage
+from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage, lean, lowered
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
 from ..geometry import UP, Mat3, Vec3, about_z, shortest
@@ -52,8 +49,7 @@ LEAST_HELD = math.radians(20.0)
 """Least tilt that each sill must withstand [rad]. A hand that carries the cage level tilts it by up to 3 deg, and
 brakes at up to 2 m/s^2, which tilts the apparent gravity by 12 deg."""
 STEEPEST = math.radians(72.0)
-"""Tilt that the hand reaches low over the table at every heading that `present` may choose [rad], tried on the model
-between x = -0.2 and 0 m."""
+"""Tilt that the hand reaches at every heading that `present` may choose [rad], tried for x from -0.2 to 0 m."""
 SPARE = math.radians(10.0)
 """How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives some degrees."""
 HOLD_AT_END = 0.25
@@ -65,13 +61,12 @@ ROOM = 0.040
 ASIDE = 0.19
 """How far from the stool the cage is emptied [m]: the tilted cage and the stool reach 0.07 m each."""
 WIDEST = math.radians(55.0)
-"""The cage is emptied towards a heading between straight ahead and this far to the middle [rad]: there the hand can
-lean far, and the ball has half a metre to run out."""
+"""How far from straight ahead, to the middle, the cage is emptied at most [rad]: the ball has half a metre there."""
 CLEAR = 0.004
 """Least air between trap and stool, and between trap and table [m]: nobody places a cage more exactly than 2 mm."""
 GIVE = math.radians(6.0)
-"""How far below the angle of the law the ball may pass the sill [rad]. As the floor turns at up to 2 rad/s, filtered or
-raw, the ball passes at 1.9 deg over it or more (160 rollouts); at 3 rad/s, 3 of 40 pass at 6 to 9 deg below."""
+"""How far below the angle of the law the ball may pass the sill [rad]. Where the floor turns at up to 2 rad/s it
+passes at 1.9 deg above it or more (160 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 9 deg below."""
 LEVEL = Pace(0.20, 0.01)
 """With the cage in the hand: slow enough for the sill to hold the ball."""
 
@@ -104,7 +99,7 @@ class BallCageEscape(Scenario):
         ball = self.foot + self.axes @ [self.ball_x, self.ball_y, self.cage.wall + self.ball.radius]
         place(scene, self.stool, "stool", stool, yaw, free=False)
         place(scene, self.cage, "cage", self.foot, yaw)
-        place(scene, dataclasses.replace(self.ball, rolling=self.rolling), "ball", ball)
+        place(scene, replace(self.ball, rolling=self.rolling), "ball", ball)
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -117,10 +112,10 @@ class BallCageEscape(Scenario):
             return "the ball fell off the table"
         if world.touched("cage", "table") or fallen(world, "cage", below=0.0):
             return "the cage was dropped or set down"
-        place, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
-        if self.cage.traps(place, r):
+        at, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
+        if self.cage.traps(at, r):
             return "the ball fell into the trap"
-        if self.cage.on_sill(place, r) and lean(world) < self.cage.tilt_over_sill(r) - GIVE:
+        if self.cage.on_sill(at, r) and lean(world.rot("cage")) < self.cage.tilt_over_sill(r) - GIVE:
             return "the ball was shaken over the sill"
         return None
 
@@ -135,23 +130,24 @@ class BallCageEscape(Scenario):
         """Lift the cage, carry it aside, tip it until the ball is over the sill, and on until it is out."""
         yield from self.pick_up(world)
         yield from self.present(world, self.tilts()[-1])
-        for down in self.tilts():
-            yield from self.tip(world, down)
-            yield from self.watch(world)
-        for shallow in (10.0, -5.0) * 3:  # past the hole at a steep tilt: back it comes, at a gentle one
+        gentle = [
+            lowered(math.radians(tilt)) for tilt in (10.0, -5.0) * 3
+        ]  # brings back a ball that has passed the hole
+        for down in [*self.tilts(), *gentle]:
             if self.out(world):
                 break
-            yield from self.tip(world, _towards_end(math.radians(shallow)))
-            yield from self.watch(world)
+            yield from self.tip(world, down)
+            yield from hold(world.arm, 0.3)
+            yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", STILL), give_up=3.0)
         yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def tilts(self) -> list[Vec3]:
         """Where down must be, in the cage's axes, one after the other: unit vectors."""
         steep = self.least_tilt + SPARE
         if self.cage.face != SIDE:
-            return [_towards_end(steep)]
+            return [lowered(steep)]
         aside = np.array([HOLD_AT_END, math.sin(steep), -math.cos(steep)])
-        return [_towards_end(self.cage.tilt_over_sill(self.ball.radius) + SPARE), aside / np.linalg.norm(aside)]
+        return [lowered(self.cage.tilt_over_sill(self.ball.radius) + SPARE), aside / np.linalg.norm(aside)]
 
     def pick_up(self, world: World) -> Plan:
         """Take the cage by its width and lift it clear of the stool."""
@@ -160,8 +156,7 @@ class BallCageEscape(Scenario):
     def present(self, world: World, down: Vec3) -> Plan:
         """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
 
-        The place is towards the middle of the table, but to the left where the leaning end is to face about: joint 7
-        starts at 45 deg, and has room for half a turn one way only.
+        The place is towards the middle, but to the left where the end must face about: there joint 7 has half a turn.
         """
         arm, steep, leaning = world.arm, math.acos(-down[2]), world.rot("cage") @ down
         side = -1.0 if self.y > 0 and (leaning[0] > 0 or self.cage.face == SIDE) else 1.0
@@ -174,8 +169,7 @@ class BallCageEscape(Scenario):
     def _turn_to_front(self, arm: Arm, leaning: Vec3, side: float) -> float:
         """The least turn of the hand that takes a direction to the front, or up to `WIDEST` to a side of it [rad].
 
-        With a hole in a side it is the turn that takes it straightest to the front, as far as joint 7 can go: such a
-        cage is tipped towards its end first, and the end must not point to the robot.
+        With a hole in a side it is the straightest: the end, which is lowered first, must not point to the robot.
         """
         heading, laps = math.atan2(leaning[1], leaning[0]), (-2 * math.pi, 0.0, 2 * math.pi)
         aside = {side * front - heading + lap: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
@@ -186,11 +180,6 @@ class BallCageEscape(Scenario):
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
         rot = shortest(world.rot("cage") @ down, -UP) @ world.arm.hand_rot
         yield from turn_to(world.arm, rot, rate, until=lambda: self.out(world))
-
-    def watch(self, world: World) -> Plan:
-        """Wait until the ball has come to rest in the cage, or is out."""
-        yield from hold(world.arm, 0.3)
-        yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", STILL), give_up=3.0)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -208,11 +197,11 @@ class BallCageEscape(Scenario):
         }
 
     def tip_only(self, world: World, *tilts: float) -> Plan:
-        """As the oracle, with other tilts [rad], one after the other, and nothing after them."""
+        """As the oracle, with other tilts [rad], and nothing after them."""
         yield from self.pick_up(world)
-        yield from self.present(world, _towards_end(tilts[-1]))
+        yield from self.present(world, lowered(tilts[-1]))
         for tilt in tilts:
-            yield from self.tip(world, _towards_end(tilt), rate=0.5)
+            yield from self.tip(world, lowered(tilt), rate=0.5)
             yield from hold(world.arm, 1.0)
 
     def _shake(self, world: World, tilt: float = 0.0, spin: float = 0.0) -> Plan:
@@ -241,8 +230,7 @@ class BallCageEscape(Scenario):
         return Answer(tuple(range(-90, 270, 15)), act, right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        closed = dataclasses.replace(self.cage, closed=True)
-        return {"no_hole": dataclasses.replace(self, cage=closed).build()}
+        return {"no_hole": replace(self, cage=replace(self.cage, closed=True)).build()}
 
     # --- constraints ------------------------------------------------------------------------
 
@@ -271,20 +259,20 @@ class BallCageEscape(Scenario):
         yield require(2 * r <= length, "the trap does not take the ball", length=length, radius=r)
         yield require(tilt > STEEPEST, "the ball rolls out of the trap again", tilt=tilt, steepest=STEEPEST)
 
-        # The cage stands by itself, where the hand can take it.
+        # The cage stands by itself, in reach.
         half, far = stool.length / 2, abs(cage.offset - self.stool_x) + cage.hole
         covered = cage.face != BOTTOM or (far <= half and cage.hole <= stool.width / 2)
         yield require(covered, "the stool does not cover the hole", far=far, hole=cage.hole, width=stool.width)
         beside = min(self.stool_x - half - cage.trap_x - cage.wall / 2, stool.height - cage.trap)
         yield require(beside >= CLEAR, "the trap has no room beside the stool", room=beside, least=CLEAR)
-        load = (cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x) / (cage.mass + self.ball.mass)
-        lever = abs(load - self.stool_x)
+        moment = cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x
+        lever = abs(moment / (cage.mass + self.ball.mass) - self.stool_x)
         yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
         yield on_table("the cage", self.foot, margin=cage.length)
         yield within_reach("the cage", self.handle)
 
     def features(self) -> Mapping[str, float]:
-        """How far the cage must be tilted [rad], and the air that the hole leaves round the ball."""
+        """How far the cage must be tilted [rad], and the air round the ball in the hole."""
         return {"least_tilt": self.least_tilt, "air_over_radius": self.cage.hole / self.ball.radius - 1}
 
     # --- geometry ---------------------------------------------------------------------------
@@ -308,14 +296,3 @@ class BallCageEscape(Scenario):
     def least_tilt(self) -> float:
         """Tilt that lets the ball out [rad]."""
         return self.cage.least_tilt(self.ball.radius)
-
-
-def _towards_end(tilt: float) -> Vec3:
-    """Where down is in a cage whose holed end is lowered by `tilt` [rad]."""
-    return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
-
-
-def lean(world: World) -> float:
-    """Tilt of the floor towards the hole's end, as a ball feels it that is free to roll along the cage [rad]."""
-    along, _, across = world.rot("cage")[2]
-    return math.atan2(-along, across)

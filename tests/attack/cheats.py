@@ -10,13 +10,14 @@ from contextlib import suppress
 
 import numpy as np
 
+from scengen.assets.cage import lowered
 from scengen.errors import GaveUp
-from scengen.geometry import UP, heading
+from scengen.geometry import UP, heading, shortest
 from scengen.robots.jaw import TIP
 from scengen.scenario import Plan, Shortcut
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, grasp, pick, release
-from scengen.skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, go_to, hold, push, retreat
+from scengen.skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to
 
 Cheat = Callable[..., Plan]
 
@@ -70,26 +71,25 @@ def catch(world: World, body: str) -> Plan:
     yield from grasp(world.arm)
 
 
-def both_ends_in_turn(self, world: World) -> Plan:
-    """Tip to the wrong end, then to the other one: blind to hole and ball."""
-    steep = self.least_tilt + math.radians(13.0)
-    wrong, right = (np.array([sign * math.sin(steep), 0.0, -math.cos(steep)]) for sign in (-1.0, 1.0))
+def snap(self, world: World) -> Plan:
+    """Lean the cage by 30 deg as fast as the hand turns, and back, towards one end and the other."""
     yield from self.pick_up(world)
-    yield from self.present(world, right)
-    for down in (wrong, right):
-        with suppress(GaveUp):
-            yield from self.tip(world, down)
-        yield from self.watch(world)
+    yield from self.present(world, lowered(0.5))
+    level = world.arm.hand_rot
+    for tilt in (0.5, -0.5) * 3:
+        for rot in (shortest(world.rot("cage") @ lowered(tilt), -UP) @ world.arm.hand_rot, level):
+            with suppress(GaveUp):
+                yield from turn_to(world.arm, rot, rate=6.0, give_up=0.5)
 
 
-def shake_level(self, world: World) -> Plan:
-    """Take it up and shake it along its length with the wrist spinning."""
+def hop(self, world: World) -> Plan:
+    """Take it up and shake it up and down."""
     yield from self.pick_up(world)
     yield from retreat(world.arm, 0.10)
     start = world.time
     while world.time < start + 6.0:
-        sign = 1.0 if (world.time - start) % 0.6 < 0.3 else -1.0
-        yield np.array([*(sign * world.rot("cage")[:, 0]), 0.0, 0.0, sign, CLOSED])
+        sign = 1.0 if (world.time - start) % 0.3 < 0.15 else -1.0
+        yield np.array([0.0, 0.0, sign, 0.0, 0.0, 0.0, CLOSED])
 
 
 def hold_the_weight_down(self, world: World) -> Plan:
@@ -144,7 +144,7 @@ CHEATS: Mapping[str, Mapping[str, Cheat]] = {
     "domino_single": {f.__name__: f for f in (knock_slab_with_starter, strike_last_tile_with_starter)},
     "domino_select": {f.__name__: f for f in (topple_the_decoy,)},
     "galileo_ramp_drop": {"staircase": staircase},
-    "ball_cage_escape": {f.__name__: f for f in (both_ends_in_turn, shake_level)},
+    "ball_cage_escape": {f.__name__: f for f in (snap, hop)},
     "seesaw_balance": {f.__name__: f for f in (hold_the_weight_down, nudge_the_target)},
     "tool_retrieve": {f.__name__: f for f in (only_draw_it_in, take_it_by_hand)},
     "packing": {},

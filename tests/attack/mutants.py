@@ -18,7 +18,6 @@ from unittest import mock
 from scengen import config
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
-from scengen.geometry import UP
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.sim import scene_text
@@ -122,7 +121,7 @@ SOUND: dict[tuple[type, str], Any] = {}
 
 def mutants() -> list[Mutant]:
     """All of them."""
-    kinds = (clauses, limits, values, holes, narrow)
+    kinds = (clauses, limits, values, narrow)
     found = [mutant for task in TASKS for kind in kinds for mutant in kind(task)]
     for mutant in found:
         family = config.task(mutant.task).family
@@ -213,7 +212,7 @@ BARS: Mapping[int, float] = {1: 0.10, 3: 0.20}
 WIDE: Mapping[str, Mapping[str, float]] = {
     "domino_single": {"SLAB_MOVES": 0.004},
     "domino_select": {"SLAB_MOVES": 0.004, "CARRIED": 0.30},
-    "ball_cage_escape": {"STILL": 5.0},
+    "ball_cage_escape": {"STILL": 5.0, "GIVE": math.radians(60.0)},
     "seesaw_balance": {"LEVEL": math.radians(10.5), "STAYS": 0.40},
     "tool_retrieve": {"LIFTED": -0.001},
     "packing": {"FLAT": math.radians(60.0), "DOWN": 0.03},
@@ -251,7 +250,8 @@ VALUES: Mapping[str, Mapping[str, Change]] = {
     },
     "ball_cage_escape": {
         "the sill does not hold the ball": lambda s: replace(s, cage=replace(s.cage, sill=0.0)),
-        "the ball lies beyond the sill": lambda s: replace(s, ball_x=0.0),
+        "the ball lies beyond the sill": lambda s: replace(s, ball_x=0.012),
+        "the trap gives the ball back": lambda s: replace(s, cage=replace(s.cage, trap=0.004)),
     },
     "packing": {
         "every piece lies within 45 deg of its slot": lambda s: replace(
@@ -260,34 +260,4 @@ VALUES: Mapping[str, Mapping[str, Change]] = {
     },
     "domino_single": {},
     "domino_select": {},
-}
-
-
-# --- holes: what the families did not refuse when they were first attacked ------------------------
-
-
-def holes(task: str) -> Iterator[Mutant]:
-    """The family that there was, against the one that refuses a known cheat."""
-    for name, refused in HOLES.get(task, {}).items():
-        family = config.task(task).family
-        sound = family.failure
-
-        def mended(self: Any, world: World, sound: Any = sound, refused: Any = refused) -> str | None:
-            return sound(self, world) or refused(self, world)
-
-        yield Mutant(task, name, {"failure": sound}, mended={"failure": mended})
-
-
-def _wrong_end(self: Any, world: World) -> str | None:
-    lean = math.degrees(math.asin(max(-1.0, min(1.0, float(world.rot("cage")[:, 0] @ UP)))))
-    return "the cage was tilted to the wrong end" if lean > 25.0 else None
-
-
-def _jerked(self: Any, world: World) -> str | None:
-    moved = float((world.velocity("cage")[3:] ** 2).sum()) ** 0.5
-    return "the cage was shaken" if moved > 0.28 else None
-
-
-HOLES: Mapping[str, Mapping[str, Callable[[Any, World], str | None]]] = {
-    "ball_cage_escape": {"hole: both ends in turn": _wrong_end, "hole: shaking": _jerked},
 }
