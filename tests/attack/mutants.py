@@ -51,8 +51,6 @@ class Mutant:
     """Constants of its module that are replaced."""
     change: Change | None = None
     """Makes of a scenario one that the constraints refute."""
-    mended: Mapping[str, Any] = field(default_factory=dict)
-    """Attributes of the family that is not weakened, where it differs from the one that there is."""
     narrow: tuple[str, ...] = ()
     """Overrides of the task: training ranges so narrow that fixed answers are right too often."""
 
@@ -111,8 +109,7 @@ def strict(mutant: Mutant) -> Iterator[None]:
     with patched(
         mutant.task, {n: SOUND[family, n] for n in mutant.patch}, {n: SOUND[family, n] for n in mutant.limits}
     ):
-        with patched(mutant.task, mutant.mended, {}):
-            yield
+        yield
 
 
 SOUND: dict[tuple[type, str], Any] = {}
