@@ -56,7 +56,7 @@ POOLS: dict[str, tuple[str, ...]] = {
     "cage_id": ("task=ball_cage_escape", "n=1", *QUICKLY),
     "cage_severity": ("task=ball_cage_escape", "split=low_stool@1", "n=1", *QUICKLY),
     "seesaw_id": ("task=seesaw_balance", "n=1", *QUICKLY),
-    "seesaw_axis": ("task=seesaw_balance", "split=other_arm", "n=1", *QUICKLY),
+    "seesaw_axis": ("task=seesaw_balance", "split=heavy_target", "n=1", *QUICKLY),
     "tool_id": ("task=tool_retrieve", "n=1", *QUICKLY),
     "tool_composed": ("task=tool_retrieve", "split=long_handle@1+turned_hook@1", "n=1", *QUICKLY),
     "packing_id": ("task=packing", "n=1", *QUICKLY),
