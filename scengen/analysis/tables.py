@@ -1,5 +1,6 @@
 """Tables about distributions."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -54,14 +55,15 @@ def pairs_table(pairs: list[Pair], one: str, other: str) -> Table:
     return table
 
 
-def power_table(analysis: PowerAnalysis) -> Table:
+def power_table(analysis: PowerAnalysis, progress: Callable[[int, int], None]) -> Table:
     """The smallest drop that can be told apart, by ID success rate and intra-cluster correlation."""
     size = f"{analysis.seeds} seeds x {analysis.rollouts} rollouts a split"
     title = f"smallest drop found with probability {analysis.power:g}: {size}"
     correlations = sorted({*CORRELATIONS, analysis.correlation})
     table = Table("ID success", *(f"correlation {c:g}" for c in correlations), title=title, title_justify="left")
-    for before in BASELINES:
-        drops = (replace(analysis, correlation=c).smallest_drop(before) for c in correlations)
+    for done, before in enumerate(BASELINES):
+        progress(done, len(BASELINES))
+        drops = [replace(analysis, correlation=c).smallest_drop(before) for c in correlations]
         table.add_row(f"{before:g}", *("none" if d is None else f"{d:.2f}" for d in drops))
     return table
 

@@ -6,8 +6,9 @@ from ..analysis.tables import power_table
 from ..config import read
 from ..errors import BadConfig
 from ..evaluate.power import PowerAnalysis, seeds_for
+from ..runs.progress import ProgressBar
 from ..targets import try_file
-from . import OK, Arguments, out, say, write_json
+from . import OK, Arguments, err, out, say, write_json
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ def command(arguments: Arguments) -> int:
     asked = {k: v for k, v in asdict(settings).items() if k not in ("success", "drop", "json")}
     analysis = PowerAnalysis(**asked)
     smallest = analysis.smallest_drop(settings.success)
-    out.print(power_table(analysis))
+    with ProgressBar(err, "simulated experiments", 1) as progress_bar:
+        shown = power_table(analysis, progress_bar.of)
+    out.print(shown)
     found = "no drop, not even to 0," if smallest is None else f"a drop of {smallest:.2f} or more"
     say(
         f"from {settings.success:g}, {found} is found with probability {analysis.power:g}; "
