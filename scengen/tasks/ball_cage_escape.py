@@ -130,10 +130,8 @@ class BallCageEscape(Scenario):
         """Lift the cage, carry it aside, tip it until the ball is over the sill, and on until it is out."""
         yield from self.pick_up(world)
         yield from self.present(world, self.tilts()[-1])
-        gentle = [
-            lowered(math.radians(tilt)) for tilt in (10.0, -5.0) * 3
-        ]  # brings back a ball that has passed the hole
-        for down in [*self.tilts(), *gentle]:
+        back = [lowered(math.radians(tilt)) for tilt in (10.0, -5.0) * 3]  # for a ball that has passed the hole
+        for down in [*self.tilts(), *back]:
             if self.out(world):
                 break
             yield from self.tip(world, down)
@@ -227,7 +225,7 @@ class BallCageEscape(Scenario):
         def act(world: World, heading: float) -> Plan:
             yield from self.tip_only(world, math.copysign(self.least_tilt + SPARE, right(heading) - 0.5))
 
-        return Answer(tuple(range(-90, 270, 15)), act, right, tries=1)
+        return Answer(tuple(map(float, range(-90, 270, 15))), act, right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_hole": replace(self, cage=replace(self.cage, closed=True)).build()}
