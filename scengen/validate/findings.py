@@ -58,7 +58,8 @@ class Findings:
         self.examinations: list[Examination] = []
         self.differences: list[dict[str, str]] = []
         self.remarks: list[str] = []
-        self.settings, self.sample = "", None
+        self.settings = ""
+        self.sample: dict[str, Any] | None = None
         self.left_out: dict[int, str] = {}
         """Why indices without a scenario are not certified."""
         self.expired = False
