@@ -359,7 +359,8 @@ def _tilt_over(height: float, radius: float) -> float:
 
 def _box(low: ArrayLike, high: ArrayLike) -> Box:
     """A cuboid between two corners."""
-    return (np.asarray(low, float) + high) / 2, np.subtract(high, low)
+    first, last = np.asarray(low, float), np.asarray(high, float)
+    return (first + last) / 2, last - first
 
 
 def _cuboid(centre: Vec3, size: Vec3, sign: float) -> tuple[float, Vec3, Mat3]:
