@@ -52,9 +52,9 @@ SURELY = math.radians(4.5)
 """Tilt with which the oracle is content [rad]: a beam that looks at rest at 0.01 rad/s may creep by another 0.4 deg."""
 CLEARLY = math.radians(7.0)
 """Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by 2 mm can change."""
-STAYS = 0.015
-"""How far the target may be from where it stood on the deck [m]. A heavy counterweight that is let go far out throws
-the deck against its stop, and the target hops by up to 10 mm."""
+STAYS = 0.006
+"""How far the target may be from where it stood on the deck [m]. A counterweight that is let go far out throws the deck
+against its stop, and the target hops by up to 3 mm; a hand that strikes the deck three times moves it by up to 7."""
 ROOM = 0.008
 """Least deck on which the counterweight balances [m]: 4 mm to either side, three times the error of a placement."""
 AMISS = 0.006
@@ -142,7 +142,7 @@ class SeesawBalance(Scenario):
             tilt, stood = self.tilt(world), self.along(world, "weight")
             if abs(tilt) <= SURELY:
                 return
-            stopped = abs(tilt) > self.seesaw.steepest - math.radians(0.5)
+            stopped = abs(tilt) > self.seesaw.steepest - math.radians(1.0)
             past = stood - math.copysign(AMISS if stopped else 0.0, tilt)
             low, high = (low, min(high, past)) if tilt > 0 else (max(low, past), high)
             if high - low < 0.004:
@@ -188,8 +188,8 @@ class SeesawBalance(Scenario):
 
     def _shift(self, world: World) -> Plan:
         """Miss the balancing place by a little, and level the deck by moving the target instead."""
-        miss = 1.2 * self.margin
-        moved = min(STAYS - 0.003, miss * self.weight.mass / self.target.mass)
+        miss = 1.4 * self.margin
+        moved = min(STAYS - 0.002, miss * self.weight.mass / self.target.mass)
         yield from self.put_at(world, self.balance - math.copysign(miss, self.balance))
         yield from self.put_at(world, self.offset + math.copysign(moved, self.balance), "target")
 
