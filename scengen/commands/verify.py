@@ -134,7 +134,7 @@ def _tell(pool: Pool, report: Report) -> None:
             (report.replayed, "replayed"),
             (report.rechecked, "checked again without an oracle"),
             (report.certified_again, "certified again"),
-            (report.left_out, "left out and failing again"),
+            (report.left_out, "left out and certified again"),
             (report.expired, "expired"),
             (report.drifted, "end in other bits"),
         )

@@ -28,7 +28,7 @@ class Report:
     """Those whose checks without an oracle were repeated."""
     certified_again: int
     left_out: int
-    """Scenarios that the run had drawn and not certified, and that fail again."""
+    """Scenarios that the run had drawn and not certified, and that were certified again."""
     failed: list[dict[str, str]]
     """`id`, `verdict` and `reason` of everything that is not sound; a fault of the whole pool under manifest.json."""
     expired: int

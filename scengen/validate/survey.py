@@ -182,5 +182,14 @@ def wrong_losses(pool: Pool, again: Mapping[int, str]) -> Iterator[str]:
         yield f"certified again, scenarios that it left out fail otherwise than it tells, {_told(missing)}{certified}"
 
 
+def wrong_attack(pool: Pool) -> Iterator[str]:
+    """Where an attack on the finished pool has left out more scenarios than it has hits that show a way around."""
+    hits = pool.manifest.get("attack", {}).get("hits", [])
+    shown = {str(hit.get("scenario")) for hit in hits if hit.get("lacks")}
+    told = sum(times for key, times in pool.reasons.items() if key.startswith("attack: "))
+    if "attack" in pool.manifest and not pool.manifest["config"]["certify"].get("attack") and told > len(shown):
+        yield f"the attack has refuted {told} scenarios, and shows a way around {len(shown)} of them"
+
+
 def _told(counts: Mapping[str, int]) -> str:
     return str(dict(itertools.islice(counts.items(), 5)))[:500]

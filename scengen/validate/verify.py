@@ -182,12 +182,14 @@ class _Run:
 
     def certify_left(self, examiner: Examiner) -> None:
         """Certify what the run has drawn and left out: else an author might leave out what a policy is bad at."""
-        if self.pool.chosen or self.options.sample is not None or examiner.claims.fingerprint != fingerprint():
+        if self.pool.chosen or self.options.sample is not None:
             return
         left = [Left(index) for index, drawn in self.drawn.items() if drawn.feasible and index not in self.certified]
         for one in each(examiner, left, self.options.workers, self.options.limits, lost):
             self._note(one)
-        if len(self.found.left_out) == len(left):
+        if certified := sum(not why for why in self.found.left_out.values()):
+            self.found.remarks.append(f"{certified} of {len(left)} scenarios that the run left out are certified here")
+        if len(self.found.left_out) == len(left) and examiner.claims.fingerprint == fingerprint():
             for what in survey.wrong_losses(self.pool, self.found.left_out):
                 self.found.of_pool(MANIFEST, "refuted", what)
 
@@ -210,6 +212,7 @@ class _Run:
         if self.pool.chosen:
             yield from survey.wrong_subset(self.pool)
             return
+        yield from survey.wrong_attack(self.pool)
         yield from survey.wrong_rejects(self.pool, self.rejected, self.certified)
         if len(self.drawn) == self.pool.indices:
             yield from survey.wrong_funnel(self.pool, self.certified, self.drawn)

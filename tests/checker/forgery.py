@@ -90,7 +90,7 @@ class Draft:
 
     # --- the scene --------------------------------------------------------------------------
 
-    def scene(self, pattern: str, new: str, rows: int = 1) -> None:
+    def scene(self, pattern: str, new: str | Callable[[re.Match[str]], str], rows: int = 1) -> None:
         """Replace the first match of a pattern in the scene of the first so many scenarios."""
         for row in self.rows[:rows]:
             row["scene_xml"], count = re.subn(pattern, new, row["scene_xml"], count=1, flags=re.S)

@@ -104,6 +104,21 @@ def _drop_second(draft: Draft) -> None:
     del draft.rows[1]
 
 
+def _attacked(hit: dict[str, Any] | None, hits: int = 1) -> Change:
+    """The manifest tells of an attack that nobody has made."""
+    listed = [] if hit is None else [{**hit, "tier": "retry", "raw": False}]
+    rates = [{"tier": "retry", "raw": False, "rollouts": 100, "hits": hits, "refuting": 0}]
+    return _manifest(attack={"task": "domino_single", "rates": rates, "hits": listed})
+
+
+def _left_out_by_an_attack(draft: Draft) -> None:
+    """A scenario that the author did not like is said to have a way around, and nobody sees it."""
+    del draft.rows[0]
+    _attacked(None, hits=0)(draft)
+    draft.manifest.update(n=1, first_draws=1, reasons={"attack: a way around, by retry, raw, without a - b: c": 1})
+    draft.manifest["funnel"].update(certified=1)
+
+
 def _certified_too(draft: Draft) -> None:
     """Instead of the scenario that failed the first certified one stands among the rejects."""
     failed = draft.rejected[0]["certificate"]["checks"]
@@ -255,6 +270,9 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
     "keep_without_rejects": ("single_kept", r"reject|keep|kept", lambda d: d.rejected.clear()),
     "rejects_without_keep": ("single_kept", r"reject|keep|kept", _config(keep=[])),
     "reject_of_another_index": ("single_kept", r"reject|index|drawn", lambda d: d.rejected[0].update(index=40)),
+    "left_out_by_an_attack": ("single_quick", r"way around", _left_out_by_an_attack),
+    "hits_of_nobody": ("single_quick", r"hit", _attacked({"file": "hits/a.npz", "sha256": "0" * 64})),
+    "hits_not_counted": ("single_quick", r"hits", _attacked(None, hits=3)),
     "reject_of_a_certified_index": ("single_kept", r"reject|certified too", _certified_too),
     "reject_twice": ("single_kept", r"reject", lambda d: d.rejected.append(copy.deepcopy(d.rejected[0]))),
     "reject_for_another_reason": ("single_kept", r"reject|reasons", _other_reason),

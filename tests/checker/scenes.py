@@ -86,6 +86,15 @@ def _extra(xml: str, to: str = "worldbody") -> Change:
     return lambda draft: draft.add(xml, to)
 
 
+def _aside(body: str, by: float) -> Change:
+    """A body that stands elsewhere [m]."""
+
+    def moved(found: re.Match[str]) -> str:
+        return f"{found[1]} {float(found[2]) + by:.6g}"
+
+    return lambda draft: draft.scene(rf'(name="{body}" pos="\S+) (\S+)', moved)
+
+
 SINGLE: dict[str, tuple[Change, str]] = {
     "gravity_sideways": (lambda d: _option(d, 'gravity="0 5 -9.81"'), IDLE),
     "gravity_weaker": (lambda d: _option(d, 'gravity="0 0 -9.5"'), SAME),
@@ -142,7 +151,7 @@ OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
     "select_id": {
         "decoy_is_red": (_recolour("decoy_0/box", "slab_1/box"), SAME),
         "lighter_tiles": (_scaled("tile_2_1/box", "mass", 0.9), SAME),
-        "broken_chain_mended": (lambda d: d.scene(r'(name="tile_1_1" pos="\S+) \S+', r"\1 -0.0994618"), SAME),
+        "tile_of_a_chain_moved": (_aside("tile_1_1", 0.002), SAME),
     },
     "galileo_id": {
         "patch_is_grey": (_attribute("ramp/patch_0", "rgba", "0.62 0.6 0.57 1"), SAME),
