@@ -49,7 +49,12 @@ def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None
 
     The bounds are physical, not statistical: outside them the builder makes no sense. Which values
     are *likely* is written in conf/task/.
+
+    Raises:
+        ValueError: the period is no positive number.
     """
+    if period is not None and not (math.isfinite(period) and period > 0):
+        raise ValueError(f"period = {period}; it must be a positive number, or None")
     whole = isinstance(nominal, int)
     meta = {"unit": unit, "low": low, "high": high, "period": period, "hidden": hidden, "integer": whole}
     return dataclasses.field(default=nominal, metadata=meta)

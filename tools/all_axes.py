@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scengen import cli, config
+from scengen.analysis.distance import Energy
 from scengen.ood.behaviour import EXTRAPOLATION
 from scengen.ood.boundary import FAILS_AT_ONCE, HOLDS
 
@@ -26,7 +27,8 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
 * **replay**, **oracle**: where on the path success falls to 50 %; 0 is the edge of training, 1 the far end of the axis,
   in brackets the 95 % credible interval; `> x`: it holds to the end of the path. `at the edge`: the replay fails as
   soon as its scene's own value is exchanged for the nearest end of training.
-* **energy**: energy distance between the features of the twins [training ranges], p value of its permutation test.
+* **energy**: energy distance between the features of the twins [training ranges], what chance gives, and the p value of
+  a test that exchanges twins; `equal` where the axis moves no feature.
 
 | task | axis | outside | physics | certified | true extrapolation | else | replay | oracle | energy |
 |---|---|---|---|---|---|---|---|---|---|
@@ -72,7 +74,7 @@ def _line(card: dict[str, Any]) -> str:
         ", ".join(f"{s['count']} {s['kind']}" for s in card["behaviour"] if s["count"] and s is not share),
         _boundary(card, "replay"),
         _boundary(card, "oracle"),
-        f"{card['energy']['distance']:.2g} (p = {card['energy']['pvalue']:.2g})",
+        str(Energy(**card["energy"])),
     ]
     return f"| {' | '.join(cells)} |\n"
 

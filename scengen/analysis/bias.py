@@ -105,10 +105,10 @@ def bias(table: Mapping[str, Numbers], accepted: Flags, permutations: int = 999)
     pvalues = false_discovery_control(raw) if raw else []
     marginals = [_marginal(n, c, accepted, float(p)) for (n, c), p in zip(varied.items(), pvalues, strict=True)]
     joint = Energy(0.0, 1.0)
-    if varied and not accepted.all():
+    if varied and _can_tell(accepted):
         points = np.column_stack([column / np.ptp(column) for column in varied.values()])[:MOST]
         taken = accepted[:MOST]
-        if taken.any() and not taken.all():
+        if _can_tell(taken):
             joint = energy(points[taken], points[~taken], permutations)
     order = sorted(marginals, key=lambda m: (m.pvalue, -m.ks))
     return Bias(len(accepted), int(accepted.sum()), tuple(order), joint)
@@ -135,7 +135,12 @@ def acceptance_map(names: tuple[str, str], table: Mapping[str, Numbers], accepte
 
 
 def _pvalue(column: Numbers, accepted: Flags) -> float:
-    return 1.0 if accepted.all() else float(ks_2samp(column[accepted], column[~accepted]).pvalue)  # type: ignore[attr-defined]
+    return 1.0 if not _can_tell(accepted) else float(ks_2samp(column[accepted], column[~accepted]).pvalue)  # type: ignore[attr-defined]
+
+
+def _can_tell(accepted: Flags) -> bool:
+    """Whether there are two on either side at least: one draw has no distribution."""
+    return bool(2 <= accepted.sum() <= len(accepted) - 2)
 
 
 def _marginal(name: str, column: Numbers, accepted: Flags, pvalue: float) -> Marginal:

@@ -50,5 +50,6 @@ def _table(card: Card) -> Table:
         table.add_row(f"boundary of {who}", f"{edge.verdict}: {where}" + (f" ({at})" if at else ""))
     if card.why_no_path:
         table.add_row("boundary", card.why_no_path)
-    table.add_row("energy distance", f"{card.energy.distance:.3g} training ranges, p = {card.energy.pvalue:.3g}")
+    table.add_row("energy distance of features", f"{card.energy} [training ranges]")
+    table.add_row("of moved parameters", f"{card.energy_of_parameters} [training ranges]")
     return table

@@ -6,11 +6,15 @@ from ..config import read_task
 from ..pictures.report import attack_table, funnel_table, summary_lines
 from ..runs.generate import Settings, generate
 from ..runs.progress import ProgressBar
+from ..samplers.designs import SOBOL
 from . import FAILED, OK, Arguments, err, out, say, warn
 
 
 def command(arguments: Arguments) -> int:
     settings, task, certify_settings = read_task("generate", arguments, Settings)
+    if settings.sampler == "sobol" and settings.n < SOBOL:
+        what = f"of {settings.n} points of a Sobol set some pairs of parameters correlate by chance, up to 0.95 at 32"
+        warn(f"scengen: {what}; say n={SOBOL} or more, or sampler=lhs:{settings.n}")
     with ProgressBar(err, f"{task.name}/{settings.split}", settings.n) as progress_bar:
 
         def progress(certified: int, finished: int, verdicts: Mapping[str, int]) -> None:

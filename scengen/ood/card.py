@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ..analysis import distance
-from ..analysis.space import of_features
+from ..analysis.space import Space, of_features, of_parameters
 from ..errors import UnknownName, at_least
 from ..pictures import film, render
 from ..pictures.plots import svg
@@ -72,6 +72,8 @@ class Card:
     """Why there are no boundaries; empty if there are."""
     energy: distance.Energy
     """Between the features of the first n twins in and out of distribution, in ranges of training."""
+    energy_of_parameters: distance.Energy
+    """The same between the parameters that move."""
 
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
@@ -109,6 +111,9 @@ def make(
     ]
     training, here = [t for t, _ in twins], [s for _, s in twins]
     space = of_features(task, training, here)
+    moved = Space(
+        tuple(c for c in of_parameters(task, [*training, *here]).columns if c.name in task.axes[name].replace)
+    )
     evidence = features.sampled(task, name)
     axis = task.axes[name]
     card = Card(
@@ -126,7 +131,8 @@ def make(
         behaviour.shares(trials),
         boundaries,
         why_no_path,
-        distance.energy(space.points(training), space.points(here)),
+        distance.energy(space.points(training), space.points(here), twins=True),
+        distance.energy(moved.points(training), moved.points(here), twins=True),
     )
     write(folder / "card.json", json.dumps(card.plain(), indent=1) + "\n")
     return card, _page(task, card, made.pool, seed, folder / "card.html")

@@ -1,5 +1,6 @@
 """An OOD axis: which parameters leave their training support, where they go, and why."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -7,7 +8,7 @@ from ..errors import BadConfig
 from ..params import Parameter, Value
 from ..symmetry import Symmetry, images
 from .dists import Choice, Dist, Fixed, Integer
-from .support import Interval, Support, distance, meet, nearest, width
+from .support import Interval, Support, distance, meet, nearest, turned, width
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,8 @@ class Axis:
 
     def _value(self, fraction: float, parameter: Parameter, target: Interval, training: Support) -> Value:
         period = parameter.period
-        far = max(target.low, target.high, key=lambda v: abs(nearest(training, v, period) - v))
+        ends = [target.low, target.high, *_opposite(training, target, period)]
+        far = max(ends, key=lambda v: abs(nearest(training, v, period) - v))
         edge = nearest(training, far, period)
         far = self.limits.get(parameter.name, far)
         value = edge + fraction * (far - edge)
@@ -146,6 +148,15 @@ class Axis:
                 f"whole number; from {edge:g} to {far:g} there are {abs(far - edge):g} steps"
             )
         return round(value)
+
+
+def _opposite(training: Support, target: Interval, period: float | None) -> list[float]:
+    """On a circle, the values of a range that lie in the middle between two neighbouring parts of training."""
+    if period is None:
+        return []
+    parts = sorted((z for part in training for z in turned(part, target, period)), key=lambda i: i.low)
+    middles = [(one.high + other.low) / 2 for one, other in itertools.pairwise(parts) if one.high < other.low]
+    return [middle for middle in middles if middle in target]
 
 
 def reflected(support: Support, about: float) -> Support:

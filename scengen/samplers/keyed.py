@@ -11,10 +11,12 @@ _NORMAL = statistics.NormalDist()
 
 
 def unit(*key: str | int) -> float:
-    """A number in (0, 1), uniform over keys: 53 bits of BLAKE2b of the key, centred in their cell."""
+    """A number in (0, 1), uniform over keys: 53 bits of BLAKE2b of the key, centred in their cell.
+
+    The centre of the last cell rounds to 1, which is no number below 1: there it is the largest one."""
     text = "\x1f".join(map(str, key))
     digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
-    return ((int.from_bytes(digest, "big") >> 11) + 0.5) / 2**53
+    return min(((int.from_bytes(digest, "big") >> 11) + 0.5) / 2**53, 1.0 - 2.0**-53)
 
 
 def spread(size: float, *key: str | int) -> float:

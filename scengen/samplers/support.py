@@ -41,10 +41,20 @@ class Interval:
 Support = tuple[Interval, ...]
 """A non-empty union of intervals."""
 
+TOLERANCE = 1e-9
+"""Gaps smaller than this share of the largest end are rounding: 0.1 * 3 touches a range that ends at 0.3."""
+
 
 def distance(a: Support, b: Support, period: float | None = None) -> float:
-    """Smallest distance between a value of `a` and a value of `b`, on a circle if there is a period."""
-    return min(x.distance(z) for x in a for y in b for z in turned(y, x, period))
+    """Smallest distance between a value of `a` and a value of `b`, on a circle if there is a period.
+
+    The same from `b` to `a`, and 0 where it is no more than rounding (`TOLERANCE`).
+    """
+    there = min(x.distance(z) for x in a for y in b for z in turned(y, x, period))
+    back = min(y.distance(z) for y in b for x in a for z in turned(x, y, period))
+    size = max(abs(end) for i in (*a, *b) for end in (i.low, i.high, period or 0.0))
+    gap = min(there, back)
+    return gap if gap > TOLERANCE * size else 0.0
 
 
 def meet(a: Support, b: Support, period: float | None = None) -> bool:

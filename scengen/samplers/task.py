@@ -128,16 +128,27 @@ class Task:
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such severity, or two axes move the same parameter.
+            BadConfig: it has no such severity, two axes move the same parameter, or together they lead back into
+                training.
         """
+        split = Split.parse(split)
+        if split in self._composed:
+            return self._composed[split]
         shifted: dict[str, Dist] = {}
-        for axis in map(self.axis, Split.parse(split).parts):
+        for axis in map(self.axis, split.parts):
             if both := shifted.keys() & axis.replace.keys():
                 raise BadConfig(
                     f"split {split}: two of its axes move {', '.join(sorted(both))}; compose axes that differ"
                 )
             shifted.update(axis.replace)
-        return shifted
+        if len(split.parts) > 1:
+            self.prove(Axis(str(split), "", "", shifted))
+        return self._composed.setdefault(split, shifted)
+
+    @cached_property
+    def _composed(self) -> dict[Split, dict[str, Dist]]:
+        """What splits replace, proved once."""
+        return {}
 
     def design(self, spelled: str) -> Design:
         """Where the numbers come from: `iid`, `sobol`, `lhs:50` or `grid:3`.

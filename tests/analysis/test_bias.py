@@ -118,3 +118,10 @@ def test_leaked_scenarios_make_the_comparison_fail(made, tmp_path, capsys):
     assert cli.run(("compare", f"pool={made}", f"json={tmp_path / 'c.json'}")) == 0
     assert cli.run(("compare", f"pool={made},{made}", "permutations=9")) == 1
     assert "near duplicates" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("rejected", [1, 2, 49])
+def test_a_single_draw_on_one_side_is_no_distribution(rejected):
+    table = {"x": np.linspace(0.0, 1.0, 50)}
+    found = bias(table, np.arange(50) >= rejected, 49)
+    assert found.accepted == 50 - rejected and (rejected == 2 or not found.flagged)

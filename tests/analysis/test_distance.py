@@ -120,3 +120,32 @@ def test_the_farthest_points_of_a_grid_with_a_crowd_leave_the_crowd_alone():
     apart = np.linalg.norm(first[:, None] - first[None], axis=2)[np.triu_indices(5, 1)]
     assert apart.min() > 2.7  # the middle and the four corners
     assert list(chosen[:9]) == list(farthest_points(np.concatenate([crowd, grid]), 9))
+
+
+def twins(random, shift, common=0.95):
+    """Fifty pairs that have most in common."""
+    training = random.standard_normal((50, 1))
+    return training, common * training + np.sqrt(1 - common**2) * random.standard_normal((50, 1)) + shift
+
+
+def test_what_twins_have_in_common_hides_no_shift():
+    random = np.random.default_rng(0)
+    unpaired, paired = 0, 0
+    for _ in range(20):
+        x, y = twins(random, 0.3)
+        unpaired += energy(x, y, 199).pvalue < 0.05
+        paired += energy(x, y, 199, twins=True).pvalue < 0.05
+    assert paired >= 18 and unpaired <= 8
+
+
+def test_without_a_shift_twins_are_seldom_told_apart():
+    random = np.random.default_rng(1)
+    pvalues = [energy(*twins(random, 0.0), 199, twins=True).pvalue for _ in range(60)]
+    assert np.mean(np.array(pvalues) < 0.05) < 0.15
+
+
+def test_identical_twins_are_equal_and_others_are_told_what_chance_gives():
+    x, y = twins(np.random.default_rng(2), 0.0)
+    assert str(energy(x, x, twins=True)) == "equal"
+    found = energy(x, y, 199, twins=True)
+    assert 0.0 < found.chance < 0.5 and str(found).startswith(f"{found.distance:.2g} (by chance ")

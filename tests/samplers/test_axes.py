@@ -1,11 +1,17 @@
+from unittest import mock
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scengen import config
 from scengen.errors import BadConfig, ScengenError, UnknownName
+from scengen.params import param
+from scengen.samplers import keyed
 from scengen.samplers.support import Interval, distance
 from scengen.samplers.task import load
+from scengen.symmetry import Symmetry
+from scengen.tasks.domino_single import DominoSingle
 
 TASKS = config.tasks()
 NODE = config.task("domino_single").node
@@ -92,3 +98,52 @@ def test_distance_on_a_circle_ignores_whole_turns_and_order(a, b, turns):
     assert distance(here, there, 180.0) == pytest.approx(distance(there, here, 180.0), abs=1e-6)
     assert distance(here, there, 180.0) <= distance(here, there) + 1e-9
     assert distance(here, there, 180.0) <= 90.0 + 1e-9
+
+
+@given(st.integers(-3600, 3600), st.integers(0, 900), st.integers(0, 900), st.sampled_from([None, 90.0, 180.0, 360.0]))
+def test_ranges_that_touch_as_written_touch_whatever_rounding_makes_of_them(start, length, other, period):
+    """With one decimal each, as in task files; nearly a fifth of such pairs had a gap of 1e-14 on a circle."""
+    a, b, c = start / 10, (start + length) / 10, (start + length + other) / 10
+    assert distance((Interval(a, b),), (Interval(b, c),), period) == 0.0
+
+
+def test_rounding_makes_no_gap_and_a_small_step_does():
+    training = (Interval(0.0, 0.3),)
+    assert distance((Interval(0.1 * 3, 0.4),), training) == 0.0
+    assert distance((Interval(0.3 * (1 + 1e-12), 0.4),), training) == 0.0
+    assert distance((Interval(0.3001, 0.4),), training) == pytest.approx(1e-4)
+
+
+def test_axes_that_lead_back_into_training_together_are_refused(monkeypatch):
+    """Each mirrors one of two parameters that a symmetry mirrors together."""
+    mirror = Symmetry("mirror", reflect={"y": 0.0, "heading": 0.0})
+    monkeypatch.setattr(DominoSingle, "SYMMETRIES", (mirror,))
+    there = {**NODE, "id": {**NODE["id"], "y": ["uniform", 0.1, 0.2], "heading": ["uniform", 10.0, 20.0]}}
+    axes = {
+        "over": {"replace": {"y": ["uniform", -0.2, -0.1]}},
+        "round": {"replace": {"heading": ["uniform", -20, -10]}},
+    }
+    task = load("domino_single", {**there, "axes": axes})
+    assert task.shifts("over") and task.shifts("round")
+    with pytest.raises(BadConfig, match="under the symmetries of the family"):
+        task.shifts("over+round")
+
+
+def test_on_a_circle_the_far_end_is_what_is_farthest():
+    """Between -90 and 90 straight ahead is as far as it gets, not an end of the range."""
+    there = {**NODE, "id": {**NODE["id"], "heading": ["choice", -90.0, 90.0]}}
+    axes = {"mine": {"replace": {"heading": ["uniform", -60.0, 50.0]}, "severities": 2}}
+    task = load("domino_single", {**there, "axes": axes})
+    assert task.axis("mine@2").replace["heading"].value == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("period", [0, -90.0, float("inf"), float("nan")])
+def test_a_period_is_a_positive_number(period):
+    with pytest.raises(ValueError, match="it must be a positive number"):
+        param(0.0, "deg", -180.0, 180.0, period=period)
+
+
+def test_no_number_is_1(monkeypatch):
+    digest = mock.Mock(digest=lambda: b"\xff" * 8)
+    monkeypatch.setattr(keyed.hashlib, "blake2b", lambda *_, **__: digest)
+    assert 0.999 < keyed.unit("anything") < 1.0
