@@ -160,7 +160,7 @@ def flagged(task: str) -> dict[str, Any]:
 def _hit(arena: Arena, attempt: Attempt, played: Any) -> Hit:
     """A success as a hit that lacks nothing."""
     scenario, digest = arena.scenario.id, played.digest
-    return Hit(scenario, attempt.tier, False, str(attempt), played.seconds, digest, (), (), played.actions)
+    return Hit(scenario, attempt.tier, False, str(attempt), played.seconds, digest, (), (), {}, played.actions)
 
 
 def _told(hit: Hit | None) -> str:
