@@ -5,7 +5,7 @@ from rich.table import Table
 from ..config import read
 from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
 from ..runs.progress import ProgressBar
-from . import OK, Arguments, err, out, say, write, write_json
+from . import FAILED, OK, Arguments, err, out, say, warn, write, write_json
 
 
 def command(arguments: Arguments) -> int:
@@ -19,8 +19,10 @@ def command(arguments: Arguments) -> int:
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
+    for scenario, why in found.lost.items():
+        warn(f"UNKNOWN {scenario}: {why}; it was left out")
     if found.earlier:
         what = "the pools, the settings and the policy are the same; fresh=true plays them anew"
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl")
-    return OK
+    return FAILED if found.lost else OK

@@ -23,6 +23,6 @@ def command(arguments: Arguments) -> int:
     )
     for scenario in summary.failed:
         warn(f"FAILED {scenario}: the witness does not reach the goal here; its episode has success = false")
-    for told in summary.lost:
-        warn(f"UNKNOWN {told}; it was left out")
+    for scenario, why in summary.lost.items():
+        warn(f"UNKNOWN {scenario}: {why}; it was left out")
     return FAILED if summary.failed or summary.lost else OK

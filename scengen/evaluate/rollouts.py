@@ -14,7 +14,7 @@ import numpy as np
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..envs.observations import check_names
-from ..errors import BadConfig, ScengenError, at_least
+from ..errors import BadConfig, PoolError, ScengenError, at_least
 from ..log import Log
 from ..parallel import each
 from ..pool import Pool, PoolRow
@@ -22,6 +22,7 @@ from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
 from ..targets import refused, try_folder
+from ..validate.playable import unplayable
 from .policies import REPLAY, Policy, blamed, find, identity, made
 
 
@@ -94,6 +95,8 @@ class Evaluation:
     episodes: list[dict[str, Any]]
     earlier: int
     """How many of them an earlier run of the same command had played."""
+    lost: Mapping[str, str]
+    """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
 def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evaluation:
@@ -114,6 +117,11 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evalua
     about: dict[tuple[str, str], dict[str, Any]] = {}
     for pool in pools:
         about |= _chosen(pool, settings.seeds)
+    first = itertools.chain.from_iterable(itertools.islice(pool.rows(), settings.seeds) for pool in pools)
+    if lost := dict(unplayable(first, settings.workers)):
+        about = {(pool, id_): a for (pool, id_), a in about.items() if id_ not in lost}
+        if not about:
+            raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings)
     depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
@@ -133,7 +141,7 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evalua
             ({**about[e["pool"], e["scenario"]], **e} for e in log.records if _id(e) in wanted),
             key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
         )
-        return Evaluation(episodes, done)
+        return Evaluation(episodes, done, lost)
 
 
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[Line]:

@@ -8,16 +8,15 @@ environment takes them as they are.
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from itertools import chain, islice, tee
+from itertools import chain, islice
 from pathlib import Path
 
 from ..control.loop import ACTION
 from ..envs.observations import CAMERAS, Stream, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
-from ..parallel import SHOWN, each
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
@@ -27,7 +26,7 @@ from ..scenario import Scenario
 from ..sim.world import World
 from ..targets import try_folder
 from ..validate.identity import check_versions, versions
-from ..validate.playable import play as try_out
+from ..validate.playable import unplayable
 from .cameras import calibration
 from .lerobot import DataSet, Feature
 from .play import play
@@ -89,7 +88,7 @@ class Summary:
     rows: int
     failed: tuple[str, ...]
     """Scenarios whose witness did not reach the goal here; their episodes say so."""
-    lost: tuple[str, ...]
+    lost: Mapping[str, str]
     """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
@@ -115,14 +114,13 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
         raise BadConfig(f"{settings.unfinished} cannot be written: {error.strerror}") from None
     try:
         size, features = (settings.width, settings.height), _features(settings, robot)
-        failed, lost = [], []
-        rows, tried = tee(islice(chain.from_iterable(pool.rows() for pool in pools), count))
+        failed, lost = [], dict(unplayable(_rows(pools, count)))
         with DataSet(settings.unfinished, settings.fps, robot, features, settings.eyes, size) as data:
-            for row, why in zip(rows, each(_try, tried, 1, SHOWN, _lost), strict=True):
+            for row in _rows(pools, count):
+                if row.id in lost:
+                    continue
                 scenario = find_task(row.task).scenario(row.params)
-                if why:
-                    lost.append(why)
-                elif not _episode(data, row, scenario, settings, streams):
+                if not _episode(data, row, scenario, settings, streams):
                     failed.append(row.id)
                 progress(len(data.episodes), count)
         source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
@@ -131,15 +129,11 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
     except BaseException:
         shutil.rmtree(settings.unfinished)
         raise
-    return Summary(len(data.episodes), data.rows, tuple(failed), tuple(lost))
+    return Summary(len(data.episodes), data.rows, tuple(failed), lost)
 
 
-def _try(row: PoolRow) -> str:
-    return try_out((row.scene_xml, row.embodiment, row.witness))
-
-
-def _lost(row: PoolRow, reason: str) -> str:
-    return f"{row.id}: playing it {reason}"
+def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
+    return islice(chain.from_iterable(pool.rows() for pool in pools), count)
 
 
 def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:

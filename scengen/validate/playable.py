@@ -1,10 +1,11 @@
 """Whether what a stranger's pool holds can be played at all: tried where it can be ended, before it is looked at."""
 
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 from ..episode import Actions
 from ..errors import Unstable
-from ..parallel import SHOWN, apart
+from ..parallel import SHOWN, apart, each
 from ..pool import NO_WITNESS, PoolRow
 from ..sim.world import World
 
@@ -12,15 +13,29 @@ Played = tuple[str, str, Actions]
 """A scene, its robot, and what is done in it."""
 
 
-def play(what: Played) -> str:
-    """Compile a scene and play actions in it, without looking at what comes of it. Returns nothing."""
+def play(what: Played) -> None:
+    """Compile a scene and play actions in it, without looking at what comes of it."""
     scene_xml, embodiment, actions = what
     world = World.load(scene_xml, embodiment)
     world.reset()
     with suppress(Unstable):  # whoever looks at it sees that too
         for action in actions:
             world.apply(action)
-    return ""
+
+
+def unplayable(rows: Iterable[PoolRow], workers: int = 1) -> Iterator[tuple[str, str]]:
+    """Id and reason of every scenario that crashes, or takes more than a scenario may.
+
+    Raises:
+        ScengenError: a scene does not compile.
+    """
+    tried = each(_try, rows, workers, SHOWN, lambda row, reason: (row.id, f"playing it {reason}"))
+    return (found for found in tried if found is not None)
+
+
+def _try(row: PoolRow) -> tuple[str, str] | None:
+    play((row.scene_xml, row.embodiment, row.witness))
+    return None
 
 
 def check_row(row: PoolRow) -> PoolRow:
