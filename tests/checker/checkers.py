@@ -105,12 +105,20 @@ def _no(why: str) -> int:
     return REFUTED
 
 
+SECONDS, MEGABYTES = 8, 1200
+"""What a command may take for a scenario, instead of minutes and thousands: that it ends is tested, and not when."""
+
+
 def _command(*command: str) -> Checker:
     """A command that opens pools: it judges nothing, and is only asked to end properly."""
 
     def run(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
         from scengen import cli
+        from scengen.commands import export
+        from scengen.parallel import Limits
+        from scengen.validate import playable
 
+        playable.SHOWN = export.SHOWN = Limits(SECONDS, MEGABYTES)
         return cli.run([command[0], f"pool={folder}", *command[1:]])
 
     return run
@@ -118,6 +126,7 @@ def _command(*command: str) -> Checker:
 
 ANY = "id=8"
 """The beginning of an id in the pools that hostile ones are made from."""
+LIMITED = (f"limit_seconds={SECONDS}", f"limit_mb={MEGABYTES}")
 COMMANDS: dict[str, Checker] = {
     "show": _command("show"),
     "show_one": _command("show", ANY),
@@ -126,12 +135,12 @@ COMMANDS: dict[str, Checker] = {
     "film": _command("film", ANY, "to=out.png", "frames=2", "width=64", "height=64"),
     "record": _command("record", "to=out", "cameras=none", "n=1"),
     "evaluate": _command("evaluate", "policy=idle", "seeds=1", "rollouts=1", "to=out"),
-    "attack": _command("attack", "n=1", "budget=2", "to=out"),
+    "attack": _command("attack", "n=1", "budget=2", "to=out", *LIMITED),
     "bias": _command("bias"),
     "compare": _command("compare"),
     "report": _command("report", "to=out.html"),
     "subset": _command("subset", "n=1", "to=out"),
-    "robosuite_one": _command("robosuite", "first=1"),
+    "robosuite_one": _command("robosuite", "first=1", *LIMITED),
 }
 CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)} | COMMANDS
 CONTROLS = ("always", "parse", "hashes")
