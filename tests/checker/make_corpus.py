@@ -19,6 +19,7 @@ import certificates
 import hostile_data
 import hostile_files
 import labels
+import losses
 import make_base
 import scenes
 import witnesses
@@ -28,7 +29,7 @@ from forgery import Case, Draft
 def cases() -> list[Case]:
     """The whole corpus."""
     found = []
-    for module in (accepted, scenes, labels, certificates, witnesses, hostile_data, hostile_files):
+    for module in (accepted, scenes, labels, losses, certificates, witnesses, hostile_data, hostile_files):
         found += [replace(case, kind=module.__name__) for case in module.CASES]
     names = [case.name for case in found]
     twice = {name for name in names if names.count(name) > 1}
