@@ -103,8 +103,11 @@ class Ramp(Prop):
         return self.bend * (1 - math.cos(arc / self.bend)) + (abs(s) - arc) * math.sin(self.slope)
 
     def at_height(self, height: float) -> float:
-        """Where on the far incline the floor is that high [m]."""
-        return self.foot + (height - self.height(self.foot)) / math.sin(self.slope)
+        """Where on the far side the floor is that high [m]: 0 below the valley, and as if the incline were endless."""
+        foot = self.height(self.foot)
+        if height < foot:
+            return self.bend * math.acos(1.0 - max(0.0, height) / self.bend)
+        return self.foot + (height - foot) / math.sin(self.slope)
 
     @property
     def goal(self) -> float:
@@ -136,6 +139,14 @@ class Ramp(Prop):
         if abs(x) <= level:
             return self.bend * math.asin(x / self.bend)
         return math.copysign(self.foot + (abs(x) - level) / math.cos(self.slope), x)
+
+    def part(self, s: float) -> str:
+        """The part of the floor at s, by the name of its body."""
+        low, high = self.patch
+        for name, end in (("near", -self.foot), ("valley", self.foot), ("far", low), ("patch", high)):
+            if s < end:
+                return name
+        return "beyond"
 
     # --- motion of a ball -----------------------------------------------------------------
 

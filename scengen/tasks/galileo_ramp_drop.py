@@ -105,15 +105,20 @@ class GalileoRampDrop(Scenario):
         """Find the height by energy, bring the ball there, let it go, keep out of its way."""
         yield from self.release_at(world, self.start)
 
-    def release_at(self, world: World, s: float, on: str = "ramp/near") -> Plan:
+    def release_at(self, world: World, s: float) -> Plan:
         """Take the ball from the tray and release it at rest on the floor of the ramp, at s [m]."""
-        yield from self._drop_at(world, s, on)
+        yield from self._drop_at(world, s)
         yield from retreat(world.arm, LIFT)
 
-    def _drop_at(self, world: World, s: float, on: str = "ramp/near") -> Plan:
+    def _drop_at(self, world: World, s: float) -> Plan:
         """As `release_at`, but the open jaw stays."""
         yield from self._take(world)
-        yield from put(world.arm, "ball", self.resting(s), on, hover=LIFT, down=-self.axes @ self.ramp.normal(s))
+        yield from self._put_at(world, s)
+
+    def _put_at(self, world: World, s: float, hover: float = LIFT) -> Plan:
+        """Lower the held ball on the floor at s and let it go. Lengths in [m]."""
+        on, down = f"ramp/{self.ramp.part(s)}", -self.axes @ self.ramp.normal(s)
+        yield from put(world.arm, "ball", self.resting(s), on, hover, down)
 
     def _take(self, world: World) -> Plan:
         """Take the ball from the tray. The hand turns first: both at once may bend the arm out of reach."""
@@ -128,7 +133,7 @@ class GalileoRampDrop(Scenario):
         plans = {
             "as_high_as_possible": Shortcut(partial(self.release_at, s=self.brim)),
             "half_as_high": Shortcut(partial(self.release_at, s=-self.ramp.at_height(start / 2))),
-            "carry_it_to_the_patch": Shortcut(partial(self.release_at, s=patch, on="ramp/patch")),
+            "carry_it_to_the_patch": Shortcut(partial(self.release_at, s=patch)),
             "catch_it_and_try_higher": Shortcut(self._try_higher),
             "let_it_bounce_across": Shortcut(partial(self.let_fall, s=-0.05, height=0.12)),
         }
@@ -144,8 +149,7 @@ class GalileoRampDrop(Scenario):
             yield from wait(arm, lambda: math.dist(world.com("ball"), arm.hand) > 0.12, give_up=2.0)
             yield from wait(arm, lambda: math.dist(world.com("ball"), arm.hand) < 0.08, give_up=3.0)
             yield from grasp(arm)
-            s = -self.ramp.at_height(height := height + 0.004)
-            yield from put(arm, "ball", self.resting(s), "ramp/near", hover=0.02, down=-self.axes @ self.ramp.normal(s))
+            yield from self._put_at(world, -self.ramp.at_height(height := height + 0.004), hover=0.02)
 
     def let_fall(self, world: World, s: float, height: float) -> Plan:
         """Let the ball fall on the ramp at s from a height [m]: it bounces, and may come down on the patch."""

@@ -129,9 +129,18 @@ def test_the_floor_is_where_the_formulas_say_and_no_seam_stands_out(angle, bend,
 
 @given(angle=st.floats(10.0, 60.0), bend=st.floats(0.05, 0.14), at=st.floats(-0.98, 0.98))
 @settings(max_examples=60, deadline=None)
-def test_the_place_below_a_point_is_found(angle, bend, at):
+def test_a_place_is_found_by_what_is_above_it_and_by_its_height(angle, bend, at):
     ramp = Ramp(angle=angle, bend=bend)
-    assert ramp.below(ramp.floor(at * ramp.top)[0]) == pytest.approx(at * ramp.top, abs=1e-9)
+    s = at * ramp.top
+    assert ramp.below(ramp.floor(s)[0]) == pytest.approx(s, abs=1e-9)
+    assert ramp.at_height(ramp.height(s)) == pytest.approx(abs(s), abs=1e-6)
+
+
+def test_the_parts_of_the_floor_follow_each_other():
+    ramp = Ramp()
+    low, high = ramp.patch
+    places = (-0.2, -0.001 - ramp.foot, 0.0, ramp.foot + 0.001, (low + high) / 2, high + 0.001)
+    assert [ramp.part(s) for s in places] == ["near", "near", "valley", "far", "patch", "beyond"]
 
 
 @given(level=st.floats(0.3, 0.8), angle=angles, friction=st.floats(0.0, 0.5))
