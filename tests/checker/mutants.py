@@ -184,14 +184,20 @@ def _lines(outcome: Outcome) -> set[str]:
     return {line for line in outcome.text.splitlines() if not re.match("verify .* of", line)}
 
 
-def judge(draft: Draft, level: str) -> Outcome:
-    """What verification says of a lie; one that cannot be written in the format is kept out by that."""
+def judge(draft: Draft, level: str, as_it_was: bytes = b"") -> Outcome:
+    """What verification says of a lie; one that cannot be written in the format is kept out by that.
+
+    Args:
+        as_it_was: the manifest of the sound pool; if nothing was changed in the files, nothing is to be said.
+    """
     with tempfile.TemporaryDirectory() as folder:
         pool = Path(folder, "pool")
         try:
             draft.write(pool)
         except Exception as error:  # whatever pyarrow and json have to say about values of another type
             return Outcome("", "", "end", "reject", "", f"not written: {error!r}", 0.0, 0.0, 0.0)
+        if (pool / "manifest.json").read_bytes() == as_it_was:
+            return Outcome("", "", "end", "reject", "", "not written: the format has no place for it", 0.0, 0.0, 0.0)
         case = Case("mutant", "", "end", level=level)
         return attempt(case, pool, "scengen")
 
@@ -207,11 +213,13 @@ def run(count: int, seed: int, level: str, names: list[str]) -> int:
             sound = judge(copy.deepcopy(draft), level)
             if sound.verdict != "accept":
                 sys.exit(f"{name} is not sound: {sound.text}")
-            mutators.append((name, _lines(sound), Mutator(draft, pick.randrange(2**32))))
+            copy.deepcopy(draft).write(Path(scratch, f"{name}_again"))
+            text = Path(scratch, f"{name}_again", "manifest.json").read_bytes()
+            mutators.append((name, _lines(sound), text, Mutator(draft, pick.randrange(2**32))))
         for k in range(count):
-            name, usual, mutator = mutators[k % len(mutators)]
+            name, usual, text, mutator = mutators[k % len(mutators)]
             lie, draft = mutator.lie()
-            outcome = judge(draft, level)
+            outcome = judge(draft, level, text)
             free = next((why for pattern, why in free_here.items() if re.search(pattern, lie)), "")
             kind = "unwritten" if outcome.text.startswith("not written") else outcome.verdict
             if kind == "accept":
