@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -289,7 +288,7 @@ def _finish(
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
     kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in _WITHOUT_ROW]
-    reasons = Counter(f"{r.check}: {_NUMBER.sub('#', r.reason)}" for r in counted if r.check not in ("", "feasible"))
+    reasons = Counter(pool.uncounted(f"{r.check}: {r.reason}") for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
     counts = funnel(counted)
@@ -307,7 +306,3 @@ def _finish(
     written = pool.write(folder, manifest, journal.rows(certified), list(journal.rows(kept)))
     cpu = math.fsum(r.cpu for r in counted)
     return Summary(written, len(certified), len(counted), counts, dict(reasons), first, report, cpu)
-
-
-_NUMBER = re.compile(r"\d+(\.\d+)?")
-"""Numbers in a reason; without them, rejections of the same kind have the same reason and can be counted."""
