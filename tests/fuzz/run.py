@@ -105,6 +105,8 @@ WORK = (
     "scengen.validate.certify.certify",
     "scengen.runs.generate.each",
     "scengen.evaluate.rollouts.each",
+    "scengen.evaluate.rollouts.unplayable",
+    "scengen.export.recording.unplayable",
     "scengen.validate.verify.verify",
     "scengen.commands.verify.verify",
     "scengen.commands.attack.attack",
