@@ -66,7 +66,7 @@ CLEAR = 0.004
 """Least air between trap and stool, and between trap and table [m]: nobody places a cage more exactly than 2 mm."""
 GIVE = math.radians(6.0)
 """How far below the angle of the law the ball may pass the sill [rad]. Where the floor turns at up to 2 rad/s it
-passes at 1.9 deg above it or more (160 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 9 deg below."""
+passes at 1.2 deg above it or more (120 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 8 deg below."""
 LEVEL = Pace(0.20, 0.01)
 """With the cage in the hand: slow enough for the sill to hold the ball."""
 
