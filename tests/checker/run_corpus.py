@@ -141,7 +141,7 @@ def main() -> int:
     if "robosuite" in asked.checker and asked.checker != ["robosuite"]:
         parser.error("robosuite judges accepted pools only; run it alone")
     if asked.checker == ["robosuite"]:
-        chosen = [c for c in chosen if c.expect == "accept"]
+        chosen = [replace(c, says="") for c in chosen if c.expect == "accept"]  # it tells of no configuration
     if set(asked.checker) <= COMMANDS.keys():
         chosen = [replace(c, expect="end", says="") for c in chosen if c.kind.startswith("hostile")]
     if not asked.again:
