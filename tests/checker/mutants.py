@@ -47,6 +47,7 @@ OTHER_TYPES = [None, [], {}, "", 0, [[]], {"a": {}}, [1, 2], True]
 
 FREE: dict[str, dict[str, str]] = {
     "replay": {
+        r"checks\.0\.numbers\.|checks\.8\.numbers\.bound": "the last digits of what is computed",
         r"checks\.5\.numbers\.(reason|seconds|outcome)": "how waiting fails",
         r"checks\.2\.numbers|checks\.3\.numbers": "how far bodies overlap and drift, within the limits",
         r"checks\.6\.numbers": "how shortcuts fail",
@@ -54,6 +55,7 @@ FREE: dict[str, dict[str, str]] = {
         r"checks\.10\.numbers": "how the witness fails without the means",
     },
     "recheck": {
+        r"checks\.8\.numbers\.bound": "the last digits of what is computed",
         r"checks\.6\.numbers": "how shortcuts fail",
         r"checks\.8\.numbers\.failures": "how jittered runs fail",
     },
