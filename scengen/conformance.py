@@ -24,7 +24,6 @@ from .sim import scene_text
 from .validate.certify import NOT_TRIED, certify
 from .validate.settings import QUICK
 
-
 TRIED = 2
 """How many shortcuts of every scenario must be carried out to their end: one that gives up shows nothing."""
 
