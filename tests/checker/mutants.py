@@ -100,6 +100,8 @@ class Mutator:
         top = pick.choice(list(tops) * 2 + ["manifest"])
         path, old = pick.choice([(p, v) for p, v in leaves(tops[top]) if p[0] not in ("shards", "rejected")])
         new = self._other(old)
+        while not isinstance(old, np.ndarray) and not isinstance(new, np.ndarray) and new == old:
+            new = self._other(old)
         told = f"{top}.{'.'.join(map(str, path))}: {_short(old)} -> {_short(new)}"
         if pick.random() < 0.3 and not isinstance(old, (np.ndarray, bool)) and old not in ("", 0, 1, [], {}, None):
             draft.manifest = replaced(draft.manifest, old, new)
