@@ -41,7 +41,7 @@ class SpelledShortcut(DominoSingle):
     """A name that a shell would take apart."""
 
     def shortcuts(self):
-        return {"push the slab": Shortcut(self._push_slab)}
+        return {**super().shortcuts(), "push the slab": Shortcut(self._push_slab)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class SpelledAblation(DominoSingle):
 @pytest.mark.parametrize(
     ("family", "says"),
     [
-        (NoShortcuts, "domino_single/id/0 has no shortcuts"),
+        (NoShortcuts, "domino_single/id/0 has 0 shortcuts: 2 at least"),
         (NoAblations, "domino_single/id/0 has no ablations"),
         (EmptyAblation, "the ablation 'no_chain' takes nothing away"),
         (SpelledShortcut, "the shortcut 'push the slab' has no name in snake_case"),
