@@ -22,18 +22,20 @@ Written by `make attacks`: what the built-in adversary (`scengen attack`) came t
 each task, every plan both through the teleoperation filter and raw. It knows nothing of a task but its bodies, a
 witness, and what the family says is asked for.
 
-* **random**: one to five random moves (pick, push, place, press, turn, shake, throw, wait), and what a search makes of
-  them from rare states. **retries**: one move repeated while a height, a tilt, a place or a direction is swept.
-  **foreign**: witnesses of the other scenarios. **own**: the witness with a phase dropped, repeated, mirrored, slowed
-  or quickened: most of these still do what the task asks for, and bound nothing. **shortcuts**: the declared ones,
-  alone and in sequence. Each with its hits of rollouts and the one-sided 95 % Clopper-Pearson bound of the rate.
+* **random**: one to five random moves from the start (pick, push, place, press, turn, shake, throw, wait). **foreign**:
+  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in sequence. Each with its hits of
+  rollouts and the one-sided 95 % Clopper-Pearson bound of the rate.
+* **retries**: one move repeated while a height, a tilt, a place or a direction is swept, often from where the scenario's
+  own witness has come to. **own**: that witness with a phase dropped, repeated, mirrored, slowed or quickened, and a
+  search that goes on from its states. Whoever is given the solution may well solve the rest: these look for ways
+  around, and their rates bound nothing.
 * **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, given one after
   the other without looking: share of fresh draws that they solve, and its bound. "-" where what is asked for is no
   number, or where a wrong answer ends the episode.
 * **refuting**: hits that lack a contact which the oracle needs in every jittered run: a way around the task. There may
   be none; whoever finds one, please tell us.
 
-| task | random | retries | foreign | own | shortcuts | 1 fixed | 2 fixed | 3 fixed | rollouts | refuting |
+| task | random | foreign | shortcuts | 1 fixed | 2 fixed | 3 fixed | retries | own | rollouts | refuting |
 |---|---|---|---|---|---|---|---|---|---|---|
 """
 
@@ -57,12 +59,13 @@ def main(budget: str, *tasks: str) -> None:
 
 def line(report: Mapping[str, Any]) -> str:
     """One task in the table."""
-    tiers = (("random", "search"), ("retry",), ("foreign",), ("witness",), ("shortcut",))
+    blind, given = (("random",), ("foreign",), ("shortcut",)), (("retry",), ("witness", "search"))
     fixed = {len(prior["values"]): _share(prior) for prior in report["priors"]}
     cells = [
         report["task"],
-        *(_counted(rate for rate in report["rates"] if rate["tier"] in names) for names in tiers),
+        *(_counted(rate for rate in report["rates"] if rate["tier"] in names) for names in blind),
         *(fixed.get(count, "-") for count in (1, 2, 3)),
+        *(_counted(rate for rate in report["rates"] if rate["tier"] in names) for names in given),
         str(report["rollouts"]),
         str(len(report["hits"])),
     ]
