@@ -25,10 +25,10 @@ witness, and what the family says is asked for.
 * **random**: one to five random moves from the start (pick, push, place, press, turn, shake, throw, wait). **foreign**:
   witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in sequence. Each with its hits of
   rollouts and the one-sided 95 % Clopper-Pearson bound of the rate.
-* **retries**: one move repeated while a height, a tilt, a place or a direction is swept, often from where the own witness
-  has come to. **own**: that witness with a phase dropped, repeated, mirrored, slowed or quickened, and a search that goes
-  on from its states. Whoever is given the solution may well solve the rest: these look for ways around, and their rates
-  bound nothing.
+* **retries**: one move repeated while a height, a tilt, a place or a direction is swept, often from where the own
+  witness has come to. **own**: that witness with a phase dropped, repeated, mirrored, slowed or quickened, and a search
+  that goes on from its states. Whoever is given the solution may well solve the rest: these look for ways around, and
+  their rates bound nothing.
 * **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, given one after
   the other without looking: share of fresh draws that they solve, and its bound. "-" where what is asked for is no
   number, or where a wrong answer ends the episode.
