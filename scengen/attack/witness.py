@@ -1,6 +1,5 @@
 """A witness taken apart: where the hand was, the phases that it went through, and plans that follow them."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -176,7 +175,7 @@ def _aim(path: Trace, begin: int, row: int, sign: Vec3) -> Mat3:
     return rotation(-sign * between(path.rots[begin], path.rots[row])) @ path.rots[begin]
 
 
-def again(actions: Actions, raw: bool) -> Iterator[NDArray[np.float64]]:
+def again(actions: Actions, raw: bool) -> Plan:
     """Recorded actions once more: as they were received, or as they must be asked for to come through the filter."""
     before = np.zeros(MOTION)
     for action in np.asarray(actions, float):

@@ -32,8 +32,10 @@ def remark(text: str) -> None:
     warn(f"scengen: {text}", "yellow")
 
 
-def one(pool: str | list[str]) -> str:
+def one(pool: str | list[str] | None) -> str:
     """The only pool named, for a command that takes one."""
+    if pool is None:
+        raise BadConfig("no pool was named; say pool=FOLDER")
     if isinstance(pool, list):
         raise BadConfig(f"pool = {cut(','.join(pool))}; this command takes one pool")
     return pool

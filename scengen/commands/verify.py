@@ -57,7 +57,7 @@ def command(arguments: Arguments) -> int:
     if (settings.pool is None) == (settings.hits is None):
         raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
     if settings.hits is not None:
-        return _hits(settings, arguments)
+        return _hits(settings.hits, arguments)
     pool = Pool.open(one(settings.pool))
     task = config.task(pool.task, search_path(arguments))
     limits = Limits(settings.limit_seconds, settings.limit_mb)
@@ -98,11 +98,11 @@ def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
     return list(wrong_hits(*of))
 
 
-def _hits(settings: Settings, arguments: Arguments) -> int:
+def _hits(hits: str, arguments: Arguments) -> int:
     """Replay hits of the adversary: files, or all of a folder."""
-    paths = sorted(Path(settings.hits).glob("*.npz")) if Path(settings.hits).is_dir() else [Path(settings.hits)]
+    paths = sorted(Path(hits).glob("*.npz")) if Path(hits).is_dir() else [Path(hits)]
     if not paths:
-        raise BadConfig(f"hits = {settings.hits}; the folder holds no hits (*.npz) of scengen attack")
+        raise BadConfig(f"hits = {hits}; the folder holds no hits (*.npz) of scengen attack")
     wrong = 0
     for path in paths:
         hit = Hit.load(path)
