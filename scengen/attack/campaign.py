@@ -146,7 +146,7 @@ def attack(
     subjects: Sequence[Subject],
     settings: Settings,
     folder: Path,
-    progress: Callable[[int, int], None] = lambda done, hits: None,
+    progress: Callable[[int, int], None],
 ) -> Report:
     """Attack every subject, continuing what stands in `folder`; hits are stored there.
 

@@ -1,6 +1,7 @@
 """The adversary as a check of a certificate: a few rollouts that need nothing but the scenario and its witness."""
 
 from ..validate.certify import Finding, Trial
+from .evidence import spelled
 from .play import Arena
 from .retries import RETRY
 from .search import RANDOM, SEARCH, Attack
@@ -20,8 +21,7 @@ def attacked(trial: Trial) -> Finding:
     arena = Arena(trial.scenario, trial.text, trial.embodiment, trial.horizon, trial.witness.actions)
     result = Attack(arena, seed=0).run(trial.settings.attack, TIERS)
     numbers = {
-        f"{rate.tier}_{'raw' if rate.raw else 'filtered'}": {"rollouts": rate.rollouts, "hits": rate.hits}
-        for rate in result.rates
+        f"{rate.tier}_{spelled(rate.raw)}": {"rollouts": rate.rollouts, "hits": rate.hits} for rate in result.rates
     }
     around = next((hit for hit in result.hits if hit.refutes), None)
     reason = f"a way around, {around}" if around else ""

@@ -29,6 +29,11 @@ VARIED = 3
 """Jittered runs of the oracle: a contact that is missing in one of them is no part of the solution."""
 
 
+def spelled(raw: bool) -> str:
+    """How actions come to the controller, in a word."""
+    return "raw" if raw else "filtered"
+
+
 @dataclass(frozen=True)
 class Hit:
     """A rollout of the adversary that reached the goal, and does so again in a fresh world, bit for bit."""
@@ -62,11 +67,11 @@ class Hit:
     @property
     def name(self) -> str:
         """Of its files."""
-        return f"{self.scenario}-{self.tier}-{'raw' if self.raw else 'filtered'}-{self.digest[:6]}"
+        return f"{self.scenario}-{self.tier}-{spelled(self.raw)}-{self.digest[:6]}"
 
     def __str__(self) -> str:
         contacts = " without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
-        return f"by {self.tier}, {'raw' if self.raw else 'filtered'},{contacts}: {self.plan}"
+        return f"by {self.tier}, {spelled(self.raw)},{contacts}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
         """Everything but actions and parameters."""

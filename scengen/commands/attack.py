@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import config
 from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
-from ..attack.evidence import Hit
+from ..attack.evidence import Hit, spelled
 from ..attack.priors import Prior
 from ..config import read, search_path
 from ..errors import BadConfig
@@ -67,8 +67,7 @@ def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Su
 def _remarks(report: Report) -> list[str]:
     counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
     untried = [
-        f"not tried {times} times: {name} ({'raw' if raw else 'filtered'}): {reason}"
-        for (name, raw, reason), times in counts.items()
+        f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()
     ]
     return [*map(_fixed, report.priors), *untried, *(f"unknown: the attack on {one}" for one in report.lost)]
 

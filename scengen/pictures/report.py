@@ -10,7 +10,7 @@ import jinja2
 from rich.table import Table
 
 from ..attack.campaign import Report as AttackReport
-from ..attack.evidence import Rate
+from ..attack.evidence import Rate, spelled
 from ..certificate import STAGES
 from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
@@ -63,7 +63,7 @@ def attack_table(report: AttackReport) -> Table:
 
 def _cells(rate: Rate) -> list[str]:
     """One line of the table in words."""
-    kind, counts = "raw" if rate.raw else "filtered", (str(rate.rollouts), str(rate.hits))
+    kind, counts = spelled(rate.raw), (str(rate.rollouts), str(rate.hits))
     return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]
 
 

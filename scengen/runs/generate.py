@@ -141,7 +141,8 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
     try:
         records = journal.records()
         _extend(job, settings, records, journal, progress)
-        report = _attack(job, settings, records, journal, progress) if settings.attack else None
+        asked = settings.attack and _chosen(records, settings.n)
+        report = _attack(job, settings, records, journal, progress) if asked else None
         try:
             return _finish(folder, identity, settings, records, journal, report)
         except OSError as error:

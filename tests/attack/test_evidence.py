@@ -95,3 +95,9 @@ def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys,
     argv = ["attack", "task=domino_single", "n=1", "budget=2", "tiers=[random]", f"to={tmp_path}"]
     assert cli.run(argv) == 2
     assert "unknown: the attack on" in capsys.readouterr().out
+
+
+def test_a_run_that_certifies_nothing_has_nothing_to_attack(tmp_path, capsys):
+    argv = ["generate", "task=domino_single", "n=1", "limit=1", "attack=4", "task.horizon=0.05"]
+    assert cli.run([*argv, f"pool={tmp_path / 'pool'}"]) == 1
+    assert "only 0 of 1 could be certified" in capsys.readouterr().err
