@@ -1,0 +1,71 @@
+"""Plates with a raised rim: a flat foot, a wall that slopes upwards, and a level lip."""
+
+import math
+from dataclasses import dataclass
+
+from ..params import param
+from .prop import Rgba, show
+from .turned import PROUD, SHORTEST, Section, Turned
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plate(Turned):
+    """A plate that stands on the middle of its foot. Without `rise` it is a disc.
+
+              ______                            ______   lip
+                    \\__                    __//
+                       \\__________________//   wall
+                           foot
+
+    Thickness: paper, App. C ("3 thicknesses: 2, 3, 5 mm; 4 diameters"), which gives no other length and no mass.
+    Dessert, salad, dinner and large dinner plates are 0.16, 0.20, 0.24 and 0.26 m wide. 0.050 kg is a plate of moulded fibre.
+    """
+
+    radius: float = param(0.110, "m", 0.080, 0.135)
+    """Outer one."""
+    foot: float = param(0.050, "m", 0.025, 0.052)
+    """Radius of the flat part, on which the plate stands."""
+    lip: float = param(0.022, "m", 0.0, 0.025)
+    """Width of the level part at the rim."""
+    rise: float = param(0.030, "m", 0.0, 0.040)
+    """Height of the lip's underside above the ground."""
+    thickness: float = param(0.005, "m", 0.0015, 0.008)
+    """Along the vertical, everywhere."""
+    hole: float = param(0.0, "m", 0.0, 0.020)
+    """Radius of a round hole in the middle of the foot; 0: none."""
+    mass: float = param(0.050, "kg", 0.01, 1.0)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
+
+    @property
+    def stance(self) -> tuple[float, float]:
+        return self.foot, self.thickness
+
+    @property
+    def height(self) -> float:
+        """Of the lip's upper side above the ground [m]."""
+        return self.rise + self.thickness
+
+    @property
+    def pressed_tilt(self) -> float:
+        """Tilt at which the lip, pressed down, touches the ground [rad]; the plate turns about its foot's edge."""
+        return math.atan2(self.rise, self.radius - self.foot)
+
+    @property
+    def sections(self) -> list[Section]:
+        hole = self.hole if self.hole >= SHORTEST else 0.0
+        lip = self.lip if self.lip >= SHORTEST else 0.0
+        ends = [("bottom", hole, 0.0, self.foot, 0.0), ("wall", self.foot, 0.0, self.radius - lip, self.rise)]
+        if lip:
+            ends.append(("lip", self.radius - lip, self.rise, self.radius, self.rise))
+        return [self._strip(*end) for end in ends]
+
+    def _strip(self, name: str, inner: float, start: float, outer: float, stop: float) -> Section:
+        """What lies between two radii, its underside from height `start` to `stop` [m]."""
+        t = self.thickness
+        return Section(name, ((inner, start + PROUD), (outer, stop + PROUD), (outer, stop + t), (inner, start + t)))
+
+
+if __name__ == "__main__":
+    for plate in (Plate(), Plate(lip=0.0, rise=0.012), Plate(rise=0.0)):
+        show(plate)

@@ -1,0 +1,133 @@
+"""Solids of revolution: sections of a profile, turned about the vertical and cut into convex wedges.
+
+        z
+        |      __     A section is a convex polygon of radii and heights. Turned about the axis and cut by `SECTORS`
+        |    _/ /     planes through the axis, it leaves the wedges
+        |___/ _/
+        |____/            { (x, y, z): (x, z) in the section, |y| <= x tan(pi / SECTORS) }.
+        +---------- r
+                      They are cut out by planes alone, so that each is the hull of its corners. A section that reaches
+                      the axis is not cut: turned, it is convex as it is.
+
+Flat faces stand for round walls and touch them from outside, in the middle of each sector: nothing hollow is narrower
+than nominal, and nothing stands out by more than 1 / cos(pi / SECTORS) - 1 = 0.9 % of its radius. All sectors share the
+mesh of one wedge. Mass and inertia are those of the round solid.
+
+Such a solid stands on a ring of small spheres, its feet: MuJoCo gives two convex geoms one point of contact, and a disc
+on one point rocks.
+"""
+
+import abc
+import itertools
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import UP, Mat3, Vec3, heading, quat
+from .prop import Prop, Rgba, solid
+
+SECTORS = 24
+"""Wedges in a full turn."""
+FEET = 8
+FOOT = 0.001
+"""Radius of a foot [m], or half the thickness of a thinner floor."""
+PROUD = 0.0002
+"""How far feet stand out of the underside [m]. At a tilt of 0.2 rad the underside's edge takes over from them."""
+SHORTEST = 1e-4
+"""Details that are smaller are left out [m]."""
+
+MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+@dataclass(frozen=True)
+class Section:
+    """A convex polygon of the profile."""
+
+    name: str
+    corners: tuple[tuple[float, float], ...]
+    """Radius and height of each [m], counterclockwise with the radius to the right and the height upwards."""
+    friction: float | None = None
+    """Sliding friction of its surface; None: the whole solid's."""
+
+    @property
+    def reaches_axis(self) -> bool:
+        return min(radius for radius, _ in self.corners) == 0.0
+
+    def moments(self) -> NDArray[np.float64]:
+        """Integrals of r, r z, r z^2 and r^3 over the polygon [m^3, m^4, m^5, m^5]: a fan of triangles, each exact.
+
+        The rule of four points is exact for polynomials of degree 3 (Strang and Fix).
+        """
+        points = np.array(self.corners)
+        rule = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
+        weights = np.array([-27, 25, 25, 25]) / 48
+        total = np.zeros(4)
+        for second, third in itertools.pairwise(points[1:]):
+            (a, b), (c, d) = second - points[0], third - points[0]
+            r, z = (rule @ np.array([points[0], second, third])).T
+            total += (a * d - b * c) / 2 * np.array([r, r * z, r * z**2, r**3]) @ weights
+        return total
+
+    def wedge(self) -> NDArray[np.float64]:
+        """Corners of the wedge around the x axis, or of the whole turned section if it reaches the axis, (n, 3) [m]."""
+        half = math.pi / SECTORS
+        angles = half * (2 * np.arange(SECTORS) + 1) if self.reaches_axis else np.array([-half, half])
+        rays = np.stack([np.cos(angles), np.sin(angles)], axis=1) / math.cos(half)
+        return np.vstack([np.column_stack([r * rays, np.full(len(rays), z)]) for r, z in self.corners])
+
+
+class Turned(Prop):
+    """What all solids of revolution share. Subclasses are dataclasses that name the lengths of their profile."""
+
+    mass: float
+    friction: float
+    rgba: Rgba
+
+    @property
+    @abc.abstractmethod
+    def sections(self) -> list[Section]:
+        """The profile. Sections touch; where they overlapped mass would count twice."""
+
+    @property
+    @abc.abstractmethod
+    def stance(self) -> tuple[float, float]:
+        """Radius of the flat underside, at height `PROUD`, and thickness of the floor above it [m]."""
+
+    def inertial(self) -> tuple[Vec3, Mat3]:
+        """Centre of mass [m] and inertia about it [kg m^2] of the round solid, of one density."""
+        total = np.sum([section.moments() for section in self.sections], axis=0)
+        volume, first, second, cubed = 2 * math.pi * total
+        density, height = self.mass / volume, first / volume
+        across = density * (cubed / 2 + second) - self.mass * height**2
+        return np.array([0.0, 0.0, height]), np.diag([across, across, density * cubed])
+
+    @property
+    def tipping_angle(self) -> float:
+        """Tilt at which the centre of mass passes over the edge of the underside [rad]."""
+        return math.atan2(self.stance[0], self.inertial()[0][2])
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        com, inertia = self.inertial()
+        body.explicitinertial, body.mass, body.ipos = True, self.mass, com
+        body.fullinertia = np.array([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
+        for section in self.sections:
+            self._turn(section, body, spec)
+        edge, floor = self.stance
+        radius = min(FOOT, floor / 2)
+        for i in range(FEET):
+            pos = (edge - radius) * heading(360.0 * i / FEET) + radius * UP
+            solid(body, f"foot_{i}", [radius], pos, type=SPHERE, friction=self.friction, mass=0.0, group=3)
+
+    def _turn(self, section: Section, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        """Add the wedges of a section; they share one mesh."""
+        spec.add_mesh(name=section.name, uservert=section.wedge().ravel().tolist())
+        friction = self.friction if section.friction is None else section.friction
+        for i in range(1 if section.reaches_axis else SECTORS):
+            turn = quat("z", 2 * math.pi * i / SECTORS)
+            wedge = solid(
+                body, f"{section.name}_{i}", (), type=MESH, quat=turn, friction=friction, mass=0.0, rgba=self.rgba
+            )
+            wedge.meshname = section.name
