@@ -77,6 +77,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 MOST = {
     "budget": 10_000_000,
+    "any_n": 1_000_000,
     "attack": 1_000_000,
     "comparisons": 1_000_000,
     "first": 1_000_000_000,

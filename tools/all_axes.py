@@ -1,4 +1,4 @@
-"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 [task ...]`
+"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 50 [task]`
 
 Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again. Axes without a
 card keep the line that they have.
@@ -6,12 +6,12 @@ card keep the line that they have.
 
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from scengen import cli, config
 from scengen.analysis.distance import Energy
-from scengen.ood.behaviour import EXTRAPOLATION
 from scengen.ood.boundary import FAILS_AT_ONCE, HOLDS
 
 PAGE = Path("docs/axes.md")
@@ -21,28 +21,39 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
-* **certified**: of how many indices. **true extrapolation**: twins in which the witness of the training twin fails and
-  the oracle succeeds, with Wilson's 95 % interval; **else**: the others. On a cosmetic axis open-loop replay suffices:
-  it asks for no new motion, and perception is not tested.
-* **replay**, **oracle**: where on the path success falls to 50 %; 0 is the edge of training, 1 the far end of the axis,
-  in brackets the 95 % credible interval; `> x`: it holds to the end of the path. `at the edge`: the replay fails as
-  soon as its scene's own value is exchanged for the nearest end of training.
+* **certified**: of how many indices.
+* **verdict**: the strongest memory that the axis breaks. The four columns behind it say, for each memory, how many of
+  its control scenarios within training it solves, then how many OOD twins, and the excess with its 95 % interval.
+  **replay**: the actions that solve the training twin; **object-centric**: its path relative to the bodies that the
+  hand goes to, followed by feedback; **any**: one of 16 training solutions, none of them the twin's own. The control
+  is the scenario remembered, with the axis' own parameters redrawn within training; for **any**, and where training
+  knows one value only (marked *held out*), it is a training scenario that nobody remembers. Twins count that the
+  oracle solves in both arms. `weak`: it solves less than 30 % of its control, and tells nothing.
+  *cosmetic to memory*: some memory solves most of the axis; what is new there is for the eye, if for anything.
+* **replay ends**, **oracle ends**: where on the path success falls to 50 %; 0 is the edge of training, 1 the far end
+  of the axis, in brackets the 95 % credible interval; `> x`: it holds to the end of the path. `at the edge`: the replay
+  fails as soon as its scene's own value is exchanged for the nearest end of training.
 * **energy**: energy distance between the features of the twins [training ranges], what chance gives, and the p value of
   a test that exchanges twins; `equal` where the axis moves no feature.
 
-| task | axis | outside | physics | certified | true extrapolation | else | replay | oracle | energy |
-|---|---|---|---|---|---|---|---|---|---|
+{titles}
+{rule}
 """
+COLUMNS = (
+    *("task", "axis", "outside", "physics", "certified", "verdict"),
+    *("replay", "any replay", "object-centric", "any object-centric"),
+    *("replay ends", "oracle ends", "energy"),
+)
 
 
-def main(n: str, *tasks: str) -> None:
+def main(n: str, any_n: str, *tasks: str) -> None:
     """Make all cards, or those of some tasks, and write their lines."""
     failed = []
     for task in tasks or config.tasks():
         for axis in config.task(task).axes:
-            if cli.run(("axis", f"task={task}", f"axis={axis}", f"n={n}", "workers=2")):
+            if cli.run(("axis", f"task={task}", f"axis={axis}", f"n={n}", f"any_n={any_n}", "workers=2")):
                 failed.append(f"{task}/{axis}")
-    PAGE.write_text(HEAD.format(n=n) + "".join(_lines()))
+    PAGE.write_text(HEAD.format(n=n, titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
 
@@ -63,20 +74,34 @@ def _lines() -> list[str]:
 def _line(card: dict[str, Any]) -> str:
     gaps = [p["relative"] for p in card["proofs"] if p["relative"]]
     leaving = [d["feature"] for d in card["features"] if d["inside"] == 0]
-    share = next(s for s in card["behaviour"] if s["kind"] == EXTRAPOLATION)
     cells = [
         card["task"],
         card["axis"],
         f"{min(gaps):.2g}" if gaps else "another value",
         ", ".join(leaving) or "stays",
         f"{card['funnel']['certified']} of {card['indices']}",
-        f"{share['count']} ({share['low']:.0%} to {share['high']:.0%})",
-        ", ".join(f"{s['count']} {s['kind']}" for s in card["behaviour"] if s["count"] and s is not share),
+        card["verdict"].replace("_", "-").replace("any-", "any "),
+        *map(_rung, card["rungs"]),
         _boundary(card, "replay"),
         _boundary(card, "oracle"),
         str(Energy(**card["energy"])),
     ]
-    return f"| {' | '.join(cells)} |\n"
+    return _row(cells) + "\n"
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _rung(rung: dict[str, Any]) -> str:
+    if not rung["excess"]:
+        return rung["finding"]
+    n, lost = rung["excess"]["twins"], rung["excess"]
+    solved = [round(rung[arm]["value"] * n) for arm in ("training", "here")]
+    held_out = ", held out" if rung["control"].startswith("held") and not rung["name"].startswith("any") else ""
+    weak = "weak, " if rung["finding"] == "too weak" else ""
+    how = f"{lost['value']:+.2f} [{lost['low']:.2f}, {lost['high']:.2f}]"
+    return f"{weak}{solved[0]} → {solved[1]} of {n}, {how}{held_out}"
 
 
 def _boundary(card: dict[str, Any], who: str) -> str:

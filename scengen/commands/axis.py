@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.table import Table
 
 from ..config import read_task
+from ..ood.behaviour import Rung
 from ..ood.card import Card, Settings, make
 from ..runs.progress import ProgressBar
 from ..targets import try_folder
@@ -29,6 +30,15 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
+def _tell(rung: Rung) -> str:
+    """What one kind of memory does, in words."""
+    if not (rung.training and rung.here and rung.excess):
+        return rung.finding
+    rates = f"{rung.training.value:.0%} of {rung.control}, {rung.here.value:.0%} of {rung.excess.twins} twins"
+    lost = f"{rung.excess.value:.0%} lost, 95 % interval {rung.excess.low:.0%} to {rung.excess.high:.0%}"
+    return f"{rung.finding}: {rates} ({lost})"
+
+
 def _table(card: Card) -> Table:
     """The card in a few lines."""
     table = Table(title=f"{card.task}: axis {card.axis}", title_justify="left", show_header=False)
@@ -40,10 +50,11 @@ def _table(card: Card) -> Table:
         table.add_row("physics", f"{found.feature}: " + (f"leaves training ({found.kind})" if found.leaves else how))
     solvable = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
     table.add_row("solvable", solvable)
-    for share in card.behaviour:
-        if share.count:
-            told = f"{share.value:.0%}, 95 % interval {share.low:.0%} to {share.high:.0%}"
-            table.add_row("behaviour", f"{share.kind}: {share.count} ({told})")
+    table.add_row("verdict", card.verdict)
+    for rung in card.rungs:
+        table.add_row(f"memory {rung.name}", _tell(rung))
+    if card.oracle:
+        table.add_row("oracle", f"solves {card.oracle.value:.0%} of {card.oracle.scenarios} twins")
     for who, edge in card.boundaries.items():
         at = ", ".join(f"{name} = {value:.4g}" for name, value in edge.values.items())
         where = f"{edge.middle:.2f} from {edge.low:.2f} to {edge.high:.2f}, the path ends at {edge.end:.2f}"

@@ -1,6 +1,19 @@
-"""What a shift does to behaviour: witnesses of training scenarios are replayed in their OOD twins."""
+"""What memories of training are worth on an axis, each beside its control.
 
-from collections.abc import Callable, Iterable
+That a memorised motion fails out of distribution says nothing as long as it fails within training too. So every kind of
+memory (a rung) is played in two arms: in OOD twins, and in training scenarios that differ from what it remembers as
+much as training scenarios do. `excess` is what it loses from the one to the other, twin by twin.
+
+* `replay`: the actions that solve the training twin; `object_centric`: its path relative to bodies, see `memory`.
+  Control: the same scenario with the axis' own parameters redrawn within training. Where training knows one value
+  only there is no such move. Then both arms play the nearest of `LIBRARY` other memories instead: in the training
+  scenario, and in its OOD twin.
+* `any_replay`, `any_object_centric`: whether any of the `LIBRARY` memories solves it, none of which is the twin's own.
+  Control: the training twin, which none of them remembers either.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -10,131 +23,271 @@ from ..episode import Actions
 from ..errors import Infeasible
 from ..log import Log
 from ..parallel import Limits, each
+from ..params import with_values
+from ..samplers.dists import Fixed
+from ..samplers.keyed import unit
 from ..samplers.split import ID
-from ..samplers.task import Task
+from ..samplers.task import Draw, Task
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
-from ..statistics import wilson
+from ..statistics import Difference, Rate, paired, rate
 from ..validate.identity import source_sha256
 from ..validate.rollout import Rollout, replay, run
+from .memory import Memory, remember
 
-EXTRAPOLATION = "true extrapolation"
-COSMETIC = "cosmetic"
-UNKNOWN = "unknown or refuted"
-BUG = "oracle bug"
-KINDS: dict[tuple[bool, bool], str] = {
-    (False, True): EXTRAPOLATION,
-    (True, True): COSMETIC,
-    (False, False): UNKNOWN,
-    (True, False): BUG,
-}
-"""What it means whether (the actions of the ID twin, the oracle) solves an OOD scenario."""
-
-
+RUNGS = ("replay", "any_replay", "object_centric", "any_object_centric")
+"""From the weakest memory to the strongest."""
+LIBRARY = 16
+"""How many training solutions `any_...` may choose from: those of the first indices of another seed."""
+OWN = 0.9
+"""A rung counts if it solves its own scenario again this often, for example."""
+WORKS = 0.3
+"""A rung that solves fewer scenarios of its control arm is too weak to tell anything about an axis."""
+HALF = 0.5
+"""An axis is cosmetic if a memory solves more than this share of it, by the lower end of the interval."""
+MOVES = 20
+"""Draws of a move within training until one is feasible."""
 LIMITS = Limits(600.0, 4000)
-"""Of one twin: two oracle runs and a replay take some seconds."""
+"""Of one twin: some oracle runs and replays take some seconds."""
+COSMETIC, CANNOT_TELL = "cosmetic to memory", "cannot tell"
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One OOD scenario, tried twice."""
+class Rung:
+    """What one kind of memory does on an axis; twins count that the oracle solves in both arms."""
 
-    index: int
-    replay: bool
-    """Whether the actions that solve its ID twin solve it too."""
-    oracle: bool
-    """Whether its oracle solves it; False too if the scenario is infeasible."""
-    reason: str
-    """Why the replay failed; or why there is no scenario."""
+    name: str
+    own: float
+    """Share of its own scenarios that it solves again."""
+    control: str
+    """`moved within training` or `held-out training`."""
+    training: Rate | None
+    """How often it solves its control; None where there was no twin to try."""
+    here: Rate | None
+    """How often it solves the OOD twin."""
+    excess: Difference | None
+    """`training` minus `here`, by twins."""
 
     @property
-    def kind(self) -> str:
-        """One of the values of `KINDS`."""
-        return KINDS[self.replay, self.oracle]
+    def finding(self) -> str:
+        """`breaks`, `holds` (as far as the interval tells), `too weak`, or `not tried`."""
+        if self.training is None or self.excess is None:
+            return "not tried"
+        if self.own < OWN or self.training.value < WORKS:
+            return "too weak"
+        return "breaks" if self.excess.low > 0 else "holds"
 
 
-@dataclass(frozen=True)
-class Share:
-    """How often one kind occurred, with Wilson's 95 % interval of its share."""
-
-    kind: str
-    count: int
-    value: float
-    low: float
-    high: float
+def verdict(rungs: Iterable[Rung]) -> str:
+    """The strongest memory that an axis breaks; else `COSMETIC` if some memory solves most of it, or `CANNOT_TELL`."""
+    tried = {rung.name: rung for rung in rungs}
+    if broken := [name for name in RUNGS if name in tried and tried[name].finding == "breaks"]:
+        return f"breaks {broken[-1]}"
+    solved = any(rung.here is not None and rung.here.low > HALF for rung in tried.values())
+    return COSMETIC if solved else CANNOT_TELL
 
 
-def try_twins(
+def climb(
     task: Task,
     split: str,
     folder: Path,
+    controls: Path,
     n: int,
+    any_n: int,
     seed: int = 0,
     workers: int = 1,
-    progress: Callable[[int], None] = lambda done: None,
-) -> list[Trial]:
-    """Replay ID witnesses in the first n scenarios of a split, continuing what stands in `folder`.
-
-    Twins that their own oracle cannot solve have no actions and are left out.
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> tuple[list[Rung], Rate | None]:
+    """Play all memories on the first twins of a split, continuing what stands in both folders.
 
     Args:
-        progress: told how many twins are done.
+        controls: where the outcomes in held-out training scenarios stand, which all axes of a task share.
+        n: twins; those that their own oracle cannot solve remember nothing and are left out.
+        any_n: how many of them are also tried with any of the library: that costs `2 * LIBRARY` rollouts each.
+        progress: told what is being done, how far it is, and how much there is.
+
+    Returns:
+        The rungs in the order of `RUNGS`, and how often the oracle solves the split.
     """
-    shifts = {name: str(dist) for name, dist in task.shifts(split).items()}
-    identity = {"task": task.name, "split": split, "shifts": shifts, "seed": seed, "source": source_sha256(task.family)}
-    with Log(folder / "behaviour.jsonl", identity) as log:
-        todo = sorted(set(range(n)) - {r["index"] for r in log.records})
-        for trial in each(partial(_try_twin, task, split, seed), todo, workers, LIMITS, _lost):
-            log.add(trial)
-            progress(len(log.records))
-        records = sorted((r for r in log.records if r["index"] < n), key=lambda r: r["index"])
-    return [Trial(**r) for r in records if r["replay"] is not None]
+
+    def play(work: Callable[..., dict[str, Any]], where: Path, which: str, count: int, what: str) -> list[dict]:
+        shifts = {name: str(dist) for name, dist in task.shifts(which).items()}
+        identity = {"task": task.name, "split": which, "shifts": shifts, "seed": seed, "library": LIBRARY}
+        identity["source"] = source_sha256(task.family)
+        with Log(where, identity) as log:
+            todo = sorted(set(range(count)) - {r["index"] for r in log.records})
+            if todo:
+                _library(task, seed)  # before the workers: they are copies of this process
+            for record in each(partial(work, task, which, seed), todo, workers, LIMITS, _lost):
+                log.add(record)
+                progress(what, len(log.records), count)
+            return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])
+
+    own = play(_own, controls / "own.jsonl", ID, n, "memories in training")
+    any_id = play(_any, controls / "any.jsonl", ID, any_n, "any memory in training")
+    twins = play(_twin, folder / "twins.jsonl", split, n, "memories in twins")
+    any_ood = play(_any, folder / "any.jsonl", split, any_n, "any memory in twins")
+    return _rungs(own, any_id, twins, any_ood), _oracle(twins)
 
 
-def shares(trials: Iterable[Trial]) -> list[Share]:
-    """How often each kind occurred, in the order of `KINDS`."""
-    kinds = [trial.kind for trial in trials]
-    n = len(kinds)
-    counts = {kind: kinds.count(kind) for kind in KINDS.values()}
-    return [Share(kind, k, k / n, *wilson(k / n, n)) for kind, k in counts.items()] if n else []
+def _oracle(twins: list[dict[str, Any]]) -> Rate | None:
+    tried = [[t["here"]["oracle"]] for t in twins if t.get("here")]
+    return rate(tried) if tried else None
 
 
-def try_both(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool, str]:
-    """Whether recorded actions and whether the oracle solve a scenario, and why the replay does not."""
-    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
-    replayed = replay(scenario, world, actions, task.horizon, until_settled=True)
-    return replayed.solved, _solution(scenario, world, task.horizon).solved, replayed.reason
+def _rungs(
+    own: list[dict[str, Any]],
+    any_id: list[dict[str, Any]],
+    twins: list[dict[str, Any]],
+    any_ood: list[dict[str, Any]],
+) -> list[Rung]:
+    """What the records come to."""
+    again = [r["again"] for r in own if r.get("again") is not None]
+    faithful = {name: sum(again) / len(again) if again and "object" in name else 1.0 for name in RUNGS}
+    moved = any(t.get("moved") for t in twins)
+    both = [t for t in twins if t.get("control") and t["control"]["oracle"] and t["here"]["oracle"]]
+    solved = {t["index"] for t in twins if t.get("here") and t["here"]["oracle"]}
+    inside = {r["index"]: r for r in any_id if r.get("any_replay") is not None}
+    pairs = [(inside[r["index"]], r) for r in any_ood if r["index"] in solved & inside.keys()]
+    found = []
+    for name in RUNGS:
+        if name.startswith("any"):
+            a, b = [[p[name]] for p, _ in pairs], [[p[name]] for _, p in pairs]
+        else:
+            a, b = [[t["control"][name]] for t in both], [[t["here"][name]] for t in both]
+        control = "moved within training" if moved and not name.startswith("any") else "held-out training"
+        if a:
+            found.append(Rung(name, faithful[name], control, rate(a), rate(b), paired(a, b)))
+        else:
+            found.append(Rung(name, faithful[name], control, None, None, None))
+    return found
 
 
-def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
-    """Actions with which the oracle solves a training scenario, or None."""
-    return _actions(task.draw(ID, seed, index).scenario, task.horizon, task.embodiment)
+# --- one index ----------------------------------------------------------------------------------
 
 
-@cache
-def _actions(scenario: Scenario, horizon: float, embodiment: str) -> Actions | None:
-    world = World.load(scene_text.emit(scenario.build())[0], embodiment)
-    rollout = _solution(scenario, world, horizon)
-    return rollout.actions if rollout.solved else None
+def _own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
+    """Whether an object-centric memory solves the scenario that it remembers."""
+    scenario, memory = _memory(task, seed, index)
+    return {"index": index, "again": memory and _follows(task, memory, scenario)}
 
 
-def _solution(scenario: Scenario, world: World, horizon: float) -> Rollout:
-    return run(scenario, world, scenario.oracle, horizon, until_settled=True)
-
-
-def _try_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """One trial as plain data; `replay` is None where the twin's oracle gave no actions."""
-    found: tuple[bool | None, bool, str]
-    actions = twin_actions(task, seed, index)
+def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+    """A twin's own memory, or the nearest one, in both arms. No `here` where nothing can be said."""
+    trained, memory = _memory(task, seed, index)
+    moved = any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
+    record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}
+    if memory is None:
+        return record
+    if not moved:
+        memory = _nearest(task, seed, task.draw(ID, seed, index))[0]
     try:
-        scenario = task.draw(split, seed, index).scenario
-        found = try_both(task, actions, scenario) if actions is not None else (None, False, "")
-    except Infeasible as error:
-        found = False, False, str(error)
-    return {"index": index, **dict(zip(("replay", "oracle", "reason"), found, strict=True))}
+        record["here"] = _outcomes(task, memory, task.draw(split, seed, index).scenario)
+    except Infeasible:
+        return record
+    if (control := _move(task, split, seed, index, trained) if moved else trained) is not None:
+        record["control"] = _outcomes(task, memory, control)
+    return record
+
+
+def _any(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+    """Whether any memory of the library solves a scenario, replayed or object-centric."""
+    try:
+        draw = task.draw(split, seed, index)
+    except Infeasible:
+        return {"index": index}
+    memories = _nearest(task, seed, draw)
+    return {
+        "index": index,
+        "any_replay": any(_replays(task, m.actions, draw.scenario) for m in memories),
+        "any_object_centric": any(_follows(task, m, draw.scenario) for m in memories),
+    }
 
 
 def _lost(index: int, reason: str) -> dict[str, Any]:
     """A twin that has crashed its process, or has reached a limit: nothing is known about it."""
-    return {"index": index, "replay": False, "oracle": False, "reason": reason}
+    return {"index": index, "reason": reason}
+
+
+def _outcomes(task: Task, memory: Memory, scenario: Scenario) -> dict[str, bool]:
+    return {
+        "oracle": _solution(task, scenario).solved,
+        "replay": _replays(task, memory.actions, scenario),
+        "object_centric": _follows(task, memory, scenario),
+    }
+
+
+def _move(task: Task, split: str, seed: int, index: int, trained: Scenario) -> Scenario | None:
+    """A training scenario with what the axis moves drawn anew within training; None if no draw is feasible."""
+    for attempt in range(MOVES):
+        fresh = {
+            name: task.training[name].quantile(unit(task.name, name, seed, index, attempt, "moved"))
+            for name in task.shifts(split)
+        }
+        scenario = with_values(trained, fresh)
+        if scenario.infeasible() is None:
+            return scenario
+    return None
+
+
+def _nearest(task: Task, seed: int, draw: Draw) -> list[Memory]:
+    """The library, nearest first: by the quantiles of the parameters that vary in training."""
+
+    def away(quantiles: Mapping[str, float]) -> float:
+        shared = quantiles.keys() & draw.quantiles.keys() - draw.shifted.keys()
+        return math.fsum((quantiles[name] - draw.quantiles[name]) ** 2 for name in sorted(shared))
+
+    return [memory for _, memory in sorted(_library(task, seed), key=lambda known: away(known[0]))]
+
+
+# --- rollouts -----------------------------------------------------------------------------------
+
+
+def try_both(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool]:
+    """Whether recorded actions and whether the oracle solve a scenario."""
+    return _replays(task, actions, scenario), _solution(task, scenario).solved
+
+
+def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
+    """Actions with which the oracle solves a training scenario, or None."""
+    memory = _memory(task, seed, index)[1]
+    return memory and memory.actions
+
+
+def _memory(task: Task, seed: int, index: int) -> tuple[Scenario, Memory | None]:
+    """A training scenario, and how the oracle solves it."""
+    scenario = task.draw(ID, seed, index).scenario
+    return scenario, _remembered(scenario, task.horizon, task.embodiment)
+
+
+def _library(task: Task, seed: int) -> Sequence[tuple[Mapping[str, float], Memory]]:
+    """Memories of training with the quantiles of their scenarios."""
+    draws = [task.draw(ID, seed + 1, index) for index in range(LIBRARY)]
+    known = [(d.quantiles, _remembered(d.scenario, task.horizon, task.embodiment)) for d in draws]
+    return [(quantiles, memory) for quantiles, memory in known if memory is not None]
+
+
+@cache
+def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> Memory | None:
+    world = _world(scenario, embodiment)
+    rollout = run(scenario, world, scenario.oracle, horizon, until_settled=True)
+    return remember(world, rollout.actions) if rollout.solved else None
+
+
+def _world(scenario: Scenario, embodiment: str) -> World:
+    return World.load(scene_text.emit(scenario.build())[0], embodiment)
+
+
+def _solution(task: Task, scenario: Scenario) -> Rollout:
+    return run(scenario, _world(scenario, task.embodiment), scenario.oracle, task.horizon, until_settled=True)
+
+
+def _replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
+    world = _world(scenario, task.embodiment)
+    return replay(scenario, world, actions, task.horizon, until_settled=True).solved
+
+
+def _follows(task: Task, memory: Memory, scenario: Scenario) -> bool:
+    world = _world(scenario, task.embodiment)
+    return run(scenario, world, memory.follow, task.horizon, until_settled=True, raw=True).solved

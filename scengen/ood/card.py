@@ -22,6 +22,7 @@ from ..samplers.split import ID
 from ..samplers.support import Support
 from ..samplers.task import Task
 from ..sim import scene_text
+from ..statistics import Rate
 from ..targets import write
 from ..validate.settings import CertifySettings
 from . import behaviour, boundary, features
@@ -36,6 +37,7 @@ class Settings:
 
     axis: str = ""
     n: int = 50
+    any_n: int | None = None
     seed: int = 0
     rounds: int = 16
     workers: int = 1
@@ -46,6 +48,8 @@ class Settings:
         if self.axis not in task.axes:
             raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
         at_least(self, n=2, seed=0, rounds=2, workers=1)
+        if self.any_n is not None:
+            at_least(self, any_n=0)
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,11 @@ class Card:
     """How many indices had to be tried for n certified scenarios."""
     first_draws: int
     """How many of them were certified as first drawn."""
-    behaviour: list[behaviour.Share]
+    verdict: str
+    """The strongest memory that the axis breaks, see `behaviour.verdict`."""
+    rungs: list[behaviour.Rung]
+    oracle: Rate | None
+    """How often the oracle solves the OOD twins, certified or not."""
     boundaries: dict[str, boundary.Boundary]
     why_no_path: str
     """Why there are no boundaries; empty if there are."""
@@ -78,6 +86,7 @@ class Card:
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
         told = asdict(self)
+        told["rungs"] = [{**asdict(rung), "finding": rung.finding} for rung in self.rungs]
         told["boundaries"] = {k: {**asdict(b), "verdict": b.verdict} for k, b in self.boundaries.items()}
         return told
 
@@ -101,9 +110,9 @@ def make(
     name, n, seed = settings.axis, settings.n, settings.seed
     wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
     made = generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))
-    trials = behaviour.try_twins(
-        task, name, folder, n, seed, settings.workers, lambda done: progress("replay ID witnesses", done, n)
-    )
+    any_n = n if settings.any_n is None else min(n, settings.any_n)
+    controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
+    rungs, oracle = behaviour.climb(task, name, folder, controls, n, any_n, seed, settings.workers, progress)
     boundaries, why_no_path = _boundaries(task, name, folder, seed, settings.rounds, progress)
     twins = [
         (task.draw(ID, seed, index).scenario, task.scenario(params))
@@ -128,7 +137,9 @@ def make(
         made.reasons,
         made.indices,
         made.first_draws,
-        behaviour.shares(trials),
+        behaviour.verdict(rungs),
+        rungs,
+        oracle,
         boundaries,
         why_no_path,
         distance.energy(space.points(training), space.points(here), twins=True),

@@ -1,4 +1,4 @@
-"""Witnesses of ID twins, replayed out of distribution, and the card that tells of it."""
+"""Memories of training, played within training and out of it, and the card that tells of it."""
 
 import json
 
@@ -6,49 +6,100 @@ import pytest
 
 from scengen import cli, config
 from scengen.ood import behaviour
-from scengen.ood.behaviour import BUG, COSMETIC, EXTRAPOLATION, UNKNOWN, Trial, shares, try_twins
-from scengen.statistics import wilson
+from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Rung, climb, verdict
+from scengen.ood.memory import remember
+from scengen.samplers.split import ID
+from scengen.sim import scene_text
+from scengen.sim.world import World
+from scengen.statistics import paired, rate
+from scengen.validate.rollout import run
 
 TASK = config.task("domino_single")
 
 
-def test_the_four_verdicts_are_what_their_names_say():
-    kinds = [Trial(0, replay, oracle, "").kind for replay, oracle in ((0, 1), (1, 1), (0, 0), (1, 0))]
-    assert kinds == [EXTRAPOLATION, COSMETIC, UNKNOWN, BUG]
+def rung(name, training, here, own=1.0):
+    """A rung that solved so many of 20 in either arm."""
+    a, b = ([[i < solved] for i in range(20)] for solved in (training, here))
+    return Rung(name, own, "moved within training", rate(a), rate(b), paired(a, b))
 
 
-def test_shares_add_up_and_carry_wilsons_interval():
-    found = shares([Trial(k, False, k < 6, "") for k in range(8)])
-    assert sum(s.value for s in found) == 1.0 and [s.count for s in found] == [6, 0, 2, 0]
-    assert (found[0].low, found[0].high) == wilson(0.75, 8)
+@pytest.mark.parametrize(
+    ("training", "here", "own", "finding"),
+    [
+        (20, 0, 1.0, "breaks"),
+        (20, 20, 1.0, "holds"),
+        (8, 7, 1.0, "holds"),
+        (4, 0, 1.0, "too weak"),
+        (20, 0, 0.8, "too weak"),
+    ],
+)
+def test_a_memory_counts_where_it_works_within_training(training, here, own, finding):
+    assert rung("replay", training, here, own).finding == finding
 
 
-def test_a_stout_first_tile_defeats_memory_and_a_light_tile_does_not(tmp_path):
-    assert {t.kind for t in try_twins(TASK, "stout_starter", tmp_path / "stout", 2)} == {EXTRAPOLATION}
-    assert {t.kind for t in try_twins(TASK, "light_tiles", tmp_path / "light", 2)} == {COSMETIC}
+def test_the_verdict_names_the_strongest_memory_that_breaks():
+    broken, intact, weak = rung("replay", 20, 0), rung("object_centric", 20, 20), rung("any_replay", 2, 0)
+    assert verdict([broken, weak, intact]) == "breaks replay"
+    assert verdict([broken, rung("object_centric", 19, 2)]) == "breaks object_centric"
+    assert verdict([weak, intact]) == COSMETIC
+    assert verdict([weak]) == verdict([]) == CANNOT_TELL, "a memory that fails in training too is no evidence"
+    assert verdict([Rung("replay", 1.0, "held-out training", None, None, None)]) == CANNOT_TELL
+
+
+def solved(split, index):
+    """A scenario of a split, its world, and the oracle's actions."""
+    scenario = TASK.draw(split, 0, index).scenario
+    world = World.load(scene_text.emit(scenario.build())[0], TASK.embodiment)
+    return scenario, world, run(scenario, world, scenario.oracle, TASK.horizon).actions
+
+
+def test_an_object_centric_memory_follows_its_body():
+    _, world, actions = solved(ID, 0)
+    memory = remember(world, actions)
+    assert [part.body for part in memory.parts] == ["tile_0"] and memory.parts[0].first == 0
+    again, there, _ = solved("diagonal", 0)
+    assert run(again, there, memory.follow, TASK.horizon, raw=True).solved
+
+
+def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
+    task = config.task("tool_retrieve")
+    scenario = task.draw(ID, 0, 0).scenario
+    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    memory = remember(world, run(scenario, world, scenario.oracle, task.horizon).actions)
+    assert [part.body for part in memory.parts] == ["hook", "cube"]
+    assert run(scenario, world, memory.follow, task.horizon, raw=True).solved, "its own scenario again"
+
+
+def test_a_stout_first_tile_breaks_replay_and_a_light_one_does_not(tmp_path):
+    rungs, oracle = climb(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, 4, 0)
+    assert oracle.value == 1.0 and (rungs[0].training.value, rungs[0].here.value) == (1.0, 0.0)
+    assert [r.finding for r in rungs if r.name.startswith("any")] == ["not tried", "not tried"]
+    rungs, _ = climb(TASK, "light_tiles", tmp_path / "light", tmp_path / ID, 2, 1)
+    assert rungs[0].here.value == 1.0 and {r.name: r.excess.twins for r in rungs}["any_object_centric"] == 1
 
 
 def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
-    first = try_twins(TASK, "light_tiles", tmp_path, 1)
+    first = climb(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0)
 
     def never(*_):
         raise AssertionError
 
-    monkeypatch.setattr(behaviour, "_try_twin", never)
-    assert try_twins(TASK, "light_tiles", tmp_path, 1) == first
+    monkeypatch.setattr(behaviour, "_library", never)
+    assert climb(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0) == first
 
 
 def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     far = "task.id.x=[uniform,0.0,0.2]"  # with a stout first tile the chain of index 1 leaves the table
-    argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "rounds=2", far, f"to={tmp_path}")
+    argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "any_n=0", "rounds=2", far, f"to={tmp_path}")
     assert cli.run((*argv, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0
     card = json.loads((tmp_path / "card.json").read_text())
     assert card["proofs"][0]["parameter"] == "starter.thickness" and card["proofs"][0]["gap"] == pytest.approx(0.014)
-    assert card["funnel"]["certified"] == 2 and [s["count"] for s in card["behaviour"]] == [1, 0, 1, 0]
+    assert card["funnel"]["certified"] == 2 and card["oracle"]["scenarios"] == 1
+    assert [r["finding"] for r in card["rungs"]][1::2] == ["not tried", "not tried"]
     assert card["reasons"]["feasible: the chain leaves the table"] == card["funnel"]["proposed"] - 2
     assert card["boundaries"]["replay"]["trials"] == 8 and card["energy"]["distance"] > 1
     page = (tmp_path / "card.html").read_text()
-    assert "true extrapolation" in page and 'src="http' not in page and "<script" not in page
+    assert card["verdict"] in page and 'src="http' not in page and "<script" not in page
     longer = [a.replace("rounds=2", "rounds=3") for a in argv]
     assert cli.run((*longer, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0, "a card can be continued"
     assert json.loads((tmp_path / "card.json").read_text())["boundaries"]["replay"]["trials"] > 8
@@ -60,6 +111,7 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
         (("axis=wide_gap",), "did you mean 'wide_gaps'"),
         (("axis=id",), "no axis of domino_single named 'id'"),
         (("axis=diagonal", "n=1"), "n = 1; it must be at least 2"),
+        (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be at least 0"),
         ((), "axis needs axis=..."),
     ],
 )
