@@ -18,7 +18,7 @@ class Plate(Turned):
                            foot
 
     Thickness: paper, App. C ("3 thicknesses: 2, 3, 5 mm; 4 diameters"), which gives no other length and no mass.
-    Dessert, salad, dinner and large dinner plates are 0.16, 0.20, 0.24 and 0.26 m wide. 0.050 kg is a plate of moulded fibre.
+    Dessert, salad, dinner and large dinner plates are 0.16, 0.20, 0.24 and 0.26 m wide; 0.050 kg is moulded fibre.
     """
 
     radius: float = param(0.110, "m", 0.080, 0.135)

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import UP, Mat3, Vec3, heading, quat
-from .prop import Prop, Rgba, solid
+from .prop import PRIORITY, Prop, Rgba, solid
 
 SECTORS = 24
 """Wedges in a full turn."""
@@ -51,6 +51,8 @@ class Section:
     """Radius and height of each [m], counterclockwise with the radius to the right and the height upwards."""
     friction: float | None = None
     """Sliding friction of its surface; None: the whole solid's."""
+    priority: int = PRIORITY
+    """Of its contacts; see `prop.PRIORITY`."""
 
     @property
     def reaches_axis(self) -> bool:
@@ -96,18 +98,23 @@ class Turned(Prop):
     def stance(self) -> tuple[float, float]:
         """Radius of the flat underside, at height `PROUD`, and thickness of the floor above it [m]."""
 
-    def inertial(self) -> tuple[Vec3, Mat3]:
-        """Centre of mass [m] and inertia about it [kg m^2] of the round solid, of one density."""
+    def round_body(self) -> tuple[float, Vec3, Mat3]:
+        """Volume [m^3] and centre [m] of the round body, and the inertia about it at a density of 1 [m^5]."""
         total = np.sum([section.moments() for section in self.sections], axis=0)
         volume, first, second, cubed = 2 * math.pi * total
-        density, height = self.mass / volume, first / volume
-        across = density * (cubed / 2 + second) - self.mass * height**2
-        return np.array([0.0, 0.0, height]), np.diag([across, across, density * cubed])
+        across = cubed / 2 + second - first**2 / volume
+        return volume, np.array([0.0, 0.0, first / volume]), np.diag([across, across, cubed])
+
+    def inertial(self) -> tuple[Vec3, Mat3]:
+        """Centre of mass [m] and inertia about it [kg m^2], of one density."""
+        volume, centre, inertia = self.round_body()
+        return centre, self.mass / volume * inertia
 
     @property
     def tipping_angle(self) -> float:
-        """Tilt at which the centre of mass passes over the edge of the underside [rad]."""
-        return math.atan2(self.stance[0], self.inertial()[0][2])
+        """Tilt at which the centre of mass passes over the nearest edge of the underside [rad]."""
+        com, _ = self.inertial()
+        return math.atan2(self.stance[0] - math.hypot(com[0], com[1]), com[2])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         com, inertia = self.inertial()
@@ -127,7 +134,6 @@ class Turned(Prop):
         friction = self.friction if section.friction is None else section.friction
         for i in range(1 if section.reaches_axis else SECTORS):
             turn = quat("z", 2 * math.pi * i / SECTORS)
-            wedge = solid(
-                body, f"{section.name}_{i}", (), type=MESH, quat=turn, friction=friction, mass=0.0, rgba=self.rgba
-            )
-            wedge.meshname = section.name
+            wedge = solid(body, f"{section.name}_{i}", (), type=MESH, quat=turn, friction=friction, mass=0.0)
+            wedge.meshname, wedge.priority = section.name, section.priority
+            wedge.rgba = np.array(self.rgba, np.float32)

@@ -1,0 +1,93 @@
+"""Bowls: a spherical shell on a flat foot, with a bead along the rim to be held by."""
+
+import math
+from dataclasses import dataclass
+
+from ..params import param
+from .prop import Rgba, show
+from .turned import PROUD, Section, Turned
+
+BANDS = 6
+"""Cones that stand for the shell. Tangents of the inner sphere, chords of the outer one: 0.25 mm of 3 mm get lost."""
+BEAD = 0.012
+"""Height of the bead [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bowl(Turned):
+    """A bowl that stands on the middle of its foot, which is flush with the shell: no ring stands out to be gripped.
+
+    Radius: paper, App. C ("2 sizes", no lengths): 0.065 and 0.080 m are a cereal and a soup bowl.
+    """
+
+    radius: float = param(0.075, "m", 0.060, 0.095)
+    """Outer one, at the rim."""
+    depth: float = param(0.055, "m", 0.035, 0.060)
+    """Height of the rim above the ground."""
+    foot: float = param(0.028, "m", 0.015, 0.035)
+    """Radius of the flat underside."""
+    wall: float = param(0.003, "m", 0.002, 0.004)
+    bead: float = param(0.005, "m", 0.004, 0.008)
+    """Thickness of the rim, over its last 12 mm; it is thicker towards the inside."""
+    mass: float = param(0.050, "kg", 0.01, 0.5)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    rgba: Rgba = (0.36, 0.52, 0.62, 1.0)
+
+    @property
+    def height(self) -> float:
+        """Of the rim above the ground [m]."""
+        return self.depth
+
+    @property
+    def centre(self) -> float:
+        """Height of the centre of both spheres [m]: as far from the edge of the foot as from the rim."""
+        return ((self.radius**2 - self.foot**2) / (self.depth - PROUD) + self.depth + PROUD) / 2
+
+    @property
+    def outer(self) -> float:
+        """Radius of the outer sphere [m]."""
+        return math.hypot(self.foot, self.centre - PROUD)
+
+    @property
+    def inner(self) -> float:
+        """Radius of the inner sphere [m]: no part of the shell lies within, other than floor and bead."""
+        return self.outer - self.wall
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor inside [m]."""
+        return self._corner(self.inner / math.cos(self._step / 2), self._first)[1]
+
+    @property
+    def stance(self) -> tuple[float, float]:
+        return self.foot, self.floor
+
+    @property
+    def sections(self) -> list[Section]:
+        angles = [self._first + i * self._step for i in range(BANDS + 1)]
+        outside = [self._corner(self.outer, a) for a in angles]
+        inside = [self._corner(self.inner / math.cos(self._step / 2), a) for a in angles]
+        bottom = [(0.0, PROUD), outside[0], inside[0], (0.0, inside[0][1])]
+        shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(BANDS)]
+        edge = [(self.radius, self.depth), (self.radius - self.bead, self.depth)]
+        bead = [outside[-1], *edge, self._corner(self.outer - self.bead, angles[-1])]
+        walls = [Section(f"shell_{i}", corners) for i, corners in enumerate(shell)]
+        return [Section("bottom", tuple(bottom)), *walls, Section("bead", tuple(bead))]
+
+    @property
+    def _first(self) -> float:
+        """Angle at the spheres' centre between the axis and the edge of the foot [rad]."""
+        return math.atan2(self.foot, self.centre - PROUD)
+
+    @property
+    def _step(self) -> float:
+        """Angle of one band [rad]: from the edge of the foot to the lower end of the bead they share the shell."""
+        return (math.acos((self.centre - self.depth + BEAD) / self.outer) - self._first) / BANDS
+
+    def _corner(self, distance: float, angle: float) -> tuple[float, float]:
+        """The point at that distance from the spheres' centre, at that angle from straight down."""
+        return distance * math.sin(angle), self.centre - distance * math.cos(angle)
+
+
+if __name__ == "__main__":
+    show(Bowl())
