@@ -221,9 +221,9 @@ def test_a_cup_tips_where_its_centre_of_mass_passes_its_edge(cup, factor, tips):
     assert (data.xmat[-1, 8] < math.cos(math.radians(20))) == tips
 
 
-@pytest.mark.parametrize(("factor", "tips"), [(0.95, False), (1.05, True), (-1.05, False)])
+@pytest.mark.parametrize(("factor", "tips"), [(0.92, False), (1.05, True), (-1.05, False)])
 def test_a_cup_tips_sooner_towards_its_handle(factor, tips):
-    """A narrow one, which turns about its foot before the handle comes down; leaning away it stands."""
+    """A narrow one, whose handle stays off the table; feet are 1 mm inside its edge. Leaning away it stands."""
     cup = Cup(base=0.035, handle=0.03, friction=1.5)
     model, data = on_table(cup, slope=factor * cup.tipping_angle)
     mujoco.mj_step(model, data, 500)
