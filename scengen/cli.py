@@ -31,6 +31,7 @@ VERBS = (
     "evaluate",
     "attack",
     "axis",
+    "discover",
     "report",
     "robosuite",
     "power",

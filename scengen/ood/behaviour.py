@@ -33,7 +33,7 @@ from ..sim import scene_text
 from ..sim.world import World
 from ..statistics import Difference, Rate, paired, rate
 from ..validate.identity import source_sha256
-from ..validate.rollout import Rollout, replay, run
+from ..validate.rollout import replay, run
 from .memory import Memory, remember
 
 RUNGS = ("replay", "any_replay", "object_centric", "any_object_centric")
@@ -168,14 +168,13 @@ def _rungs(
 
 
 def _own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
-    """Whether an object-centric memory solves the scenario that it remembers."""
-    scenario, memory = _memory(task, seed, index)
-    return {"index": index, "again": memory and _follows(task, memory, scenario)}
+    scenario, memory = recall(task, seed, index)
+    return {"index": index, "again": faithful(task, scenario) if memory else None}
 
 
 def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     """A twin's own memory, or the nearest one, in both arms. No `here` where nothing can be said."""
-    trained, memory = _memory(task, seed, index)
+    trained, memory = recall(task, seed, index)
     moved = any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
     record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}
     if memory is None:
@@ -186,7 +185,7 @@ def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
         record["here"] = _outcomes(task, memory, task.draw(split, seed, index).scenario)
     except Infeasible:
         return record
-    if (control := _move(task, split, seed, index, trained) if moved else trained) is not None:
+    if (control := moved_within(task, task.shifts(split), seed, index, trained) if moved else trained) is not None:
         record["control"] = _outcomes(task, memory, control)
     return record
 
@@ -200,8 +199,8 @@ def _any(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     memories = _nearest(task, seed, draw)
     return {
         "index": index,
-        "any_replay": any(_replays(task, m.actions, draw.scenario) for m in memories),
-        "any_object_centric": any(_follows(task, m, draw.scenario) for m in memories),
+        "any_replay": any(replays(task, m.actions, draw.scenario) for m in memories),
+        "any_object_centric": any(follows(task, m, draw.scenario) for m in memories),
     }
 
 
@@ -212,18 +211,18 @@ def _lost(index: int, reason: str) -> dict[str, Any]:
 
 def _outcomes(task: Task, memory: Memory, scenario: Scenario) -> dict[str, bool]:
     return {
-        "oracle": _solution(task, scenario).solved,
-        "replay": _replays(task, memory.actions, scenario),
-        "object_centric": _follows(task, memory, scenario),
+        "oracle": solves(task, scenario),
+        "replay": replays(task, memory.actions, scenario),
+        "object_centric": follows(task, memory, scenario),
     }
 
 
-def _move(task: Task, split: str, seed: int, index: int, trained: Scenario) -> Scenario | None:
-    """A training scenario with what the axis moves drawn anew within training; None if no draw is feasible."""
+def moved_within(task: Task, names: Iterable[str], seed: int, index: int, trained: Scenario) -> Scenario | None:
+    """A training scenario with some parameters drawn anew within training; None if no draw is feasible."""
+    names = list(names)
     for attempt in range(MOVES):
         fresh = {
-            name: task.training[name].quantile(unit(task.name, name, seed, index, attempt, "moved"))
-            for name in task.shifts(split)
+            name: task.training[name].quantile(unit(task.name, name, seed, index, attempt, "moved")) for name in names
         }
         scenario = with_values(trained, fresh)
         if scenario.infeasible() is None:
@@ -246,16 +245,16 @@ def _nearest(task: Task, seed: int, draw: Draw) -> list[Memory]:
 
 def try_both(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bool]:
     """Whether recorded actions and whether the oracle solve a scenario."""
-    return _replays(task, actions, scenario), _solution(task, scenario).solved
+    return replays(task, actions, scenario), solves(task, scenario)
 
 
 def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
     """Actions with which the oracle solves a training scenario, or None."""
-    memory = _memory(task, seed, index)[1]
+    memory = recall(task, seed, index)[1]
     return memory and memory.actions
 
 
-def _memory(task: Task, seed: int, index: int) -> tuple[Scenario, Memory | None]:
+def recall(task: Task, seed: int, index: int) -> tuple[Scenario, Memory | None]:
     """A training scenario, and how the oracle solves it."""
     scenario = task.draw(ID, seed, index).scenario
     return scenario, _remembered(scenario, task.horizon, task.embodiment)
@@ -266,6 +265,20 @@ def _library(task: Task, seed: int) -> Sequence[tuple[Mapping[str, float], Memor
     draws = [task.draw(ID, seed + 1, index) for index in range(LIBRARY)]
     known = [(d.quantiles, _remembered(d.scenario, task.horizon, task.embodiment)) for d in draws]
     return [(quantiles, memory) for quantiles, memory in known if memory is not None]
+
+
+def faithful(task: Task, scenario: Scenario) -> bool:
+    """Whether an object-centric memory solves again the scenario that it remembers."""
+    return _faithful(scenario, task.horizon, task.embodiment)
+
+
+@cache
+def _faithful(scenario: Scenario, horizon: float, embodiment: str) -> bool:
+    memory = _remembered(scenario, horizon, embodiment)
+    if memory is None:
+        return False
+    world = _world(scenario, embodiment)
+    return run(scenario, world, memory.follow, horizon, until_settled=True, raw=True).solved
 
 
 @cache
@@ -279,15 +292,19 @@ def _world(scenario: Scenario, embodiment: str) -> World:
     return World.load(scene_text.emit(scenario.build())[0], embodiment)
 
 
-def _solution(task: Task, scenario: Scenario) -> Rollout:
-    return run(scenario, _world(scenario, task.embodiment), scenario.oracle, task.horizon, until_settled=True)
+def solves(task: Task, scenario: Scenario) -> bool:
+    """Whether the oracle solves a scenario."""
+    world = _world(scenario, task.embodiment)
+    return run(scenario, world, scenario.oracle, task.horizon, until_settled=True).solved
 
 
-def _replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
+def replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
+    """Whether recorded actions solve a scenario."""
     world = _world(scenario, task.embodiment)
     return replay(scenario, world, actions, task.horizon, until_settled=True).solved
 
 
-def _follows(task: Task, memory: Memory, scenario: Scenario) -> bool:
+def follows(task: Task, memory: Memory, scenario: Scenario) -> bool:
+    """Whether an object-centric memory solves a scenario."""
     world = _world(scenario, task.embodiment)
     return run(scenario, world, memory.follow, task.horizon, until_settled=True, raw=True).solved

@@ -1,0 +1,48 @@
+"""a search for OOD axes: where memory fails and the oracle does not"""
+
+from pathlib import Path
+
+from rich.table import Table
+
+from ..config import read_task
+from ..errors import UnknownName, at_least
+from ..ood.discover import METHODS, Finding, Search, Settings, as_yaml, discover
+from ..runs.progress import ProgressBar
+from ..samplers.axis import spell
+from ..targets import try_folder
+from . import OK, Arguments, err, out, say, write
+
+
+def command(arguments: Arguments) -> int:
+    settings, task, checks = read_task("discover", arguments, Settings)
+    at_least(settings, budget=20, seed=0, workers=1)
+    if settings.method not in METHODS:
+        raise UnknownName("method", settings.method, METHODS)
+    folder = Path(settings.to or f"generated/discover/{task.name}")
+    try_folder(folder)
+    with ProgressBar(err, f"discover {task.name}", settings.budget) as progress_bar:
+
+        def progress(what: str, done: int, total: int) -> None:
+            progress_bar.of(min(done, total), total, what)
+
+        search = discover(task, checks, settings, folder, progress)
+    out.print(_table(task.name, search))
+    say("trials: " + ", ".join(f"{count} {what}" for what, count in (search.stages | search.spent).items()))
+    write(folder / "axes.yaml", as_yaml(task, search))
+    say(f"wrote {folder / 'axes.yaml'}: copy what says something into the task file, and measure it with scengen axis")
+    return OK
+
+
+def _table(task: str, search: Search) -> Table:
+    table = Table(title=f"{task}: {len(search.findings)} axes confirmed", title_justify="left")
+    for title in ("axis", "values", "seen", "confirmed", "p (Holm)", "in the task file"):
+        table.add_column(title)
+    for finding in (*search.findings, *search.rejected):
+        table.add_row(*_row(finding), style=None if finding in search.findings else "dim")
+    return table
+
+
+def _row(finding: Finding) -> tuple[str, ...]:
+    values = ", ".join(f"{name} {spell(dist)}" for name, dist in finding.axis.replace.items())
+    seen, confirmed = f"{finding.seen} of {finding.tried}", f"{finding.confirmed} of {finding.fresh}"
+    return finding.axis.name, values, seen, confirmed, f"{finding.p:.2g}", ", ".join(finding.known)

@@ -1,0 +1,455 @@
+"""A search for axes: where outside training an object-centric memory fails and the oracle does not.
+
+First a hypercube over all regions outside training, one or two parameters at a time, each point in a twin of its own.
+Then a forest learns from it, and points are tried where it is least sure: at the edges of what was found. What two
+parameters do together is tried with one of them alone. What is left is confirmed on fresh twins, each beside its
+control, and only that counts: a search among hundreds of points finds something by luck.
+
+One trial is a memory played in one scenario, and its oracle where the memory fails.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from ..errors import BadConfig, ScengenError
+from ..log import Log
+from ..parallel import Limits, each
+from ..params import with_values
+from ..samplers.axis import Axis, Proof
+from ..samplers.dists import Dist, Fixed, Integer, Uniform
+from ..samplers.keyed import unit
+from ..samplers.task import Task
+from ..scenario import Scenario
+from ..validate.certify import certify
+from ..validate.identity import source_sha256
+from ..validate.settings import CertifySettings
+from . import behaviour
+from .regions import Region, located, regions, spelled
+
+FOREST, HYPERCUBE = "forest", "hypercube"
+METHODS = (FOREST, HYPERCUBE)
+BREAKS, HOLDS, UNSOLVED, UNSOUND, INFEASIBLE = "breaks", "holds", "unsolved", "unsound", "infeasible"
+"""What came of a trial: the memory fails and the oracle does not; the memory solves it; the oracle fails too; the
+scene fails a check that comes before the oracle; a constraint does not hold."""
+TWINS = 8
+"""Training scenarios whose memories are played while searching."""
+FRESH, DRAWS = 10, 5
+"""Twins in which a finding is confirmed, each in a scenario of its own, and draws until that is feasible."""
+SHARES = (0.4, 0.7, 0.8)
+"""Which share of the budget is spent when the hypercube ends, the forest ends, the shrinking ends."""
+BATCH = 8
+"""Points that are tried before the forest learns anew."""
+POOL = 4000
+"""Points among which the forest chooses."""
+LEVEL = 0.05
+"""Family-wise error rate of the confirmation, by Holm's correction (Holm 1979)."""
+CHANCE = 0.5
+"""What a finding is tested against: that it breaks the memory in no more than this share of its twins."""
+LIMITS = Limits(300.0, 4000)
+"""Of one trial: some rollouts take some seconds."""
+
+Point = tuple[tuple[int, float], ...]
+"""Places in regions: pairs of a region's number and a place from 0 to 1, in the order of the regions."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen discover`; meanings stand in conf/command/discover.yaml."""
+
+    budget: int = 500
+    method: str = FOREST
+    seed: int = 0
+    workers: int = 1
+    to: str | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A box outside training in which the memory fails and the oracle does not."""
+
+    axis: Axis
+    proofs: list[Proof]
+    seen: int
+    """Trials of the search within the box in which the memory failed and the oracle did not."""
+    tried: int
+    """Trials of the search within the box that were feasible."""
+    confirmed: int
+    """Fresh twins in which the memory failed and the oracle did not, and which it solved within training."""
+    fresh: int
+    """Fresh twins tried."""
+    p: float
+    """Of the confirmation: exact binomial test against `CHANCE`, after Holm's correction."""
+    known: tuple[str, ...]
+    """Axes of the task file that move one of the same parameters into the same region."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found, and what it spent."""
+
+    findings: list[Finding]
+    """Those that were confirmed, the surest first."""
+    rejected: list[Finding]
+    """Those that were not."""
+    spent: dict[str, int]
+    """Trials by what came of them."""
+    stages: dict[str, int]
+    """Trials by stage."""
+
+
+def discover(
+    task: Task,
+    checks: CertifySettings,
+    settings: Settings,
+    folder: Path,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> Search:
+    """Search, continuing what stands in `folder`.
+
+    Args:
+        checks: settings of the checks that come before the oracle.
+        progress: told what is being done, how far it is, and how much there is.
+
+    Raises:
+        BadConfig: the method is none of `METHODS`, scikit-learn is missing, or no training scenario can be solved.
+    """
+    known = regions(task)
+    asked = _Asked(task, checks, settings, known, folder, progress)
+    with asked.log:
+        ends = [round(share * settings.budget) for share in SHARES]
+        random = np.random.default_rng(settings.seed)
+        asked.ask("hypercube", _hypercube(ends[0], len(known), random))
+        if settings.method == FOREST:
+            while asked.spent < ends[1]:
+                asked.ask("forest", _uncertain(asked.records, len(known), random)[: ends[1] - asked.spent])
+        else:
+            asked.ask("hypercube", _hypercube(ends[1] - asked.spent, len(known), random))
+        asked.ask("shrink", _alone(asked.records)[: max(0, ends[2] - asked.spent)], twins=True)
+        boxes = _boxes(asked.records)
+        room = max(1, (settings.budget - asked.spent) // FRESH)
+        tested = [(box, asked.confirm(number, box)) for number, box in enumerate(boxes[:room])]
+    found = [_finding(task, known, box, asked.records, outcomes) for box, outcomes in tested]
+    sure = _holm(found)
+    return Search(
+        [f for f in sure if f.p < LEVEL],
+        [f for f in sure if f.p >= LEVEL],
+        dict(Counter(r["outcome"] for r in asked.log.records)),
+        dict(Counter(r["stage"] for r in asked.log.records)),
+    )
+
+
+# --- trials -------------------------------------------------------------------------------------
+
+
+class _Asked:
+    """Trials, from the log as far as it goes."""
+
+    def __init__(
+        self,
+        task: Task,
+        checks: CertifySettings,
+        settings: Settings,
+        known: Sequence[Region],
+        folder: Path,
+        progress: Callable[[str, int, int], None],
+    ):
+        self.trials = _Trials(task, checks, known, settings.seed)
+        self.settings, self.progress = settings, progress
+        source = source_sha256(task.family)
+        named = {"task": task.name, "training": {n: str(d) for n, d in task.training.items()}, "source": source}
+        chosen = {"budget": settings.budget, "method": settings.method, "seed": settings.seed}
+        self.log = Log(folder / "trials.jsonl", named | chosen)
+        self.spent = 0
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """The trials of the search itself, without those that confirm."""
+        return [r for r in self.log.records[: self.spent] if r["stage"] != "confirm"]
+
+    def ask(self, stage: str, points: Sequence[tuple[Point, int | None]], twins: bool = False) -> None:
+        """Try points, each in the twin that is named, or in the next one."""
+        items = [
+            (stage, point, ("search", (self.spent + k) % TWINS if twin is None else twin))
+            for k, (point, twin) in enumerate(points)
+        ]
+        self._run(partial(_try, self.trials), items)
+
+    def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
+        """Try a box in fresh twins."""
+        begin = self.spent
+        items = [("confirm", box.plain, ("fresh", number * FRESH + k)) for k in range(FRESH)]
+        self._run(partial(_confirm, self.trials), items)
+        return self.log.records[begin : self.spent]
+
+    def _run(self, work: Callable[[Any], dict[str, Any]], items: Sequence[Any]) -> None:
+        ready = len(self.log.records) - self.spent
+        for record in each(work, items[ready:] if ready > 0 else items, self.settings.workers, LIMITS, _lost):
+            self.log.add(record)
+            self.progress(record["stage"], len(self.log.records), self.settings.budget)
+        self.spent += len(items)
+
+
+def _lost(item: Any, reason: str) -> dict[str, Any]:
+    stage, point, (_, number) = item
+    return {"stage": stage, "point": point, "twin": number, "outcome": UNSOLVED, "reason": reason}
+
+
+def _try(trials: "_Trials", item: tuple[str, Point, tuple[str, int]]) -> dict[str, Any]:
+    stage, point, (_, number) = item
+    trained, memory = trials.twin(number)
+    return {"stage": stage, "point": point, "twin": number, "outcome": trials.outcome(trained, memory, point)}
+
+
+def _confirm(trials: "_Trials", item: tuple[str, Any, tuple[str, int]]) -> dict[str, Any]:
+    """A box in one fresh twin, at a random place; the control is a move of the same parameters within training."""
+    stage, box, (_, number) = item
+    trained, memory = trials.twin(TWINS + number)
+    outcome, control, task, seed = INFEASIBLE, None, trials.task, trials.seed
+    for attempt in range(DRAWS):
+        point = [(i, low + unit("discover", seed, number, attempt, i) * (high - low)) for i, low, high in box]
+        outcome = trials.outcome(trained, memory, point)
+        if outcome != INFEASIBLE:
+            break
+    if outcome == BREAKS:
+        names = [trials.known[int(i)].parameter.name for i, *_ in box]
+        control = behaviour.moved_within(task, names, seed, number, trained)
+    worked = control is not None and behaviour.follows(task, memory, control)
+    return {"stage": stage, "point": box, "twin": number, "outcome": outcome, "control": worked}
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """What all trials of a search share."""
+
+    task: Task
+    checks: CertifySettings
+    known: Sequence[Region]
+    seed: int
+
+    def twin(self, number: int) -> tuple[Scenario, behaviour.Memory]:
+        """Training scenario `number`, or another one if its memory does not solve it again."""
+        for index in range(number, number + 1000 * DRAWS, 1000):
+            trained, memory = behaviour.recall(self.task, self.seed, index)
+            if memory is not None and behaviour.faithful(self.task, trained):
+                return trained, memory
+        raise BadConfig(f"{self.task.name}: no memory of {DRAWS} training scenarios solves its own scenario again")
+
+    def outcome(self, trained: Scenario, memory: behaviour.Memory, point: Iterable[Sequence[float]]) -> str:
+        """What comes of a memory in its own scenario with some parameters put outside training."""
+        moved = spelled({self.known[int(i)]: place for i, place in point})
+        try:
+            scenario = with_values(trained, moved)
+            if scenario.infeasible():
+                return INFEASIBLE
+            certified = certify(scenario, self.task.horizon, self.checks, self.task.embodiment, last="unsolved")
+            if any(check.passed is False for check in certified.certificate.checks):
+                return UNSOUND
+            if behaviour.follows(self.task, memory, scenario):
+                return HOLDS
+            return BREAKS if behaviour.solves(self.task, scenario) else UNSOLVED
+        except (ScengenError, ValueError):
+            return UNSOUND  # its builder, MuJoCo or the physics refuses such values
+
+
+# --- where to look ------------------------------------------------------------------------------
+
+
+def _hypercube(n: int, count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
+    """Points with one or two regions: every region as often as any other, its places spread evenly (Latin hypercube).
+
+    Two of three points move one parameter only.
+    """
+    turns, uses = list[list[int]](), Counter[int]()
+    deck = list[int]()
+    for k in range(n):
+        wanted = 1 if k % 3 else 2
+        while len(deck) < 2:
+            deck += [int(i) for i in random.permutation(count)]
+        first = deck.pop(0)
+        chosen = [first] if wanted == 1 else sorted({first, deck.pop(0)})
+        turns.append(chosen)
+        uses.update(chosen)
+    places = {i: list((random.permutation(m) + random.random(m)) / m) for i, m in sorted(uses.items())}
+    return [(tuple((i, round(float(places[i].pop()), 6)) for i in chosen), None) for chosen in turns]
+
+
+def _uncertain(records: list[dict[str, Any]], count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
+    """The points of which a forest knows least whether they break the memory, all in different regions."""
+    try:
+        from sklearn.ensemble import RandomForestClassifier
+    except ImportError:
+        raise BadConfig(
+            "method=forest needs scikit-learn: pip install 'scengen[discover]', or method=hypercube"
+        ) from None
+    table = np.stack([_row(r["point"], count) for r in records])
+    breaks = np.array([r["outcome"] == BREAKS for r in records])
+    points = [point for point, _ in _hypercube(POOL, count, random)]
+    if breaks.all() or not breaks.any():
+        return [(point, None) for point in points[:BATCH]]
+    forest = RandomForestClassifier(200, min_samples_leaf=2, random_state=int(random.integers(2**31)))
+    share = forest.fit(table, breaks).predict_proba(np.stack([_row(p, count) for p in points]))[:, 1]
+    chosen, used = list[tuple[Point, None]](), set[tuple[int, ...]]()
+    for k in np.argsort(-share * (1 - share), kind="stable"):
+        where = tuple(i for i, _ in points[k])
+        if where not in used:
+            used.add(where)
+            chosen.append((points[k], None))
+        if len(chosen) == BATCH:
+            break
+    return chosen
+
+
+def _row(point: Iterable[Sequence[float]], count: int) -> NDArray[np.float64]:
+    row = np.full(count, -0.2)  # not moved: before the beginning of every region
+    for i, place in point:
+        row[int(i)] = place
+    return row
+
+
+def _alone(records: list[dict[str, Any]]) -> list[tuple[Point, int]]:
+    """One parameter of each pair that broke a memory, in the same twin: what a pair does, one of them may do alone."""
+    single = {r["point"][0][0] for r in records if len(r["point"]) == 1 and r["outcome"] == BREAKS}
+    pairs = [r for r in records if len(r["point"]) == 2 and r["outcome"] == BREAKS]
+    return [
+        ((tuple(place),), r["twin"])
+        for r in pairs
+        if not any(place[0] in single for place in r["point"])
+        for place in r["point"]
+    ]
+
+
+# --- what was found -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Box:
+    """Ranges of places in one or two regions."""
+
+    ranges: tuple[tuple[int, float, float], ...]
+
+    @property
+    def plain(self) -> list[list[float]]:
+        return [list(r) for r in self.ranges]
+
+    def holds(self, point: Iterable[Sequence[float]]) -> bool:
+        places = {int(i): place for i, place in point}
+        return places.keys() == {i for i, *_ in self.ranges} and all(
+            low <= places[i] <= high for i, low, high in self.ranges
+        )
+
+
+def _boxes(records: list[dict[str, Any]]) -> list[_Box]:
+    """Boxes in which memories broke, those with most evidence first; pairs only where neither does it alone."""
+    where: dict[tuple[int, ...], list[dict[str, Any]]] = {}
+    for record in records:
+        where.setdefault(tuple(int(i) for i, _ in record["point"]), []).append(record)
+    found = list[tuple[int, _Box]]()
+    alone = set[int]()
+    for key in sorted(where, key=len):
+        if len(key) == 2 and alone.intersection(key):
+            continue
+        if best := _best(key, where[key]):
+            found.append(best)
+            alone.update(key if len(key) == 1 else ())
+    return [box for _, box in sorted(found, key=lambda f: (-f[0], len(f[1].ranges), f[1].ranges))]
+
+
+def _best(key: tuple[int, ...], records: list[dict[str, Any]]) -> tuple[int, _Box] | None:
+    """The box with the most breaks, less twice the other outcomes in it; None where nothing breaks."""
+    points = [dict(map(tuple, r["point"])) for r in records]
+    broken = [p for p, r in zip(points, records, strict=True) if r["outcome"] == BREAKS]
+    best: tuple[int, float, _Box] | None = None
+    for one in broken:
+        for other in broken:
+            ranges = tuple((i, min(one[i], other[i]), max(one[i], other[i])) for i in key)
+            box = _Box(ranges)
+            inside = [r["outcome"] == BREAKS for p, r in zip(points, records, strict=True) if box.holds(p.items())]
+            score = sum(inside) - 2 * (len(inside) - sum(inside))
+            size = sum(high - low for _, low, high in ranges)
+            if best is None or (score, size) > best[:2]:
+                best = (score, size, box)
+    if best is None:
+        return None
+    grown = tuple(
+        (i, round(max(0.0, low - 0.02), 6), round(min(1.0, high + 0.02), 6)) for i, low, high in best[2].ranges
+    )
+    return best[0], _Box(grown)
+
+
+def _finding(
+    task: Task, known: Sequence[Region], box: _Box, records: list[dict[str, Any]], outcomes: list[dict[str, Any]]
+) -> Finding:
+    moved = {known[i].parameter.name: _dist(known[i], low, high) for i, low, high in box.ranges}
+    name = "_and_".join(known[i].name for i, *_ in box.ranges)
+    confirmed = sum(r["outcome"] == BREAKS and r["control"] for r in outcomes)
+    why = f"An object-centric memory fails in {confirmed} of {len(outcomes)} fresh twins that the oracle solves."
+    single = len(box.ranges) == 1 and known[box.ranges[0][0]].beyond and not known[box.ranges[0][0]].parameter.integer
+    axis = Axis(name, why, "scengen discover", moved, 5 if single else 0)
+    inside = [r["outcome"] for r in records if box.holds(r["point"]) and r["outcome"] != INFEASIBLE]
+    same = [a.name for a in task.axes.values() if any(_same(known[i], a.replace) for i, *_ in box.ranges)]
+    test = binomtest(confirmed, max(1, len(outcomes)), CHANCE, "greater").pvalue
+    seen, fresh = inside.count(BREAKS), len(outcomes)
+    return Finding(axis, task.prove(axis), seen, len(inside), confirmed, fresh, float(test), tuple(same))
+
+
+def _dist(region: Region, low: float, high: float) -> Dist:
+    """The distribution over a range of places."""
+    ends = sorted((region.value(low), region.value(high)))
+    if region.parameter.integer:
+        return Fixed(ends[0]) if ends[0] == ends[1] else Integer(int(ends[0]), int(ends[1]))
+    period = region.parameter.period
+    if period and abs(ends[1] - ends[0]) > period / 2:
+        return Fixed(region.value((low + high) / 2))  # the range runs through the seam of the circle
+    ends = [float(f"{v:.4g}") for v in ends]
+    return Fixed(ends[0]) if ends[0] == ends[1] else Uniform(*ends)
+
+
+def _same(region: Region, replaced: Any) -> bool:
+    dist = replaced.get(region.parameter.name)
+    return dist is not None and any(located(region, v) for part in dist.support for v in (part.low, part.high))
+
+
+def _holm(found: list[Finding]) -> list[Finding]:
+    """Findings with p values after Holm's correction, the surest first."""
+    ordered, least, corrected = sorted(found, key=lambda f: f.p), 0.0, list[Finding]()
+    for k, finding in enumerate(ordered):
+        least = max(least, min(1.0, (len(ordered) - k) * finding.p))
+        corrected.append(replace(finding, p=least))
+    return corrected
+
+
+def as_yaml(task: Task, search: Search) -> str:
+    """The confirmed axes as a task file has them, and what the search has spent."""
+    spent = ", ".join(f"{count} {what}" for what, count in (search.stages | search.spent).items())
+    axes = {finding.axis.name: _entry(finding) for finding in search.findings}
+    found = yaml.safe_dump({"axes": axes}, sort_keys=False, default_flow_style=None, width=120)
+    return f"# Axes of {task.name} found by scengen discover: {spent}\n{found}"
+
+
+def _entry(finding: Finding) -> dict[str, Any]:
+    """An axis as it stands in a task file."""
+    moved: dict[str, Any] = {}
+    for name, dist in finding.axis.replace.items():
+        *groups, last = name.split(".")
+        inner = moved
+        for group in groups:
+            inner = inner.setdefault(group, {})
+        inner[last] = _plain(dist)
+    severities = {"severities": finding.axis.severities} if finding.axis.severities else {}
+    return {"why": finding.axis.why, "source": finding.axis.source, **severities, "replace": moved}
+
+
+def _plain(dist: Dist) -> list[Any]:
+    if isinstance(dist, Fixed):
+        return ["fixed", dist.value]
+    ends = dist.support[0].low, dist.support[-1].high
+    return ["integer" if isinstance(dist, Integer) else "uniform", *ends]
