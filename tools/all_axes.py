@@ -12,7 +12,6 @@ from typing import Any
 
 from scengen import cli, config
 from scengen.analysis.distance import Energy
-from scengen.ood.boundary import FAILS_AT_ONCE, HOLDS
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
@@ -30,9 +29,11 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} tw
   knows one value only (marked *held out*), it is a training scenario that nobody remembers. Twins count that the
   oracle solves in both arms. `weak`: it solves less than 30 % of its control, and tells nothing.
   *cosmetic to memory*: some memory solves most of the axis; what is new there is for the eye, if for anything.
-* **replay ends**, **oracle ends**: where on the path success falls to 50 %; 0 is the edge of training, 1 the far end
-  of the axis, in brackets the 95 % credible interval; `> x`: it holds to the end of the path. `at the edge`: the replay
-  fails as soon as its scene's own value is exchanged for the nearest end of training.
+* **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
+  the edge of training, 1 the far end of the axis. In brackets the 95 % interval, which assumes no curve; the point
+  before it is a guess. `> x`: not before x; where x is the end of the path, with what was solved there. `< 0`: the
+  replay fails as soon as its scene's own value is exchanged for the nearest end of training. Holes shorter than a
+  tenth of the axis, and beyond 1 shorter than half their distance from 0, are not looked for.
 * **energy**: energy distance between the features of the twins [training ranges], what chance gives, and the p value of
   a test that exchanges twins; `equal` where the axis moves no feature.
 
@@ -108,12 +109,7 @@ def _boundary(card: dict[str, Any], who: str) -> str:
     if card["why_no_path"]:
         return "separate values"
     found = card["boundaries"][who]
-    if found["verdict"] == HOLDS:
-        return f"> {found['end']:.2f}"
-    if found["verdict"] == FAILS_AT_ONCE:
-        return "at the edge"
-    at = "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
-    return f"{found['middle']:.2f} [{max(found['low'], 0):.2f}, {found['high']:.2f}]{at}"
+    return found["told"] + "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
 
 
 if __name__ == "__main__":  # worker processes import this file again

@@ -2,23 +2,19 @@
 
 A point on the path is a fraction: 0 is the edge of training, 1 the axis' far end, and beyond 1 the path goes on to the
 bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training with the
-axis' parameters put at that point.
+axis' parameters put at that point; every trial has a twin of its own.
 
-The chance of success is taken to fall along the path as a logistic curve, 1 / (1 + exp((x - middle) / spread)); what
-is known of middle and spread is kept as a posterior on a grid. Looking at the median of the middle is bisection that
-bears noise; after some rounds of it the search looks where success is between 30 and 70 percent. Success may come back
-farther out (a ball that slips on a rough ramp rolls on a rougher one): what lies beyond the first point at which all
-fail is left out.
+The boundary is the first point at which half of the twins or fewer are solved. The first looks are fixed: at both ends
+and at places along the whole path, so that a hole of a tenth of the axis is seen. The others go, in turn for replay and
+oracle, to where the boundary is likely. What the trials say is worked out by `threshold`, which assumes no curve.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import BadConfig, OutOfBounds
 from ..log import Log
@@ -30,48 +26,84 @@ from ..samplers.split import ID
 from ..samplers.support import distance
 from ..samplers.task import Task
 from ..validate.identity import source_sha256
+from . import threshold
 from .behaviour import try_both, twin_actions
+from .threshold import Bools, Floats, Ints
 
 REPLAY, ORACLE = "replay", "oracle"
 BATCH = 4
-"""Twins that are tried at one point before the search moves on; a round."""
-FIRST = (math.inf, 0.0, 1.0)
-"""Where the first rounds look: the end of the path, the edge of training, the far end of the axis."""
-BISECTIONS = 4
-"""Rounds at the most likely middle, for each of replay and oracle, before the band is sampled."""
-BAND = 0.7
-"""The band of interest: chances of success from 1 - BAND to BAND."""
+"""Trials in a round. A trial costs a rollout each of replay and oracle, and one that gives the witness."""
+FINE = 2
+"""An interval of fewer gaps between points, 0.01 each up to 1, is not narrowed further."""
 FARTHEST, STEP = 10.0, 0.02
 """A path ends at the bounds of its parameters, found in these steps, and at the latest after ten times its length."""
 
-
 HOLDS, FAILS, FAILS_AT_ONCE = "holds to the end of the path", "fails on the path", "fails at the edge of training"
+OPEN = "may hold to the end of the path"
 """What a boundary means."""
 
 
 @dataclass(frozen=True)
+class Looks:
+    """What was solved at one end of the path, in the looks that were fixed beforehand."""
+
+    solved: int
+    tried: int
+
+    @property
+    def least(self) -> float:
+        """The chance of success is at least this, at 95 %: exact, one-sided."""
+        return threshold.at_least(self.solved, self.tried)
+
+    @property
+    def most(self) -> float:
+        """The chance of success is at most this, at 95 %: exact, one-sided."""
+        return 1 - threshold.at_least(self.tried - self.solved, self.tried)
+
+    def __str__(self) -> str:
+        return f"{self.solved} of {self.tried} solved there"
+
+
+@dataclass(frozen=True)
 class Boundary:
-    """Where success falls to one half."""
+    """The first point of the path at which half of the twins or fewer are solved."""
 
     who: str
     """`replay`: actions that solved the ID twin; `oracle`: the task's own solution."""
     middle: float
-    """The point on the path, as a fraction: posterior median."""
+    """Where on the path it probably is, as a fraction: a guess, within the interval."""
     low: float
-    high: float
-    """95 % credible interval."""
+    high: float | None
+    """95 % interval, see `threshold.interval`; None where success may last to the end of the path."""
     end: float
     """How far the path goes."""
+    again: tuple[float, float] | None
+    """From where to where success has come back beyond the boundary; None if it is not seen to."""
+    at_edge: Looks
+    at_end: Looks
     values: Mapping[str, Value]
-    """The axis' parameters at the middle; empty if it lies off the path or a parameter takes several values there."""
+    """The axis' parameters at `middle`; empty if it lies off the path or a parameter takes several values there."""
     trials: int
 
     @property
     def verdict(self) -> str:
-        """What the boundary means: one of the three sentences above."""
-        if self.middle >= self.end:
-            return HOLDS
-        return FAILS_AT_ONCE if self.middle <= 0 else FAILS
+        """What the boundary means: one of the four sentences above."""
+        if self.high is None:
+            return HOLDS if self.low >= self.end else OPEN
+        return FAILS if self.high > 0 else FAILS_AT_ONCE
+
+    def __str__(self) -> str:
+        """Where it is, in one line."""
+        at_end = f"{self.at_end}, at least {self.at_end.least:.2f} at 95 %"
+        at_edge = f"{self.at_edge}, at most {self.at_edge.most:.2f} at 95 %"
+        high = self.end if self.high is None else self.high
+        told = {
+            HOLDS: f"> {self.end:.2f} ({at_end})",
+            OPEN: f"> {self.low:.2f}, perhaps > {self.end:.2f} ({at_end})",
+            FAILS: f"{self.middle:.2f} [{self.low:.2f}, {high:.2f}]",
+            FAILS_AT_ONCE: f"< 0 ({at_edge})",
+        }[self.verdict]
+        return told + (f", holds again from {self.again[0]:.2f} to {self.again[1]:.2f}" if self.again else "")
 
 
 def search(
@@ -79,29 +111,39 @@ def search(
     axis: str,
     folder: Path,
     seed: int = 0,
-    rounds: int = 16,
+    rounds: int = 20,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Boundary]:
     """Find both boundaries of an axis, continuing what stands in `folder`.
 
     Args:
-        rounds: how many points are looked at, with 4 twins each.
+        rounds: of 4 trials, at most. The fixed looks take 9, on long paths up to 12; the search ends earlier where
+            both intervals are narrow.
         progress: told how many trials are done, and how many there are to be.
 
     Raises:
-        BadConfig: the axis has no path, only separate values.
+        BadConfig: the axis has no path, only separate values; or `folder` holds another search.
     """
     path = AxisPath(task, task.axes[axis])
-    source = source_sha256(task.family)
-    identity = {"task": task.name, "axis": axis, "seed": seed, "path": path.spelled, "source": source}
+    points = threshold.points(path.end)
+    fixed = threshold.fixed(len(points) - 1)
+    identity = {
+        "task": task.name,
+        "axis": axis,
+        "seed": seed,
+        "path": path.spelled,
+        "fixed": [float(points[i]) for i in fixed],
+        "source": source_sha256(task.family),
+    }
     with Log(folder / "boundary.jsonl", identity) as log:
-        for number in range(rounds):
-            fraction = _next(number, log.records[: number * BATCH], path.end)
-            for index in range(len(log.records), (number + 1) * BATCH):
-                log.add(_try(path, seed, fraction, index))
-                progress(index + 1, rounds * BATCH)
+        for index in range(len(log.records), rounds * BATCH):
+            point = fixed[index] if index < len(fixed) else _next(log.records, points, seed)
+            if point is None:
+                break
+            log.add(_try(path, seed, float(points[point]), index))
+            progress(index + 1, rounds * BATCH)
         trials = log.records[: rounds * BATCH]
-    return {who: _boundary(who, trials, path) for who in (REPLAY, ORACLE)}
+    return {who: _boundary(who, trials, path, points) for who in (REPLAY, ORACLE)}
 
 
 def why_no_path(task: Task, axis: Axis) -> str:
@@ -184,56 +226,52 @@ def _try(path: AxisPath, seed: int, fraction: float, index: int) -> dict[str, An
     return {"index": index, "fraction": fraction, REPLAY: found[0], ORACLE: found[1]}
 
 
-def _next(number: int, trials: list[dict[str, Any]], end: float) -> float:
-    """Where to look in round `number`, given all earlier trials."""
-    if number < len(FIRST):
-        return min(end, FIRST[number])
-    who = (REPLAY, ORACLE)[number % 2]
-    middle, spread = _Posterior(trials, who, end).centre
-    if number >= len(FIRST) + 2 * BISECTIONS:
-        logit = math.log(BAND / (1 - BAND))
-        middle += spread * logit * (2 * unit("band", number) - 1)
-    return round(min(max(middle, 0.0), end), 6)
+def _next(trials: list[dict[str, Any]], points: Floats, seed: int) -> int | None:
+    """Number of the point to look at after some trials; None if there is nothing to be gained."""
+    last, index = len(points) - 1, len(trials)
+    sides = {who: _outcomes(trials, who, points) for who in (REPLAY, ORACLE)}
+    gaps = {who: threshold.interval(*sides[who], last) for who in sides}
+    wide = [who for who, (low, high) in gaps.items() if high - low >= FINE]
+    if not wide:
+        return None
+    who = (REPLAY, ORACLE)[index % 2]
+    likely = threshold.guess(*sides[who if who in wide else wide[0]], last).cumsum()
+    gap = int(np.searchsorted(likely, unit("gap", seed, index) * likely[-1]))
+    before = unit("side", seed, index) < 0.5
+    return min(max(gap - before, 0), last)
 
 
-def _boundary(who: str, trials: list[dict[str, Any]], path: AxisPath) -> Boundary:
-    low, middle, high = _Posterior(trials, who, path.end).quantiles
-    values = path.single(middle) if 0 < middle < path.end else {}
-    return Boundary(who, middle, low, high, path.end, values, sum(t[who] is not None for t in trials))
+def _boundary(who: str, trials: list[dict[str, Any]], path: AxisPath, points: Floats) -> Boundary:
+    last = len(points) - 1
+    at, solved = _outcomes(trials, who, points)
+    first, final = threshold.interval(at, solved, last)
+    gap = int(np.searchsorted(threshold.guess(at, solved, last).cumsum(), 0.5))
+    gap = min(max(gap, first), final)
+    low, high = float(points[max(first - 1, 0)]), float(points[final]) if final <= last else None
+    middle = float(points[max(gap - 1, 0)] + points[min(gap, last)]) / 2
+    again = threshold.recovery(at, solved, final)
+    return Boundary(
+        who,
+        middle,
+        low,
+        high,
+        path.end,
+        (float(points[again[0]]), float(points[again[1]])) if again else None,
+        _looks_at(0.0, trials, who),
+        _looks_at(path.end, trials, who),
+        path.single(middle) if high else {},
+        len(at),
+    )
 
 
-def _before_recovery(trials: list[dict[str, Any]], who: str) -> list[dict[str, Any]]:
-    """The trials without those beyond a point where all fail, if success comes back there."""
-    at: dict[float, list[bool]] = {}
-    for trial in trials:
-        at.setdefault(trial["fraction"], []).append(trial[who])
-    lost = min((point for point, solved in at.items() if len(solved) > 2 and not any(solved)), default=math.inf)
-    recovers = any(point > lost and sum(solved) > 0.7 * len(solved) for point, solved in at.items())
-    return [t for t in trials if t["fraction"] <= lost] if recovers else trials
+def _outcomes(trials: list[dict[str, Any]], who: str, points: Floats) -> tuple[Ints, Bools]:
+    """Number of the point, and outcome, of every trial that has one."""
+    tried = [t for t in trials if t[who] is not None]
+    at = [int(np.abs(points - t["fraction"]).argmin()) for t in tried]
+    return np.array(at, int), np.array([t[who] for t in tried], bool)
 
 
-class _Posterior:
-    """What trials say about middle and spread of the logistic curve; priors are flat, that of the spread in log."""
-
-    def __init__(self, trials: list[dict[str, Any]], who: str, end: float):
-        tried = _before_recovery([t for t in trials if t[who] is not None], who)
-        points = np.array([t["fraction"] for t in tried])
-        solved = np.array([t[who] for t in tried], bool)
-        self.middles = np.linspace(-0.5 * end, 1.5 * end, 401)
-        self.spreads = end * np.geomspace(0.005, 0.5, 25)
-        z = (points - self.middles[:, None, None]) / self.spreads[None, :, None]
-        chance = -np.logaddexp(0.0, np.where(solved, z, -z)).sum(axis=2)
-        weight = np.exp(chance - chance.max())
-        self.weight: NDArray[np.float64] = weight / weight.sum()
-
-    @property
-    def quantiles(self) -> tuple[float, float, float]:
-        """The middle: 2.5 %, 50 % and 97.5 %."""
-        total = self.weight.sum(axis=1).cumsum()
-        low, middle, high = np.interp([0.025, 0.5, 0.975], total, self.middles)
-        return float(low), float(middle), float(high)
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Median of the middle, mean of the spread."""
-        return self.quantiles[1], float((self.weight.sum(axis=0) * self.spreads).sum())
+def _looks_at(end: float, trials: list[dict[str, Any]], who: str) -> Looks:
+    """What was solved at one end; an exact bound takes no look that depends on others."""
+    fixed = [t[who] for t in trials[: 2 * threshold.EDGE] if t["fraction"] == end and t[who] is not None]
+    return Looks(sum(fixed), len(fixed))

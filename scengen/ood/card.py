@@ -39,7 +39,7 @@ class Settings:
     n: int = 50
     any_n: int | None = None
     seed: int = 0
-    rounds: int = 16
+    rounds: int = 20
     workers: int = 1
     to: str | None = None
 
@@ -87,7 +87,9 @@ class Card:
         """The card as plain data, for JSON."""
         told = asdict(self)
         told["rungs"] = [{**asdict(rung), "finding": rung.finding} for rung in self.rungs]
-        told["boundaries"] = {k: {**asdict(b), "verdict": b.verdict} for k, b in self.boundaries.items()}
+        told["boundaries"] = {
+            k: {**asdict(b), "verdict": b.verdict, "told": str(b)} for k, b in self.boundaries.items()
+        }
         return told
 
 
@@ -230,16 +232,18 @@ def _draw(plot: Any, support: Support, y: float, colour: str) -> None:
 
 
 def _path(card: Card) -> Figure:
-    """Where replay and oracle fail on the path of the axis."""
+    """Where replay and oracle fail on the path of the axis: interval and guess; lines are where they hold."""
     figure = Figure(figsize=(7.5, 1.5))
     plot = figure.subplots()
     end = max(b.end for b in card.boundaries.values())
     plot.axvspan(0, 1, color="#b5524a", alpha=0.12, lw=0)
     for y, found in enumerate(card.boundaries.values()):
-        low, middle, high = (min(max(v, 0.0), end) for v in (found.low, found.middle, found.high))
-        plot.plot([0, middle], [y, y], color="#555", linewidth=2)
-        plot.plot([low, high], [y, y], color="#555", linewidth=7, alpha=0.35, solid_capstyle="butt")
-        plot.plot(middle, y, "x" if middle < end else ">", color="#222", markersize=8)
+        high = end if found.high is None else found.high
+        for part in ((0.0, found.middle), found.again or ()):
+            plot.plot(part, [y] * len(part), color="#555", linewidth=2)
+        plot.plot([found.low, high], [y, y], color="#555", linewidth=7, alpha=0.35, solid_capstyle="butt")
+        marker = {boundary.HOLDS: ">", boundary.OPEN: ""}.get(found.verdict, "x")
+        plot.plot(found.middle, y, marker, color="#222", markersize=8, clip_on=False)
     plot.set(yticks=range(len(card.boundaries)), yticklabels=list(card.boundaries), ylim=(-0.6, 1.6), xlim=(0, end))
     plot.set_xlabel("path: 0 the edge of training, 1 the far end of the axis, on to the bounds of the parameters")
     plot.spines[["right", "top"]].set_visible(False)
