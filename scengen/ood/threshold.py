@@ -16,7 +16,7 @@ later ones, is not corrected for; what this costs is simulated in tests/ood/test
 curves, plateaus, holes, recoveries and mixtures.
 
 Where to look next follows a guess at the curve: one fall, perhaps one recovery, and one trial in five that ends
-otherwise. Where the guess is wrong the interval is wide, not false.
+otherwise. Where the guess is wrong the interval gets wide.
 """
 
 import math
