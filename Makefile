@@ -61,11 +61,12 @@ certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(SPLITS)
 
 # The card of every axis of every task, and docs/axes.md: hours. N twins each, any of 16 memories on ANY of them;
-# TASKS=packing takes some tasks alone.
+# ROUNDS of boundary search, TASKS=packing takes some tasks alone.
 TASKS ?=
 ANY ?= $(N)
+ROUNDS ?= 20
 axes: setup
-	$(BIN)/python tools/all_axes.py $(N) $(ANY) $(TASKS)
+	$(BIN)/python tools/all_axes.py $(N) $(ANY) $(ROUNDS) $(TASKS)
 
 # The adversary on every task, and docs/attacks.md: some 40 minutes. BUDGET rollouts each; TASKS=packing takes some.
 BUDGET ?= 500

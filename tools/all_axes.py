@@ -1,4 +1,4 @@
-"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 50 [task]`
+"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 50 20 [task]`
 
 Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again. Axes without a
 card keep the line that they have.
@@ -12,6 +12,7 @@ from typing import Any
 
 from scengen import cli, config
 from scengen.analysis.distance import Energy
+from scengen.ood.card import NOT_SEARCHED
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
@@ -47,12 +48,13 @@ COLUMNS = (
 )
 
 
-def main(n: str, any_n: str, *tasks: str) -> None:
+def main(n: str, any_n: str, rounds: str, *tasks: str) -> None:
     """Make all cards, or those of some tasks, and write their lines."""
     failed = []
     for task in tasks or config.tasks():
         for axis in config.task(task).axes:
-            if cli.run(("axis", f"task={task}", f"axis={axis}", f"n={n}", f"any_n={any_n}", "workers=2")):
+            asked = (f"n={n}", f"any_n={any_n}", f"rounds={rounds}", "workers=2")
+            if cli.run(("axis", f"task={task}", f"axis={axis}", *asked)):
                 failed.append(f"{task}/{axis}")
     PAGE.write_text(HEAD.format(n=n, titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
@@ -107,7 +109,7 @@ def _rung(rung: dict[str, Any]) -> str:
 
 def _boundary(card: dict[str, Any], who: str) -> str:
     if card["why_no_path"]:
-        return "separate values"
+        return "not searched" if card["why_no_path"] == NOT_SEARCHED else "separate values"
     found = card["boundaries"][who]
     return found["told"] + "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
 

@@ -27,6 +27,7 @@ from ..targets import write
 from ..validate.settings import CertifySettings
 from . import behaviour, boundary, features
 
+NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
 SHOWN = 4
 """Twins whose pictures are shown side by side."""
 
@@ -47,7 +48,7 @@ class Settings:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         if self.axis not in task.axes:
             raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
-        at_least(self, n=2, seed=0, rounds=2, workers=1)
+        at_least(self, n=2, seed=0, rounds=0, workers=1)
         if self.any_n is not None:
             at_least(self, any_n=0)
 
@@ -155,7 +156,7 @@ def _boundaries(
     task: Task, name: str, folder: Path, seed: int, rounds: int, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, boundary.Boundary], str]:
     """Both boundaries, or why there are none."""
-    if reason := boundary.why_no_path(task, task.axes[name]):
+    if reason := boundary.why_no_path(task, task.axes[name]) or ("" if rounds else NOT_SEARCHED):
         return {}, reason
     found = boundary.search(
         task, name, folder, seed, rounds, lambda done, total: progress("search boundaries", done, total)
