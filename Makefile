@@ -60,15 +60,13 @@ SPLITS ?=
 certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(SPLITS)
 
-# The card of every axis of every task, and docs/axes.md: hours. N twins each, any of 16 memories on ANY of them;
-# ROUNDS of boundary search, TASKS=packing takes some tasks alone.
-TASKS ?=
-ANY ?= $(N)
-ROUNDS ?= 20
+# The card of every axis of every task, and docs/axes.md: hours. AXES: settings of scengen axis, and tasks to do alone.
+AXES ?= n=50
 axes: setup
-	$(BIN)/python tools/all_axes.py $(N) $(ANY) $(ROUNDS) $(TASKS)
+	$(BIN)/python tools/all_axes.py $(AXES)
 
 # The adversary on every task, and docs/attacks.md: some 40 minutes. BUDGET rollouts each; TASKS=packing takes some.
+TASKS ?=
 BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)

@@ -1,4 +1,4 @@
-"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py 50 50 20 [task]`
+"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
 
 Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again. Axes without a
 card keep the line that they have.
@@ -17,7 +17,7 @@ from scengen.ood.card import NOT_SEARCHED
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
 
-Written by `make axes`; each line sums up one axis card (`scengen axis`): {n} twins, certificates with certify=quick.
+Written by `make axes`; each line sums up one axis card (`scengen axis`), and each column says how much was tried.
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
@@ -48,15 +48,16 @@ COLUMNS = (
 )
 
 
-def main(n: str, any_n: str, rounds: str, *tasks: str) -> None:
+def main(*arguments: str) -> None:
     """Make all cards, or those of some tasks, and write their lines."""
+    settings = [argument for argument in arguments if "=" in argument]
+    tasks = [argument for argument in arguments if "=" not in argument]
     failed = []
     for task in tasks or config.tasks():
         for axis in config.task(task).axes:
-            asked = (f"n={n}", f"any_n={any_n}", f"rounds={rounds}", "workers=2")
-            if cli.run(("axis", f"task={task}", f"axis={axis}", *asked)):
+            if cli.run(("axis", f"task={task}", f"axis={axis}", "workers=2", *settings)):
                 failed.append(f"{task}/{axis}")
-    PAGE.write_text(HEAD.format(n=n, titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
+    PAGE.write_text(HEAD.format(titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
 
@@ -82,7 +83,7 @@ def _line(card: dict[str, Any]) -> str:
         card["axis"],
         f"{min(gaps):.2g}" if gaps else "another value",
         ", ".join(leaving) or "stays",
-        f"{card['funnel']['certified']} of {card['indices']}",
+        f"{card['funnel']['certified']} of {card['indices']}" if card["indices"] else "not tried",
         card["verdict"].replace("_", "-").replace("any-", "any "),
         *map(_rung, card["rungs"]),
         _boundary(card, "replay"),

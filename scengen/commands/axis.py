@@ -48,8 +48,9 @@ def _table(card: Card) -> Table:
     for found in card.features:
         how = f"{found.inside} of {found.draws} draws inside training"
         table.add_row("physics", f"{found.feature}: " + (f"leaves training ({found.kind})" if found.leaves else how))
-    solvable = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
-    table.add_row("solvable", solvable)
+    if card.indices:
+        told = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
+        table.add_row("solvable", told)
     table.add_row("verdict", card.verdict)
     for rung in card.rungs:
         table.add_row(f"memory {rung.name}", _tell(rung))

@@ -1,8 +1,9 @@
 """The axis card: everything that is known about one OOD axis, on one page."""
 
+import itertools
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..analysis import distance
 from ..analysis.space import Space, of_features, of_parameters
-from ..errors import UnknownName, at_least
+from ..errors import BadConfig, Infeasible, UnknownName, at_least
 from ..pictures import film, render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
@@ -21,6 +22,7 @@ from ..samplers.axis import Proof, spell
 from ..samplers.split import ID
 from ..samplers.support import Support
 from ..samplers.task import Task
+from ..scenario import Scenario
 from ..sim import scene_text
 from ..statistics import Rate
 from ..targets import write
@@ -39,6 +41,7 @@ class Settings:
     axis: str = ""
     n: int = 50
     any_n: int | None = None
+    certify_n: int | None = None
     seed: int = 0
     rounds: int = 20
     workers: int = 1
@@ -49,8 +52,14 @@ class Settings:
         if self.axis not in task.axes:
             raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
         at_least(self, n=2, seed=0, rounds=0, workers=1)
-        if self.any_n is not None:
-            at_least(self, any_n=0)
+        for name in ("any_n", "certify_n"):
+            if not 0 <= (value := self.count(name)) <= self.n:
+                raise BadConfig(f"{name} = {value}; it must be from 0 to n = {self.n}")
+
+    def count(self, name: str) -> int:
+        """One of `any_n` and `certify_n`: all twins if it is not given."""
+        given = getattr(self, name)
+        return self.n if given is None else given
 
 
 @dataclass(frozen=True)
@@ -68,7 +77,7 @@ class Card:
     funnel: Mapping[str, int]
     reasons: Mapping[str, int]
     indices: int
-    """How many indices had to be tried for n certified scenarios."""
+    """How many indices had to be tried for the certified scenarios; 0 where none was asked for."""
     first_draws: int
     """How many of them were certified as first drawn."""
     verdict: str
@@ -80,7 +89,7 @@ class Card:
     why_no_path: str
     """Why there are no boundaries; empty if there are."""
     energy: distance.Energy
-    """Between the features of the first n twins in and out of distribution, in ranges of training."""
+    """Between the features of the first n draws in and out of distribution, in ranges of training."""
     energy_of_parameters: distance.Energy
     """The same between the parameters that move."""
 
@@ -111,22 +120,18 @@ def make(
         The card, and why it has no pictures, or nothing.
     """
     name, n, seed = settings.axis, settings.n, settings.seed
-    wanted = generate.Settings(split=name, n=n, seed=seed, workers=settings.workers, pool=str(folder / "pool"))
-    made = generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))
-    any_n = n if settings.any_n is None else min(n, settings.any_n)
+    evidence = features.sampled(task, name)
+    certify_n, any_n = settings.count("certify_n"), settings.count("any_n")
+    made = _certified(task, certify_settings, settings, certify_n, folder, progress) if certify_n else None
     controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
     rungs, oracle = behaviour.climb(task, name, folder, controls, n, any_n, seed, settings.workers, progress)
     boundaries, why_no_path = _boundaries(task, name, folder, seed, settings.rounds, progress)
-    twins = [
-        (task.draw(ID, seed, index).scenario, task.scenario(params))
-        for index, params in made.pool.columns("index", "params")
-    ]
+    twins = list(itertools.islice(_drawn(task, name, seed), n))
     training, here = [t for t, _ in twins], [s for _, s in twins]
     space = of_features(task, training, here)
     moved = Space(
         tuple(c for c in of_parameters(task, [*training, *here]).columns if c.name in task.axes[name].replace)
     )
-    evidence = features.sampled(task, name)
     axis = task.axes[name]
     card = Card(
         task.name,
@@ -136,10 +141,10 @@ def make(
         task.proofs[name],
         list(evidence.departures),
         evidence.features_stay,
-        made.funnel,
-        made.reasons,
-        made.indices,
-        made.first_draws,
+        made.funnel if made else {},
+        made.reasons if made else {},
+        made.indices if made else 0,
+        made.first_draws if made else 0,
         behaviour.verdict(rungs),
         rungs,
         oracle,
@@ -149,7 +154,30 @@ def make(
         distance.energy(moved.points(training), moved.points(here), twins=True),
     )
     write(folder / "card.json", json.dumps(card.plain(), indent=1) + "\n")
-    return card, _page(task, card, made.pool, seed, folder / "card.html")
+    return card, _page(task, card, made.pool if made else None, seed, folder / "card.html")
+
+
+def _certified(
+    task: Task,
+    certify_settings: CertifySettings,
+    settings: Settings,
+    n: int,
+    folder: Path,
+    progress: Callable[[str, int, int], None],
+) -> generate.Summary:
+    """A pool of the axis."""
+    where, split = str(folder / "pool"), settings.axis
+    wanted = generate.Settings(split=split, n=n, seed=settings.seed, workers=settings.workers, pool=where)
+    return generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))
+
+
+def _drawn(task: Task, split: str, seed: int) -> Iterator[tuple[Scenario, Scenario]]:
+    """Training scenarios and their twins, by index; infeasible ones are left out."""
+    for index in itertools.count():
+        try:
+            yield task.draw(ID, seed, index).scenario, task.draw(split, seed, index).scenario
+        except Infeasible:
+            continue
 
 
 def _boundaries(
@@ -167,11 +195,11 @@ def _boundaries(
 # --- the page -----------------------------------------------------------------------------------
 
 
-def _page(task: Task, card: Card, pool: Pool, seed: int, path: Path) -> str:
+def _page(task: Task, card: Card, pool: Pool | None, seed: int, path: Path) -> str:
     """Write the page, with pictures where they are possible. Returns why they are not, or nothing."""
     remark, pairs, strips = "", [], []
     try:
-        rows = [row for row, _ in zip(pool.rows(), range(SHOWN), strict=False)]
+        rows = [row for row, _ in zip(pool.rows(), range(SHOWN), strict=False)] if pool else []
         pairs = [(row.index, _picture(task, seed, row.index), thumbnail(row.scene_xml, row.embodiment)) for row in rows]
         strips = [*_strips(task, rows[0])] if rows else []
     except render.NoPictures as error:

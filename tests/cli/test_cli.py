@@ -14,7 +14,7 @@ from scengen import cli, config
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
-from scengen.ood import card
+from scengen.ood import card, discover
 from scengen.pictures import film, render
 from scengen.pool import Pool
 from scengen.runs import generate
@@ -205,12 +205,13 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     [
         ("generate", generate.Settings, {}),
         ("axis", card.Settings, {"axis": "diagonal"}),
+        ("discover", discover.Settings, {}),
         ("evaluate", rollouts.Settings, {"policy": "idle", "pool": "here"}),
         ("record", recording.Settings, {"pool": "here", "to": "there"}),
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
-    task = ["task=domino_single"] if verb in ("generate", "axis") else []
+    task = ["task=domino_single"] if verb in ("generate", "axis", "discover") else []
     assert config.read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 

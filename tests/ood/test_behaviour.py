@@ -111,7 +111,8 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
         (("axis=wide_gap",), "did you mean 'wide_gaps'"),
         (("axis=id",), "no axis of domino_single named 'id'"),
         (("axis=diagonal", "n=1"), "n = 1; it must be at least 2"),
-        (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be at least 0"),
+        (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be from 0 to n = 50"),
+        (("axis=diagonal", "n=10", "certify_n=20"), "certify_n = 20; it must be from 0 to n = 10"),
         ((), "axis needs axis=..."),
     ],
 )

@@ -1,0 +1,125 @@
+"""The search for axes: regions outside training, what it finds of a planted truth, and what it writes."""
+
+import pytest
+import yaml
+
+from scengen import cli, config
+from scengen.ood import discover as module
+from scengen.ood.discover import BREAKS, HOLDS, INFEASIBLE, Settings, _hypercube, _Trials, as_yaml, discover
+from scengen.ood.regions import located, regions
+from scengen.samplers.dists import Fixed
+from scengen.samplers.support import distance
+from scengen.samplers.task import load
+from scengen.validate.settings import QUICK
+
+TASK = config.task("domino_single")
+KNOWN = regions(TASK)
+
+
+@pytest.mark.parametrize("name", config.tasks())
+def test_every_place_of_every_region_is_within_bounds_and_outside_training(name):
+    task = config.task(name)
+    for region in regions(task):
+        known = region.parameter
+        for place in (0.0, 0.01, 0.5, 0.99, 1.0):
+            value = region.value(place)
+            known.check(known.name, value)
+            assert distance(task.training[known.name].support, Fixed(value).support, known.period) > 0
+            assert located(region, value)
+
+
+def test_regions_lie_between_training_values_and_beyond_them():
+    named = {region.name: region for region in KNOWN}
+    assert {"count_high", "count_low", "gap_ratio_high", "heading_from_0", "heading_from_90"} <= named.keys()
+    assert "heading_high" not in named, "a circle has no end"
+    assert named["count_low"].whole == [2] and named["count_high"].value(1.0) == 15
+    assert -180 <= named["heading_from_90"].value(0.6) <= -90
+
+
+def test_a_hypercube_uses_every_region_alike_and_spreads_its_places():
+    import numpy as np
+
+    points = [point for point, _ in _hypercube(30 * len(KNOWN), len(KNOWN), np.random.default_rng(0))]
+    uses = [sum(i == k for point in points for i, _ in point) for k in range(len(KNOWN))]
+    assert max(uses) - min(uses) <= 2 and {len(point) for point in points} == {1, 2}
+    places = sorted(place for point in points for i, place in point if i == 0)
+    assert all(abs(place - (k + 0.5) / len(places)) <= 0.5 / len(places) + 1e-6 for k, place in enumerate(places))
+
+
+@pytest.fixture
+def planted(monkeypatch):
+    """A world in which the memory fails where the starter is low but not too low, or both heavy and stout."""
+
+    def outcome(self, trained, memory, point):
+        place = {self.known[int(i)].name: p for i, p in point}
+        if 0.8 < place.get("starter_height_low", 0.0):
+            return INFEASIBLE
+        pair = place.get("starter_mass_high", 0) > 0.2 and place.get("starter_thickness_high", 0) > 0.2
+        return BREAKS if place.get("starter_height_low", 0.0) > 0.4 or pair else HOLDS
+
+    monkeypatch.setattr(_Trials, "twin", lambda self, number: (TASK.family(), None))
+    monkeypatch.setattr(_Trials, "outcome", outcome)
+    monkeypatch.setattr(module.behaviour, "moved_within", lambda *_: TASK.family())
+    monkeypatch.setattr(module.behaviour, "follows", lambda *_: True)
+
+
+def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
+    search = discover(TASK, QUICK, Settings(budget=400), tmp_path)
+    names = {finding.axis.name for finding in search.findings}
+    assert "starter_height_low" in names, "the planted one"
+    assert names <= {"starter_height_low", "starter_thickness_high_and_starter_mass_high"}, "and no accident"
+    found = next(f for f in search.findings if f.axis.name == "starter_height_low")
+    low, high = (
+        found.axis.replace["starter.height"].support[0].low,
+        found.axis.replace["starter.height"].support[0].high,
+    )
+    region = next(r for r in KNOWN if r.name == "starter_height_low")
+    assert region.value(0.85) <= low < high <= region.value(0.35)
+    assert found.confirmed >= 9 and found.p < 0.05 and found.proofs[0].gap > 0 and "low_starter" in found.known
+    assert sum(search.stages.values()) <= 400
+
+
+def test_what_is_written_can_stand_in_a_task_file(planted, tmp_path):
+    search = discover(TASK, QUICK, Settings(budget=300), tmp_path)
+    written = yaml.safe_load(as_yaml(TASK, search))
+    assert written["axes"], "something was found"
+    again = load(TASK.name, {**TASK.node, "axes": written["axes"]})
+    assert set(again.proofs) == {finding.axis.name for finding in search.findings}
+
+
+def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
+    whole = discover(TASK, QUICK, Settings(budget=100), tmp_path)
+    lines = (tmp_path / "trials.jsonl").read_text().splitlines(keepends=True)
+    (tmp_path / "trials.jsonl").write_text("".join(lines[:30]))
+    assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole
+    monkeypatch.setattr(_Trials, "outcome", None)
+    assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole, "nothing is tried twice"
+
+
+def test_a_search_that_finds_nothing_says_so(planted, tmp_path, monkeypatch):
+    monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS)
+    search = discover(TASK, QUICK, Settings(budget=40), tmp_path)
+    assert search.findings == [] and yaml.safe_load(as_yaml(TASK, search)) == {"axes": {}}
+
+
+def test_real_trials_tell_a_memory_that_holds_from_one_that_breaks(tmp_path):
+    trials = _Trials(TASK, QUICK, KNOWN, 0)
+    number = {region.name: k for k, region in enumerate(KNOWN)}
+    trained, memory = trials.twin(0)
+    assert trials.outcome(trained, memory, [(number["starter_height_low"], 0.75)]) == BREAKS
+    assert trials.outcome(trained, memory, [(number["tile_mass_high"], 0.2)]) == HOLDS
+    assert trials.outcome(trained, memory, [(number["x_high"], 1.0)]) == INFEASIBLE
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        (("method=forrest",), "did you mean 'forest'"),
+        (("budget=5",), "budget = 5; it must be at least 20"),
+        (("task=domino_singel",), "did you mean 'domino_single'"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
+    status = cli.run(("discover", "task=domino_single", f"to={tmp_path}", *argv))
+    told = capsys.readouterr().err
+    assert status == 2 and says in told and told.count("\n") == 1
