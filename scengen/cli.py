@@ -28,6 +28,7 @@ VERBS = (
     "export",
     "record",
     "tasks",
+    "asset",
     "evaluate",
     "attack",
     "axis",

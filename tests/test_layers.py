@@ -26,7 +26,7 @@ LAYERS = (
     ("attack",),
     ("runs",),
     ("pictures",),
-    ("envs",),
+    ("envs", "intake"),
     ("export", "evaluate"),
     ("analysis",),
     ("ood",),

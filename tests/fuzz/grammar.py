@@ -154,7 +154,7 @@ KEYS = [
     "x" * LONG,
     "task/x",
 ]
-PATHS_IN = ["pool", "to", "json", "junit"]
+PATHS_IN = ["pool", "to", "json", "junit", "mesh"]
 """Settings that name files and folders."""
 
 SETTINGS = {
@@ -199,13 +199,14 @@ class Grammar:
             made = verb in ("generate",)
             found.append(("pool", str(self.place / "new" / "pool") if made else str(self.pool)))
         if "to" in names:
-            suffix = {"film": ".png", "report": ".html"}.get(verb, "")
+            suffix = {"film": ".png", "report": ".html", "asset": ".stl"}.get(verb, "")
             found.append(("to", str(self.place / "new" / f"target{suffix}")))
         given = {
             "axis": ("axis", "wide_gaps"),
             "film": ("id", "0"),
             "view": ("id", "0"),
             "evaluate": ("policy", "idle"),
+            "asset": ("name", "cup"),
         }
         if verb in given:
             found.append(given[verb])

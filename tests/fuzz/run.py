@@ -117,6 +117,8 @@ WORK = (
     "scengen.envs.agreement.compare_all",
     "scengen.pictures.film.Take.moments",
     "scengen.pictures.view.view",
+    "scengen.commands.asset.encode",
+    "scengen.intake.asset.take_in",
 )
 """Where work begins that takes seconds: a command line that gets so far has been accepted."""
 

@@ -1,0 +1,141 @@
+"""what scenes are made of, as meshes; a mesh of yours as one more"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from ..assets.kits import kit, kits
+from ..config import read
+from ..errors import BadConfig, cut
+from ..export.mesh import FORMATS, encode
+from ..params import parameters
+from ..pictures import render
+from ..targets import try_file, try_folder
+from . import FAILED, OK, Arguments, out, remark, say, write
+
+if TYPE_CHECKING:
+    from ..intake.asset import Taken
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen asset`; meanings stand in conf/command/asset.yaml."""
+
+    name: str | None
+    to: str | None
+    mesh: str | None
+    units: str | None
+    mass: float | None
+    density: float | None
+    friction: float
+    error: float
+    pieces: int
+    seed: int
+
+    def check(self) -> None:
+        """Raise `BadConfig` for settings that do not go together."""
+        if self.name is not None and self.mesh is not None:
+            raise BadConfig("name= writes an asset as a mesh, mesh= makes an asset of one; give one of them")
+        if self.to is None and (self.name is not None or self.mesh is not None):
+            where = "to=FILE.stl" if self.mesh is None else "to=FOLDER"
+            raise BadConfig(f"asset needs {where}; see scengen asset --help")
+        if self.to is not None and self.name is None and self.mesh is None:
+            raise BadConfig(f"to = {cut(self.to)}, but of what? say name=ASSET or mesh=FILE")
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("asset", arguments, Settings)
+    settings.check()
+    if settings.mesh is not None:
+        return _take_in(settings, settings.mesh, Path(str(settings.to)))
+    if settings.name is not None:
+        return _write_mesh(settings.name, Path(str(settings.to)))
+    out.print(_table())
+    return OK
+
+
+def _table() -> Table:
+    table = Table("asset", "parameter", "nominal", "range", "unit")
+    for name, kind in kits().items():
+        for i, p in enumerate(parameters(kind())):
+            table.add_row("" if i else name, p.name, f"{p.nominal:g}", f"{p.low:g} to {p.high:g}", p.unit)
+    return table
+
+
+def _write_mesh(name: str, target: Path) -> int:
+    prop = kit(name)
+    if target.suffix not in FORMATS:
+        raise BadConfig(f"to = {cut(str(target))}; name a file that ends in {', '.join(FORMATS)}")
+    try_file(target)
+    write(target, encode(prop, target.suffix))
+    say(f"wrote {target}")
+    return OK
+
+
+def _take_in(settings: Settings, mesh: str, folder: Path) -> int:
+    try:
+        from ..intake import asset
+    except ImportError as error:
+        raise BadConfig(f"no {error.name} to take in meshes; say pip install 'scengen[mesh]'") from None
+    request = asset.Request(
+        mesh,
+        settings.units,
+        settings.mass,
+        settings.density,
+        settings.friction,
+        settings.error,
+        settings.pieces,
+        settings.seed,
+    )
+    request.check()
+    try_folder(folder)
+    if known := asset.kept(request, folder):
+        say(f"{folder} holds this mesh already, with these settings: nothing was computed")
+        return _tell(known)
+    taken = asset.take_in(request)
+    figures = taken.figures()
+    _write(taken, figures, folder)
+    return _tell(figures)
+
+
+def _write(taken: "Taken", figures: dict[str, Any], folder: Path) -> None:
+    """The figures last: they vouch for the files beside them."""
+    from ..intake.preview import preview
+
+    write(folder / "asset.xml", taken.xml)
+    try:
+        write(folder / "preview.png", render.encode(preview(taken.prop), "png"))
+        names = "asset.xml, asset.json and preview.png"
+    except render.NoPictures as error:
+        remark(f"{folder} has no preview.png: {error}")
+        names = "asset.xml and asset.json"
+    write(folder / "asset.json", json.dumps(figures, indent=1) + "\n")
+    say(f"wrote {names} in {folder}")
+
+
+def _tell(figures: dict[str, Any]) -> int:
+    """What was found, and whether it is what was asked for."""
+    error, hull, rest, asked = (
+        figures["error"],
+        figures["error_of_one_hull"],
+        figures["rest"],
+        figures["settings"]["error"],
+    )
+    near, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
+    say(
+        f"{count} convex piece{'s' * (count > 1)}: {1000 * error['outward']:.2f} mm too far out and "
+        f"{1000 * error['inward']:.2f} mm too far in at most, {error['volume']:.3f} times the volume; "
+        f"one convex hull: {1000 * hull['outward']:.2f} mm, {hull['volume']:.3f} times"
+    )
+    say(
+        f"{figures['mass']:.3g} kg; let go on the table it moves by {1000 * rest['creep']:.3f} mm in 2 s, "
+        f"at {1000 * rest['speed']:.2f} mm/s at most"
+    )
+    if not near:
+        say(f"MISSED: the error of {1000 * asked:g} mm that was asked for; permit more pieces, or a larger error")
+    if not rest["rests"]:
+        say("MISSED: it does not come to rest; give it a flat foot, or ask for a smaller error")
+    return OK if near and rest["rests"] else FAILED

@@ -1,0 +1,73 @@
+"""An asset as one closed mesh: the union of all that things collide with."""
+
+import mujoco
+import numpy as np
+from manifold3d import Manifold, OpType
+from numpy.typing import NDArray
+
+from ..assets.prop import Prop
+from ..errors import BadConfig
+
+FORMATS = (".glb", ".obj", ".off", ".ply", ".stl")
+SEGMENTS = 48
+"""Corners of a full circle; all lie on it."""
+OVERLAP = 1e-5
+"""By how much parts are made to stand out on all sides [m], so that those which only touch become one."""
+
+
+def united(prop: Prop) -> Manifold:
+    """The solid that an asset is in the simulation, joints at their reference, in its own axes."""
+    model = prop.spec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    parts = []
+    for g in np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0)):
+        turned = np.column_stack([data.geom_xmat[g].reshape(3, 3), data.geom_xpos[g]])
+        part = _geom(model, int(g)).transform(turned)
+        low, high = np.split(np.array(part.bounding_box()), 2)
+        middle, edges = (low + high) / 2, high - low
+        grown = part.translate((-middle).tolist()).scale((1 + 2 * OVERLAP / edges).tolist())
+        parts.append(grown.translate(middle.tolist()))
+    return Manifold.batch_boolean(parts, OpType.Add)
+
+
+def encode(prop: Prop, ending: str) -> bytes:
+    """The union as a mesh file [m].
+
+    Raises:
+        BadConfig: no such format, or trimesh is missing.
+    """
+    if ending not in FORMATS:
+        raise BadConfig(f"no mesh format named {ending!r}; known: {', '.join(FORMATS)}")
+    try:
+        import trimesh
+    except ImportError:
+        raise BadConfig("no trimesh for mesh files; say pip install 'scengen[mesh]'") from None
+    found = united(prop).to_mesh64()
+    points, faces = np.asarray(found.vert_properties)[:, :3], np.asarray(found.tri_verts, np.int64)
+    written = trimesh.Trimesh(points, faces, process=False).export(file_type=ending[1:])
+    return written.encode() if isinstance(written, str) else bytes(written)
+
+
+def _geom(model: mujoco.MjModel, g: int) -> Manifold:
+    """One geom as a solid, in its own axes."""
+    a, b, c = model.geom_size[g]
+    match mujoco.mjtGeom(model.geom_type[g]):
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return Manifold.cube((2 * a, 2 * b, 2 * c), True)
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return Manifold.sphere(a, SEGMENTS)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return Manifold.cylinder(2 * b, a, circular_segments=SEGMENTS, center=True)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            ball = Manifold.sphere(a, SEGMENTS)
+            return Manifold.batch_hull([ball.translate((0, 0, -b)), ball.translate((0, 0, b))])
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            return Manifold.hull_points(_vertices(model, int(model.geom_dataid[g])))
+        case other:
+            raise NotImplementedError(f"a geom of type {other.name} as a mesh")
+
+
+def _vertices(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64]:
+    start = model.mesh_vertadr[mesh]
+    return np.ascontiguousarray(model.mesh_vert[start : start + model.mesh_vertnum[mesh]], float)

@@ -1,0 +1,43 @@
+"""A picture of an asset on the table: as it is looked at, and beside it the pieces that things collide with."""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from ..assets.prop import TABLE_TOP, place, table
+from ..geometry import UP, heading
+from ..pictures.render import AZIMUTH, ELEVATION, Picture, camera
+from ..sim.scene_text import emit
+from ..sim.world import JAW
+from .prop import MeshProp
+
+SIZE = 480
+"""Edge of each half [pixels]."""
+AWAY = 2.6
+"""Distance of the camera, as a multiple of the asset's largest distance from the middle of its bounding box."""
+
+
+def preview(prop: MeshProp) -> Picture:
+    """Both pictures side by side, shape (480, 960, 3).
+
+    Raises:
+        NoPictures: OpenGL is missing.
+    """
+    return np.hstack([_picture(prop), _picture(replace(prop, bare=True))])
+
+
+def _picture(prop: MeshProp) -> Picture:
+    scene = table()
+    place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP], free=False)
+    low, high = prop.vertices.min(axis=0), prop.vertices.max(axis=0)
+    dip = math.radians(ELEVATION)
+    ahead = math.cos(dip) * heading(AZIMUTH) + math.sin(dip) * UP
+    right = np.cross(ahead, UP) / math.cos(dip)
+    axes, turn = np.column_stack([right, np.cross(right, ahead), -ahead]), np.empty(4)
+    mujoco.mju_mat2Quat(turn, axes.ravel())
+    eye = TABLE_TOP * UP + (low + high) / 2 - AWAY * float(np.linalg.norm(high - low)) / 2 * ahead
+    scene.worldbody.add_camera(name="close", pos=eye.tolist(), quat=turn.tolist())
+    with camera(emit(scene)[0], JAW, SIZE, SIZE) as view:
+        return view.take("close")
