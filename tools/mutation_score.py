@@ -4,6 +4,9 @@ Every mutant of tests/attack/mutants.py is attacked until something succeeds tha
 which written cheats exploit the mutant, hits of random macros alone with as many rollouts, and how many varied runs of
 the oracle would be taken for a way around the task. Results stand in generated/mutation_score.jsonl; a repeated call
 continues there.
+
+`python tools/mutation_score.py hits [budget] [task ...]` counts, for each mutant that a written cheat exploits, all
+successes that the sound family refuses: those of the adversary beside those of random macros with as many rollouts.
 """
 
 import json
@@ -52,6 +55,38 @@ def main(budget: str = "300", *tasks: str) -> None:
                 records.append(flagged(task))
                 _keep(page, records[-1])
     print(_summary(records))
+
+
+def compare(budget: str = "60", *tasks: str) -> None:
+    """Count hits of the adversary and of random macros at equal cost."""
+    ours, luck = 0, 0
+    for mutant in mutants():
+        if mutant.narrow or (tasks and mutant.task not in tasks):
+            continue
+        with mutant.weakened():
+            subjects = mutant.subjects(2)
+            if not exploits(mutant, subjects):
+                continue
+            tiers = [tier for tier in TIERS if tier != "shortcut"]  # those of a sound family are declared, not found
+            found, random = (
+                counted(mutant, subjects, int(budget), tiers),
+                counted(mutant, subjects, int(budget), [RANDOM]),
+            )
+        ours, luck = ours + found, luck + random
+        print(json.dumps({"task": mutant.task, "mutant": mutant.name, "hits": found, "random": random}), flush=True)
+    print(f"{ours} hits of the adversary, {luck} of random macros at equal cost")
+
+
+def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> int:
+    """Successes that the sound family refuses, in so many rollouts."""
+    priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
+    hits = 0
+    for number, subject in enumerate(subjects):
+        arena = arena_of(subject)
+        arena.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+        result = Attack(arena, 0, number, len(subjects), priors).run(budget // len(subjects), tiers)
+        hits += sum(mutant.kills(hit, subject.scenario, subject.scene_xml) for hit in result.hits)
+    return hits
 
 
 def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
@@ -189,4 +224,7 @@ def _summary(records: Sequence[dict[str, Any]]) -> str:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if sys.argv[1:2] == ["hits"]:
+        compare(*sys.argv[2:])
+    else:
+        main(*sys.argv[1:])
