@@ -29,7 +29,9 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`), and ea
   is the scenario remembered, with the axis' own parameters redrawn within training; for **any**, and where training
   knows one value only (marked *held out*), it is a training scenario that nobody remembers. Twins count that the
   oracle solves in both arms. `weak`: it solves less than 30 % of its control, and tells nothing.
-  *cosmetic to memory*: some memory solves most of the axis; what is new there is for the eye, if for anything.
+  *cosmetic to memory*: some memory solves most of the axis; what is new there is for the eye, if for anything. In a
+  task that asks for a choice (`domino_select`) the memory of the twin knows the answer: no axis that makes the choice
+  harder to see can break it, and whether a policy still chooses rightly is for `scengen evaluate` to say.
 * **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
   the edge of training, 1 the far end of the axis. In brackets the 95 % interval, which assumes no curve; the point
   before it is a guess. `> x`: not before x; where x is the end of the path, with what was solved there. `< 0`: the
