@@ -24,7 +24,7 @@ class Bowl(Turned):
     """Outer one, at the rim."""
     depth: float = param(0.055, "m", 0.035, 0.060)
     """Height of the rim above the ground."""
-    foot: float = param(0.028, "m", 0.015, 0.035)
+    foot: float = param(0.028, "m", 0.015, 0.045)
     """Radius of the flat underside."""
     wall: float = param(0.003, "m", 0.002, 0.004)
     bead: float = param(0.005, "m", 0.004, 0.008)

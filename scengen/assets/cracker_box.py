@@ -1,0 +1,43 @@
+"""A box of crackers in several sizes, with a slippery surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import Vec3
+from ..params import param
+from .box import Box
+from .prop import Rgba, show
+
+EDGES = (0.0717, 0.1636, 0.2138)
+"""Of the real box [m], measured on the scan of number 003 of the YCB set."""
+MASS = 0.411
+"""Of the real box [kg]: object list of the YCB set."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrackerBox(Box):
+    """A box that stands on its smallest face, the broad face towards x.
+
+    Paper, App. C: "4 size variants, low-friction surface", without numbers. Ours are 0.75, 0.85, 1.0 and 1.15 times the
+    real box; with varnish on varnish, friction is 0.15 to 0.25.
+    """
+
+    scale: float = param(1.0, "1", 0.75, 1.15)
+    """Of all edges."""
+    friction: float = param(0.20, "1", 0.05, 0.60)
+    rgba: Rgba = (0.75, 0.16, 0.14, 1.0)
+
+    @property
+    def mass(self) -> float:  # type: ignore[override]  # follows from the size, as the filling is always the same
+        """As much of the same filling as fits [kg]."""
+        return MASS * self.scale**3
+
+    @property
+    def size(self) -> Vec3:
+        return self.scale * np.array(EDGES)
+
+
+if __name__ == "__main__":
+    for scale in (0.75, 0.85, 1.0, 1.15):
+        show(CrackerBox(scale=scale))

@@ -1,0 +1,67 @@
+"""A keyboard with the letters of a QWERTY layout: each cap is a body of its own, so that contacts tell them apart."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..geometry import Vec3
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+
+ROWS = ("QWERTYUIOP", "ASDFGHJKL", "ZXCVBNM")
+"""From the far row to the near one."""
+LETTERS = "".join(ROWS)
+STAGGER = 0.5
+"""By how much each row is shifted against the one behind it, as a share of the pitch."""
+PLATE = 0.004
+"""Thickness of the plate that carries the caps [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Keyboard(Prop):
+    """The keyboard for someone who looks along +x: Q is far to the left, at +y. The origin is the middle of the plate.
+
+    Paper, App. C: "virtual QWERTY keyboard with per-key contact triggers". It gives no lengths: closed finger tips, 21
+    mm wide and 26 mm long, keep 12 mm from the neighbours of a cap that they press in its middle.
+    """
+
+    pitch: float = param(0.040, "m", 0.030, 0.050)
+    """From cap to cap along a row, and from row to row."""
+    cap: float = param(0.030, "m", 0.015, 0.030)
+    """Edge of a cap."""
+    height: float = param(0.012, "m", 0.006, 0.030)
+    """Of the caps' upper faces above the ground."""
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    rgba: Rgba = (0.86, 0.86, 0.84, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        """Edges of the plate along x and y, and height of the whole [m]."""
+        return np.array([len(ROWS) * self.pitch, (len(ROWS[0]) + 0.5) * self.pitch, self.height])
+
+    def at(self, letter: str) -> Vec3:
+        """Middle of a cap's upper face, in the keyboard's axes [m]. Raises ValueError for what is no capital letter."""
+        if len(letter) != 1 or letter not in LETTERS:
+            raise ValueError(f"no key named {letter!r}; known: {LETTERS}")
+        row = next(i for i, letters in enumerate(ROWS) if letter in letters)
+        along = ROWS[row].index(letter) + STAGGER * row - (len(ROWS[0]) - 1) / 2
+        return np.array([(1 - row) * self.pitch, -along * self.pitch, self.height])
+
+    def under(self, spot: Vec3) -> str | None:
+        """The letter of the cap over which a place is, in the keyboard's axes [m]; None: between caps."""
+        over = [letter for letter in LETTERS if np.all(np.abs(spot[:2] - self.at(letter)[:2]) <= self.cap / 2)]
+        return over[0] if over else None
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        x, y, _ = self.size / 2
+        thick, rise = PLATE / 2, (self.height - PLATE) / 2
+        solid(body, "plate", [x, y, thick], [0, 0, thick], friction=self.friction, mass=0.3, rgba=(0.2, 0.2, 0.22, 1))
+        for letter in LETTERS:
+            key = body.add_body(name=f"key_{letter}", pos=self.at(letter).tolist())
+            size, pos = [self.cap / 2, self.cap / 2, rise], [0, 0, -rise]
+            solid(key, f"cap_{letter}", size, pos, friction=self.friction, mass=0.01, rgba=self.rgba)
+
+
+if __name__ == "__main__":
+    show(Keyboard())
