@@ -1,7 +1,7 @@
 """what scenes are made of, as meshes; a mesh of yours as one more"""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +50,7 @@ def command(arguments: Arguments) -> int:
     settings = read("asset", arguments, Settings)
     settings.check()
     if settings.mesh is not None:
-        return _take_in(settings, settings.mesh, Path(str(settings.to)))
+        return _take_in(settings, Path(str(settings.to)))
     if settings.name is not None:
         return _write_mesh(settings.name, Path(str(settings.to)))
     out.print(_table())
@@ -75,21 +75,12 @@ def _write_mesh(name: str, target: Path) -> int:
     return OK
 
 
-def _take_in(settings: Settings, mesh: str, folder: Path) -> int:
+def _take_in(settings: Settings, folder: Path) -> int:
     try:
         from ..intake import asset
     except ImportError as error:
         raise BadConfig(f"no {error.name} to take in meshes; say pip install 'scengen[mesh]'") from None
-    request = asset.Request(
-        mesh,
-        settings.units,
-        settings.mass,
-        settings.density,
-        settings.friction,
-        settings.error,
-        settings.pieces,
-        settings.seed,
-    )
+    request = asset.Request(**{field.name: getattr(settings, field.name) for field in fields(asset.Request)})
     request.check()
     try_folder(folder)
     if known := asset.kept(request, folder):
@@ -118,12 +109,8 @@ def _write(taken: "Taken", figures: dict[str, Any], folder: Path) -> None:
 
 def _tell(figures: dict[str, Any]) -> int:
     """What was found, and whether it is what was asked for."""
-    error, hull, rest, asked = (
-        figures["error"],
-        figures["error_of_one_hull"],
-        figures["rest"],
-        figures["settings"]["error"],
-    )
+    error, hull, rest = figures["error"], figures["error_of_one_hull"], figures["rest"]
+    asked = figures["settings"]["error"]
     near, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
     say(
         f"{count} convex piece{'s' * (count > 1)}: {1000 * error['outward']:.2f} mm too far out and "

@@ -34,7 +34,7 @@ SPEED = 0.001
 
 @dataclass(frozen=True)
 class Request:
-    """What a mesh is taken in with."""
+    """What a mesh is taken in with; the settings of `scengen asset` of these names."""
 
     mesh: str
     units: str | None = None
@@ -122,11 +122,6 @@ class Taken:
     def xml(self) -> str:
         """A model with one body, "body", that refers to no files."""
         return emit(self.prop.spec())[0]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the pieces are as near as was asked for, and the asset comes to rest."""
-        return self.pieces.error.worst <= self.request.error and self.rest.rests
 
     def figures(self) -> dict[str, Any]:
         """What is known about the asset, as plain data."""

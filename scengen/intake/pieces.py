@@ -13,16 +13,17 @@ from scipy.spatial import KDTree
 from .prop import Points
 from .solid import Solid, as_mesh, sampled
 
-DETAIL = 0.2
-"""Share of the permitted error by which a surface is simplified before it is cut up, which saves half of the time."""
+DETAIL = 0.1
+"""Share of the permitted error by which a surface is simplified before it is cut up. A scan of a bottle with 16 000
+triangles then takes 9 s and 15 pieces at 3 mm; with a tenth of that share 24 s, and 26 pieces around its roughness."""
 POINTS = 60_000
 """At which distances are measured."""
 NEIGHBOURS = 8
 """Triangles among which the nearest one is looked for: those of the nearest points."""
 BATCH = 4096
 """Points that are compared with all planes at once; all of them would take a gigabyte."""
-ITERATIONS, NODES, RESOLUTION = 30, 10, 500
-"""CoACD's search for cuts, with less than its own 150, 20 and 2000, by which scans of 16 000 triangles take minutes."""
+ITERATIONS, NODES, RESOLUTION = 60, 15, 1000
+"""CoACD's search for cuts. With its own 150, 20 and 2000 the same bottle takes 14 s and 13 pieces."""
 
 
 @dataclass(frozen=True)
