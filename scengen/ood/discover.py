@@ -297,11 +297,11 @@ def _uncertain(records: list[dict[str, Any]], count: int, random: np.random.Gene
         return [(point, None) for point in points[:BATCH]]
     forest = RandomForestClassifier(200, min_samples_leaf=2, random_state=int(random.integers(2**31)))
     share = forest.fit(table, breaks).predict_proba(np.stack([_row(p, count) for p in points]))[:, 1]
-    chosen, used = list[tuple[Point, None]](), set[tuple[int, ...]]()
+    chosen, used = list[tuple[Point, None]](), set[int]()
     for k in np.argsort(-share * (1 - share), kind="stable"):
-        where = tuple(i for i, _ in points[k])
-        if where not in used:
-            used.add(where)
+        where = {i for i, _ in points[k]}
+        if not used & where:
+            used |= where
             chosen.append((points[k], None))
         if len(chosen) == BATCH:
             break
