@@ -66,7 +66,7 @@ class Can(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         squares = 3 * self.radius**2 + self.height**2
         weigh(body, self.mass, [0.0, 0.0, self.height / 2], np.array([squares, squares, 6 * self.radius**2]) / 12)
-        wall = [self.radius - PROUD, self.height / 2 - PROUD]
+        wall = [self.radius - PROUD, self.height / 2 - 2 * PROUD]  # no face of it is one with a seam's
         self._round("wall", body, wall, self.height / 2)
         for end, middle, low in (("foot", SEAM / 2 + PROUD, FOOT), ("top", -SEAM / 2 - PROUD, -FOOT)):
             above = 0.0 if end == "foot" else self.height
