@@ -113,6 +113,7 @@ WORK = (
     "scengen.commands.bench.bench",
     "scengen.commands.shrink.certify",
     "scengen.commands.axis.make",
+    "scengen.commands.discover.discover",
     "scengen.export.recording.DataSet",
     "scengen.envs.agreement.compare_all",
     "scengen.pictures.film.Take.moments",
