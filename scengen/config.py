@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -129,7 +130,8 @@ def _value(where: str, kind: Any, value: Any) -> Any:
     spelled = {int: "a whole number", float: "a number", str: "a word", bool: "true or false"}
     options = kind.__args__ if hasattr(kind, "__args__") and not hasattr(kind, "__origin__") else (kind,)
     if float in options and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+        with suppress(OverflowError):  # a number of hundreds of digits, which is refused below
+            return float(value)
     if value is None and type(None) in options:
         return None
     if str in options and isinstance(value, (int, float)) and not isinstance(value, bool):

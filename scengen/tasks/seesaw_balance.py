@@ -234,8 +234,17 @@ class SeesawBalance(Scenario):
             yield require(tilt >= CLEARLY, f"the {what} balances", tilt=tilt, needed=CLEARLY)
 
     def features(self) -> Mapping[str, float]:
-        """The torque to be balanced by that of the counterweight in the mirror image, and where it balances [m]."""
-        return {"torque_ratio": -self.balance / self.offset, "place_of_balance": self.balance}
+        """The torque to be balanced by that of the counterweight in the mirror image, and where it balances [m].
+
+        And, in half lengths of the beam, how far the axle is off its middle, and the target off the axle.
+        """
+        half = self.seesaw.length / 2
+        return {
+            "torque_ratio": -self.balance / self.offset,
+            "place_of_balance": self.balance,
+            "axle_off_middle": abs(self.seesaw.pivot_offset) / half,
+            "target_lever": self.offset / half,
+        }
 
     # --- statics and geometry -------------------------------------------------------------
 
