@@ -13,7 +13,7 @@ from .sim.world import World
 
 Outcome = Literal["success", "failure", "timeout", "unstable"]
 Actions = NDArray[np.float32]
-"""Shape (n, 7): one row per control period, exactly as the controller received it."""
+"""Shape (n, 7 * arms): one row per control period, exactly as the controller received it."""
 
 
 class Episode:
@@ -34,7 +34,7 @@ class Episode:
         """How long the goal has held without interruption [s]."""
 
     def step(self, action: NDArray[np.float32]) -> Outcome | None:
-        """Simulate one control period (10 ms) under an action that has passed the filter, shape (7,).
+        """Simulate one control period (10 ms) under an action that has passed the filter, shape (7 * arms,).
 
         Returns:
             The outcome so far.

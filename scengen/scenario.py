@@ -18,7 +18,8 @@ from .sim.world import World
 from .symmetry import Symmetry
 
 Action = NDArray[np.float64]
-"""Shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1 closed)."""
+"""Shape (7 * arms,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1 closed) of
+every arm in its order."""
 
 Plan = Generator[Action, None, None]
 """A scripted behaviour: one action per control period, until it has nothing left to do."""

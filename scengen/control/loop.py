@@ -1,6 +1,7 @@
-"""The control loop of one Panda with jaw or suction cup, compiled: filtered actions in, physics and contacts out."""
+"""The control loop of one or two Pandas with jaw or suction cup, compiled: actions in, physics and contacts out."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -13,7 +14,8 @@ from ..robots.panda import FINGERS, HOME, JOINTS
 from . import native, osc
 
 ACTION = 7
-"""Numbers in an action: translation (3), rotation vector (3), gripper, each in [-1, 1]."""
+"""Numbers in the action of one arm: translation (3), rotation vector (3), gripper, each in [-1, 1]. An action of the
+robot holds them for each arm, one after the other."""
 
 SCENE = np.dtype(
     [
@@ -40,16 +42,15 @@ def _sources() -> str:
     return hashlib.sha256(b"".join(Path(file).read_bytes() for file in [__file__, *files])).hexdigest()[:16]
 
 
-MEMORY = np.dtype(
+ARM = np.dtype(
     [
-        ("scene", SCENE),
         ("at", osc.PLACES),
         ("state", osc.STATE),
         ("work", osc.WORK),
         (f"sources_{_sources()}", np.int64),
     ]
 )
-"""Everything that compiled code needs besides MuJoCo, in one record: one argument is the cheapest call.
+"""What the controller of one arm needs.
 
 The last field is never used. numba's disk cache looks at the types of the arguments and at the file of the
 entry point alone, and would take machine code of an older `osc` for the present one; its name forbids that.
@@ -59,7 +60,7 @@ INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Loop:
-    """The control loop of one Panda over one (model, data).
+    """The control loop of all arms over one (model, data): the robot of the model is found by its names.
 
     After every call the poses in `data` (xpos, xquat, site_xpos ...) are those of the current qpos;
     velocities, sensors and contacts in it are those of the last physics step, 2 ms before, as in robosuite.
@@ -71,13 +72,23 @@ class Loop:
 
     touched: NDArray[np.uint8]
     """1 where two bodies were in contact (dist <= 0) at any physics step since the reset. Symmetric, shape
-    (nbody + 1, nbody + 1); the last row and column stand for any body of the robot, mount and gripper
-    included. The robot may touch itself: the fingertips of an empty closed jaw are in the last row."""
+    (nbody + arms + 1, nbody + arms + 1). After the rows and columns of the bodies comes one for each arm, which stands
+    for any body of it, mount and gripper included; the last one stands for any body of any arm. The robot may touch
+    itself: the fingertips of an empty closed jaw are in the last row."""
     touching: NDArray[np.uint8]
     """The same for the last control period alone."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, home: ArrayLike = HOME):
-        """Take over `data` and reset it. `home`: joint angles after a reset [rad], shape (7,)."""
+        """Take over `data` and reset it.
+
+        Args:
+            model: of a scene with one or two arms.
+            data: of that model.
+            home: joint angles of every arm after a reset [rad], shape (7,); or of each, shape (arms, 7).
+
+        Raises:
+            ValueError: there is no arm in the model, or its options do not allow for control.
+        """
         steps = self.PERIOD / model.opt.timestep
         self.substeps = round(steps)
         if self.substeps < 1 or abs(steps - self.substeps) > 1e-6:
@@ -88,52 +99,61 @@ class Loop:
         if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             raise ValueError("a Runge-Kutta step cannot be controlled; set option.integrator to Euler")
         self.model, self.data = model, data
-        self.home = np.array(home, dtype=np.float64)
-        if self.home.shape != (JOINTS,):
-            raise ValueError(f"home must be {JOINTS} joint angles, not an array of shape {self.home.shape}")
-        self._memory = np.zeros(1, MEMORY)
-        self._memory["at"][0] = osc.places(model, data, panda.Names())
-        _fill_scene(self._memory["scene"][0], model, data, self.substeps)
-        self._state = self._memory["state"][0]
-        self._owner = _owners(model)
-        self._latches = np.zeros((2, model.nbody + 1, model.nbody + 1), np.uint8)
+        names = panda.arms(model) or [panda.Names()]
+        self.size = ACTION * len(names)
+        """Numbers in an action of the robot."""
+        given = np.array(home, dtype=np.float64)
+        if given.shape not in ((JOINTS,), (len(names), JOINTS)):
+            raise ValueError(f"home must be {JOINTS} joint angles of each arm, not an array of shape {given.shape}")
+        self.home = np.broadcast_to(given, (len(names), JOINTS))
+        self._arms = np.zeros(len(names), ARM)
+        for arm, name in zip(self._arms, names, strict=True):
+            arm["at"] = osc.places(model, data, name)
+        self._scene = np.zeros(1, SCENE)
+        _fill_scene(self._scene[0], model, data, self.substeps)
+        self._owner = _owners(model, names)
+        labels = model.nbody + len(names) + 1
+        self._latches = np.zeros((2, labels, labels), np.uint8)
         self.touched, self.touching = self._latches
-        self._action = np.zeros(ACTION, np.float32)
+        self._action = np.zeros(self.size, np.float32)
         self._no_record = np.zeros((0, model.nu))
-        self._fingers = panda.fingers(model, panda.Names())
+        self._fingers = [panda.fingers(model, name) for name in names]
         self.reset()
 
     def reset(self) -> None:
         """Back to the start: `home`, jaw half open or suction off, nothing touched. The same bits as a fresh loop."""
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[self._memory["at"]["angle"][0]] = self.home
-        self.data.qpos[self._fingers] = FINGERS[: len(self._fingers)]
-        osc.start(self._state, self.home)
+        for arm, home, fingers in zip(self._arms, self.home, self._fingers, strict=True):
+            self.data.qpos[arm["at"]["angle"]] = home
+            self.data.qpos[fingers] = FINGERS[: len(fingers)]
+            osc.start(arm["state"], home)
         self._latches[:] = 0
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, action: ArrayLike) -> int:
-        """Simulate one control period and return the number of MuJoCo warnings since the reset; 0 is sound.
+        """Simulate one control period under an action of shape (size,).
+
+        Returns the number of MuJoCo warnings since the reset; 0 is sound.
 
         Warnings matter: MuJoCo silently starts an unstable simulation afresh, and only the warning remains.
         """
         given = np.asarray(action, np.float32)
-        if given.shape != (ACTION,):
-            raise ValueError(f"an action has shape ({ACTION},), not {given.shape}")
+        if given.shape != (self.size,):
+            raise ValueError(f"an action has shape ({self.size},), not {given.shape}")
         self._action[:] = given
-        warnings = _step(self._memory, self._owner, self._latches, self._action)
+        warnings = _step(self._scene, self._arms, self._owner, self._latches, self._action)
         if warnings < 0:
             raise ValueError(f"an action must be finite, not {given.tolist()}")
         return warnings
 
     def replay(self, actions: ArrayLike, ctrl_out: NDArray[np.float64] | None = None) -> int:
-        """Simulate one period per row of `actions`, shape (n, 7): the same bits as n ticks, in one call.
+        """Simulate one period per row of `actions`, shape (n, size): the same bits as n ticks, in one call.
 
         `ctrl_out`, shape (n * substeps, nu), receives the controls of every physics step.
         """
         actions = np.ascontiguousarray(actions, np.float32)
-        if actions.ndim != 2 or actions.shape[1] != ACTION:
-            raise ValueError(f"actions have shape (n, {ACTION}), not {actions.shape}")
+        if actions.ndim != 2 or actions.shape[1] != self.size:
+            raise ValueError(f"actions have shape (n, {self.size}), not {actions.shape}")
         bad = np.flatnonzero(~np.isfinite(actions).all(axis=1))
         if bad.size:
             raise ValueError(f"actions must be finite, but row {bad[0]} is {actions[bad[0]].tolist()}")
@@ -142,7 +162,7 @@ class Loop:
             record, wanted = ctrl_out, (len(actions) * self.substeps, self.model.nu)
             if record.shape != wanted or record.dtype != np.float64 or not record.flags.c_contiguous:
                 raise ValueError(f"ctrl_out must be a C-contiguous float64 array of shape {wanted}")
-        return _replay(self._memory, self._owner, self._latches, actions, record)
+        return _replay(self._scene, self._arms, self._owner, self._latches, actions, record)
 
     def watch(self, first: bool) -> None:
         """Latch the contacts of a physics step that somebody else makes, between its mj_step1 and mj_step2.
@@ -150,13 +170,13 @@ class Loop:
         A suction cup that is switched on but not sealed is switched off for this step. `first`: whether the step
         begins a control period.
         """
-        _watch(self._memory, self._owner, self._latches, first)
+        _watch(self._scene, self._arms, self._owner, self._latches, first)
 
     def state(self) -> NDArray[np.float64]:
         """All that the future depends on, in one vector: integration state, controller, latches, warnings."""
         physics = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))
         mujoco.mj_getState(self.model, self.data, physics, INTEGRATION)
-        parts = [physics, self._controller(), np.packbits(self._latches), self._warnings()]
+        parts = [physics, self._controllers().ravel(), np.packbits(self._latches), self._warnings()]
         return np.concatenate(parts, dtype=np.float64)
 
     def restore(self, state: NDArray[np.float64]) -> None:
@@ -164,26 +184,26 @@ class Loop:
         warnings = self._warnings()
         packed = -(-self._latches.size // 8)
         physics_size = mujoco.mj_stateSize(self.model, INTEGRATION)
-        parts = np.cumsum([physics_size, self._controller().size, packed])
+        parts = np.cumsum([physics_size, self._controllers().size, packed])
         if np.shape(state) != (parts[-1] + warnings.size,):
             raise ValueError(
                 f"a state of this scene has shape ({parts[-1] + warnings.size},), not {np.shape(state)}; "
                 "restore only what state() of the same scene returned"
             )
-        physics, controller, latches, counts = np.split(np.asarray(state, np.float64), parts)
+        physics, controllers, latches, counts = np.split(np.asarray(state, np.float64), parts)
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, physics, INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
         # Forward dynamics may leave its own mark on the warm start; the state has the last word.
         mujoco.mj_setState(self.model, self.data, physics, INTEGRATION)
-        self._controller()[:] = controller
+        self._arms["state"] = controllers.view(osc.STATE)
         bits = np.unpackbits(latches.astype(np.uint8), count=self._latches.size)
         self._latches[:] = bits.reshape(self._latches.shape)
         warnings[:] = counts.astype(np.int32)
 
-    def _controller(self) -> NDArray[np.float64]:
-        """The controller's memory as a vector, not a copy."""
-        return self._memory["state"].view(np.float64)
+    def _controllers(self) -> NDArray[np.float64]:
+        """What the controllers remember, a row for each arm."""
+        return np.ascontiguousarray(self._arms["state"]).view(np.float64).reshape(len(self._arms), -1)
 
     def _warnings(self) -> NDArray[np.int32]:
         """MuJoCo's warning counters, one for each kind, not a copy."""
@@ -200,39 +220,38 @@ def _fill_scene(scene: NDArray[np.void], model: mujoco.MjModel, data: mujoco.MjD
     scene["warning"], scene["warning_stride"], scene["warning_kinds"] = native.warning_counts(data)
 
 
-def _owners(model: mujoco.MjModel) -> NDArray[np.int32]:
-    """Body of every geom, and whether it is the robot's: shape (ngeom, 2)."""
-    base = model.body(panda.Names().base).id
-    robot = np.zeros(model.nbody, bool)
-    robot[base] = True
-    for body in range(base + 1, model.nbody):
-        robot[body] = robot[model.body_parentid[body]]
-    return np.stack([model.geom_bodyid, robot[model.geom_bodyid]], axis=1).astype(np.int32)
+def _owners(model: mujoco.MjModel, names: Sequence[panda.Names]) -> NDArray[np.int32]:
+    """Labels of every geom: its body, its arm, and the robot, the latter two `osc.NONE` in the scene; (ngeom, 3)."""
+    labels = np.full((model.nbody, 3), osc.NONE)
+    labels[:, 0] = np.arange(model.nbody)
+    for number, name in enumerate(names):
+        labels[model.body_rootid == model.body(name.base).id, 1:] = model.nbody + np.array([number, len(names)])
+    return labels[model.geom_bodyid].astype(np.int32)
 
 
 @njit(nogil=True, cache=True)
-def _step(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray) -> int:
+def _step(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, action: NDArray) -> int:
     """One control period; the number of warnings, or -1 and nothing done for an action that is not finite."""
-    for i in range(ACTION):
+    for i in range(action.shape[0]):
         if not np.isfinite(action[i]):
             return -1
-    scene = memory[0].scene
+    scene = scenes[0]
     _begin(latches)
     for k in range(scene.substeps):
-        _substep(memory, owner, latches, action, k == 0)
+        _substep(scene, arms, owner, latches, action, k == 0)
     native.kinematics(scene.model, scene.data)
     return native.warnings(scene.warning, scene.warning_stride, scene.warning_kinds)
 
 
 @njit(nogil=True, cache=True)
-def _replay(memory: NDArray, owner: NDArray, latches: NDArray, actions: NDArray, record: NDArray) -> int:
+def _replay(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, actions: NDArray, record: NDArray) -> int:
     """One control period per row of `actions`, filling `record` with the controls unless it has no rows."""
-    scene = memory[0].scene
+    scene = scenes[0]
     ctrl = native.float64s(scene.ctrl, record.shape[1])
     for t in range(actions.shape[0]):
         _begin(latches)
         for k in range(scene.substeps):
-            _substep(memory, owner, latches, actions[t], k == 0)
+            _substep(scene, arms, owner, latches, actions[t], k == 0)
             if record.shape[0] > 0:
                 record[t * scene.substeps + k] = ctrl
         # Not needed for the physics, but the same bits as ticks under any integrator are promised.
@@ -241,27 +260,32 @@ def _replay(memory: NDArray, owner: NDArray, latches: NDArray, actions: NDArray,
 
 
 @njit(nogil=True, cache=True)
-def _watch(memory: NDArray, owner: NDArray, latches: NDArray, first: bool) -> None:
-    """What `_substep` does besides controlling the arm."""
-    scene, at = memory[0].scene, memory[0].at
+def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, first: bool) -> None:
+    """What `_substep` does besides controlling the arms."""
+    scene = scenes[0]
     if first:
         _begin(latches)
     _latch(scene, owner, latches)
-    if at.cup != osc.NONE and _pads_in_contact(scene, at.pad) < osc.SEAL:
-        native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
+    for i in range(arms.shape[0]):
+        at = arms[i].at
+        if at.cup != osc.NONE and _pads_in_contact(scene, at.pad) < osc.SEAL:
+            native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
 
 
 @njit
-def _substep(memory: NDArray, owner: NDArray, latches: NDArray, action: NDArray, first: bool) -> None:
-    """One physics step under control. The first of a period moves the goal, from the pose just computed."""
-    scene, at, state, work = memory[0].scene, memory[0].at, memory[0].state, memory[0].work
+def _substep(scene: np.record, arms: NDArray, owner: NDArray, latches: NDArray, action: NDArray, first: bool) -> None:
+    """One physics step under control. The first of a period moves the goals, from the poses just computed."""
     native.step1(scene.model, scene.data)
-    if first:
-        osc.set_goal(at, state, work, action)
-    osc.apply(at, state, work)
+    for i in range(arms.shape[0]):
+        at, state, work = arms[i].at, arms[i].state, arms[i].work
+        if first:
+            osc.set_goal(at, state, work, action[ACTION * i : ACTION * (i + 1)])
+        osc.apply(at, state, work)
     _latch(scene, owner, latches)
-    if at.cup != osc.NONE:
-        osc.suck(at, state, _pads_in_contact(scene, at.pad))
+    for i in range(arms.shape[0]):
+        at = arms[i].at
+        if at.cup != osc.NONE:
+            osc.suck(at, arms[i].state, _pads_in_contact(scene, at.pad))
     native.step2(scene.model, scene.data)
 
 
@@ -302,12 +326,9 @@ def _pads_in_contact(scene: np.record, first: int) -> int:
 
 @njit
 def _mark(one: NDArray, other: NDArray, latches: NDArray) -> None:
-    """Latch the contact of two (body, is robot) rows, in the row and column of the whole robot too."""
-    robot = latches.shape[1] - 1
-    a, b = one[0], other[0]
-    for kind in range(2):
-        latches[kind, a, b] = latches[kind, b, a] = 1
-        if one[1]:
-            latches[kind, robot, b] = latches[kind, b, robot] = 1
-        if other[1]:
-            latches[kind, robot, a] = latches[kind, a, robot] = 1
+    """Latch the contact of two rows of `_owners`: every label of the one with every label of the other."""
+    for a in one:
+        for b in other:
+            if a != osc.NONE and b != osc.NONE:
+                for kind in range(2):
+                    latches[kind, a, b] = latches[kind, b, a] = 1

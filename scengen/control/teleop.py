@@ -11,27 +11,28 @@ ALPHA = 0.8
 LARGEST_CHANGE = 0.15
 """Largest change of a channel in one control step, applied after the average: same place."""
 MOTION = 6
-"""Channels that are filtered, translation and rotation; the gripper behind them passes through."""
+"""Channels of an arm that are filtered, translation and rotation; the gripper behind them passes through."""
 
 
 class Filter:
-    """Exponential moving average of the six motion channels, then a limit on the change per step.
+    """Exponential moving average of the six motion channels of each arm, then a limit on the change per step.
 
     Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs are clipped
     to [-1, 1] first, so that outputs never leave it. One object filters one stream of actions.
     """
 
-    def __init__(self) -> None:
-        self._state = np.zeros(MOTION)
-        self._input = np.zeros(MOTION + 1)
+    def __init__(self, arms: int = 1) -> None:
+        """`arms`: for how many an action holds seven numbers each."""
+        self._state = np.zeros(MOTION * arms)
+        self._input = np.zeros((MOTION + 1) * arms)
 
     def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
-        """The filtered action, shape (7,), float32: exactly what controller and witness get."""
+        """The filtered action, shape (7 * arms,), float32: exactly what controller and witness get."""
         given = np.asarray(action, np.float64)
-        if given.shape != (MOTION + 1,):
-            raise ValueError(f"an action has shape ({MOTION + 1},), not {given.shape}")
+        if given.shape != self._input.shape:
+            raise ValueError(f"an action has shape {self._input.shape}, not {given.shape}")
         self._input[:] = given
-        filtered = np.empty(MOTION + 1, np.float32)
+        filtered = np.empty(len(self._input), np.float32)
         if not _filter(self._state, self._input, filtered):
             raise ValueError(f"an action must be finite, not {given.tolist()}")
         return filtered
@@ -42,14 +43,14 @@ class Filter:
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The previous filtered motion, shape (6,), a copy; assign it to continue from there."""
+        """The previous filtered motion, shape (6 * arms,), a copy; assign it to continue from there."""
         return self._state.copy()
 
     @state.setter
     def state(self, motion: ArrayLike) -> None:
         given = np.asarray(motion, np.float64)
-        if given.shape != (MOTION,) or not (np.abs(given) <= 1.0).all():
-            raise ValueError(f"a filter's state is {MOTION} numbers in [-1, 1], not {given.tolist()}")
+        if given.shape != self._state.shape or not (np.abs(given) <= 1.0).all():
+            raise ValueError(f"a filter's state is {len(self._state)} numbers in [-1, 1], not {given.tolist()}")
         self._state[:] = given
 
 
@@ -74,15 +75,17 @@ def unfiltered(action: ArrayLike) -> NDArray[np.float32]:
 @njit(nogil=True, cache=True)
 def _filter(state: NDArray[np.float64], action: NDArray[np.float64], out: NDArray[np.float32]) -> bool:
     """Advance `state` by one action and write the result; False, and nothing done, if it is not finite."""
-    for i in range(MOTION + 1):
+    for i in range(len(action)):
         if not np.isfinite(action[i]):
             return False
-    for i in range(MOTION):
-        smooth = ALPHA * _unit(action[i]) + (1.0 - ALPHA) * state[i]
-        change = min(max(smooth - state[i], -LARGEST_CHANGE), LARGEST_CHANGE)
-        state[i] = _unit(state[i] + change)
-        out[i] = state[i]
-    out[MOTION] = _unit(action[MOTION])
+    for arm in range(len(action) // (MOTION + 1)):
+        first = (MOTION + 1) * arm
+        for i in range(MOTION):
+            before = state[MOTION * arm + i]
+            smooth = ALPHA * _unit(action[first + i]) + (1.0 - ALPHA) * before
+            change = min(max(smooth - before, -LARGEST_CHANGE), LARGEST_CHANGE)
+            out[first + i] = state[MOTION * arm + i] = _unit(before + change)
+        out[first + MOTION] = _unit(action[first + MOTION])
     return True
 
 

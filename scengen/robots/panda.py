@@ -13,7 +13,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 JOINTS = 7
 """Joints of the arm."""
@@ -29,7 +29,12 @@ FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
 BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
 """Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), mounted."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
-"""Base orientation (wxyz): robosuite leaves a single arm unturned, facing +x."""
+"""Base orientation (wxyz): robosuite leaves a single arm, and two parallel ones, unturned, facing +x."""
+APART = 0.25
+"""How far to the right of `BASE` the first of two arms stands, and the second to the left [m]: the layout "parallel" of
+robosuite's two-arm environments."""
+MOST_ARMS = 2
+"""Arms of a robot, at most: robosuite has no layout for more."""
 MOUNT: NDArray[np.float64] = np.array([0.0, 0.0, 0.01])
 """Position of the mount in the base's frame [m], shape (3,): minus RethinkMount.top_offset."""
 
@@ -72,6 +77,11 @@ class Names:
     def hand(self) -> str:
         """What the name of every part of the hand begins with."""
         return f"gripper{self.number}_right_"
+
+    @property
+    def mount(self) -> str:
+        """What the name of every part of the pedestal begins with."""
+        return f"fixed_mount{self.number}_"
 
     @property
     def joints(self) -> list[str]:
@@ -124,10 +134,27 @@ class Names:
         return f"{self.hand}pad0_collision"
 
 
-def attach(scene: mujoco.MjSpec, visual: bool = False, hand: mujoco.MjSpec | None = None) -> None:
-    """Add the robot to `scene`, named and placed as in robosuite's table environments.
+def bases(arms: int) -> NDArray[np.float64]:
+    """Base positions [m], shape (arms, 3), in the order of the arms: one in the middle, or two side by side."""
+    sides = (0.0,) if arms == 1 else (-APART, APART)
+    return BASE + np.array([[0.0, side, 0.0] for side in sides])
 
-    `hand`: instead of the two-finger jaw, a spec with a body "right_gripper" (see `suction`).
+
+def attach(
+    scene: mujoco.MjSpec,
+    visual: bool = False,
+    hand: mujoco.MjSpec | None = None,
+    number: int = 0,
+    base: ArrayLike = BASE,
+) -> None:
+    """Add an arm to `scene`, named and placed as in robosuite's table environments.
+
+    Args:
+        scene: what it is added to.
+        visual: with visual geometry.
+        hand: instead of the two-finger jaw, a spec with a body "right_gripper" (see `suction`).
+        number: of the arm, which its names tell; arms are added in the order of their numbers.
+        base: where it stands [m], see `bases`.
 
     Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times
     faster. It then lacks the wrist's force and torque sensors too, which cost 4 % of a step and influence
@@ -135,12 +162,18 @@ def attach(scene: mujoco.MjSpec, visual: bool = False, hand: mujoco.MjSpec | Non
     """
     arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), (hand or _jaw(visual)).copy()
     # Arm first: what is attached to it before it is in the scene gets its prefix too (robot0_gripper0_ ...).
-    place = scene.worldbody.add_frame(pos=BASE.tolist(), quat=BASE_QUAT.tolist())
-    names = Names()
+    place = scene.worldbody.add_frame(pos=np.asarray(base, float).tolist(), quat=BASE_QUAT.tolist())
+    names = Names(number)
     place.attach_body(arm.body("base"), names.arm, "")
-    base, wrist = scene.body(names.base), scene.body(f"{names.arm}right_hand")
-    base.add_frame().attach_body(mount.body("base"), "fixed_mount0_", "")
+    foot, wrist = scene.body(names.base), scene.body(f"{names.arm}right_hand")
+    foot.add_frame().attach_body(mount.body("base"), names.mount, "")
     wrist.add_frame().attach_body(hand.body("right_gripper"), names.hand, "")
+
+
+def arms(model: mujoco.MjModel) -> list[Names]:
+    """The arms in a model, in their order."""
+    every = (Names(number) for number in range(MOST_ARMS))
+    return [names for names in every if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, names.base) >= 0]
 
 
 def fingers(model: mujoco.MjModel, names: Names) -> list[int]:
@@ -197,7 +230,11 @@ def _assets() -> Path:
     return Path(next(iter(found.submodule_search_locations))) / "models" / "assets"
 
 
-FOLDERS = {"gripper0_": "grippers", "fixed_mount0_": "bases", "robot0_": "robots/panda"}
+FOLDERS = {
+    prefix: folder
+    for names in map(Names, range(MOST_ARMS))
+    for prefix, folder in ((names.hand, "grippers"), (names.mount, "bases"), (names.arm, "robots/panda"))
+}
 """Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""
 
 

@@ -12,6 +12,7 @@ middle of the pads' lower face, z out of the hand, and the wrist's force and tor
 import functools
 
 import mujoco
+from numpy.typing import ArrayLike
 
 from . import panda
 
@@ -36,9 +37,9 @@ _STEM = ((0.031, 0.0, 0.020, _METAL), (0.011, 0.020, 0.078, _METAL), (0.017, 0.0
 """Radius, lower and upper end along the hand's axis [m] and colour of flange plate, tube and bellows."""
 
 
-def attach(scene: mujoco.MjSpec, visual: bool = False) -> None:
-    """Add the Panda with a suction cup to `scene`; see `panda.attach`."""
-    panda.attach(scene, visual, hand=_cup(visual))
+def attach(scene: mujoco.MjSpec, visual: bool = False, number: int = 0, base: ArrayLike = panda.BASE) -> None:
+    """Add a Panda with a suction cup to `scene`; see `panda.attach`."""
+    panda.attach(scene, visual, _cup(visual), number, base)
 
 
 def xml() -> str:

@@ -5,30 +5,53 @@ import hashlib
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Self
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..control.loop import Loop
+from ..control.loop import ACTION, Loop
 from ..control.teleop import Filter
 from ..errors import UnknownName, Unstable
 from ..geometry import Mat3, Vec3
 from ..robots import panda, suction
-from ..robots.panda import Names
+from ..robots.panda import MOST_ARMS, Names
 from . import scene_text
 
 ROBOT = "robot"
-"""Stands for any body of the robot in questions about contact."""
+"""Stands for any body of the robot in questions about contact, whichever arm."""
 IDLE: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0])
-"""No motion, gripper open: what doing nothing means from the start."""
+"""No motion of an arm, gripper open: what doing nothing means from the start."""
 
 
 JAW = "panda_jaw"
 SUCTION = "panda_suction"
-EMBODIMENTS: dict[str, Callable[[mujoco.MjSpec, bool], None]] = {JAW: panda.attach, SUCTION: suction.attach}
-"""The robots that a task may ask for, and how each is added to a scene, with or without visual geometry."""
+HANDS: dict[str, Callable[[mujoco.MjSpec, bool, int, NDArray[np.float64]], None]] = {
+    JAW: lambda scene, visual, number, base: panda.attach(scene, visual, None, number, base),
+    SUCTION: suction.attach,
+}
+"""Arms by their hands, and how each is added to a scene: with or without visual geometry, its number, its place."""
+EMBODIMENTS = tuple("+".join(hands) for arms in range(1, MOST_ARMS + 1) for hands in product(HANDS, repeat=arms))
+"""The robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one
+on the right."""
+
+
+def hands(embodiment: str) -> tuple[str, ...]:
+    """The hands of a robot, in the order of its arms.
+
+    Raises:
+        UnknownName: it is none of `EMBODIMENTS`.
+    """
+    if embodiment not in EMBODIMENTS:
+        raise UnknownName("embodiment", embodiment, EMBODIMENTS)
+    return tuple(embodiment.split("+"))
+
+
+def action_size(embodiment: str) -> int:
+    """Numbers in an action of a robot: seven for each arm."""
+    return ACTION * len(hands(embodiment))
 
 
 def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjSpec:
@@ -40,7 +63,9 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
     scene = mujoco.MjSpec.from_string(scene_xml)
     if not visual:
         panda.strip_visual(scene)
-    EMBODIMENTS[embodiment](scene, visual)
+    named = hands(embodiment)
+    for number, (hand, base) in enumerate(zip(named, panda.bases(len(named)), strict=True)):
+        HANDS[hand](scene, visual, number, base)
     return scene
 
 
@@ -57,6 +82,11 @@ class Arm:
         self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
         self._fingers = panda.fingers(model, names)
         self._site = model.site(names.grip_site).id
+
+    @property
+    def label(self) -> str:
+        """The arm in questions about contact: `robot0`, `robot1`."""
+        return f"{ROBOT}{self.number}"
 
     @property
     def hand(self) -> Vec3:
@@ -82,6 +112,11 @@ class Arm:
     def finger_pos(self) -> NDArray[np.float64]:
         """Positions of the two finger joints [m]; empty without a jaw."""
         return self.data.qpos[self._fingers]
+
+    @property
+    def suction(self) -> bool:
+        """Whether the hand is a suction cup instead of a jaw."""
+        return not self._fingers
 
     @property
     def sealed(self) -> bool:
@@ -111,12 +146,13 @@ class World:
     model: mujoco.MjModel
     data: mujoco.MjData
     loop: Loop
-    filter: Filter = field(default_factory=Filter)
+    filter: Filter = field(init=False)
     arms: tuple[Arm, ...] = field(init=False)
     """All arms of the robot; an action holds seven numbers for each, in this order."""
 
     def __post_init__(self) -> None:
-        self.arms = (Arm(self, 0),)
+        self.arms = tuple(Arm(self, names.number) for names in panda.arms(self.model))
+        self.filter = Filter(len(self.arms))
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> Self:
@@ -152,7 +188,7 @@ class World:
         """Pass an action through the teleoperation filter and advance one control period (10 ms).
 
         Returns:
-            What the controller received, shape (7,).
+            What the controller received, shape (7 * arms,).
 
         Raises:
             Unstable: MuJoCo raised a warning.
@@ -162,15 +198,21 @@ class World:
         return filtered
 
     def apply(self, filtered: NDArray[np.float32]) -> None:
-        """Advance one control period under an action that has passed the filter already, shape (7,).
+        """Advance one control period under an action that has passed the filter already, shape (7 * arms,).
 
         Raises:
+            ValueError: the action has another shape, or is not finite.
             Unstable: MuJoCo raised a warning.
         """
-        for arm in self.arms:
-            arm.grip = float(filtered[7 * arm.number + 6])
-        if self.loop.step(filtered):
+        warnings = self.loop.step(filtered)
+        self.command(filtered)
+        if warnings:
             raise Unstable(f"MuJoCo raised a warning at t = {self.time:.3f} s: {', '.join(self.warnings)}")
+
+    def command(self, action: NDArray[np.floating]) -> None:
+        """Remember the gripper commands of an action, shape (7 * arms,), that has been simulated, here or elsewhere."""
+        for arm in self.arms:
+            arm.grip = float(action[ACTION * arm.number + ACTION - 1])
 
     # --- questions ------------------------------------------------------------------------
 
@@ -213,17 +255,21 @@ class World:
         return velocity
 
     def touching(self, a: str, b: str) -> bool:
-        """Whether two bodies were in contact at any physics step of the last control period."""
+        """Whether two bodies were in contact at any physics step of the last control period.
+
+        A body may also be `ROBOT`, or the `label` of an arm.
+        """
         return bool(self.loop.touching[self._label(a), self._label(b)])
 
     def touched(self, a: str, b: str) -> bool:
-        """Whether two bodies were in contact at any physics step since the start."""
+        """Whether two bodies were in contact at any physics step since the start; names as for `touching`."""
         return bool(self.loop.touched[self._label(a), self._label(b)])
 
     def touching_bodies(self, body: str) -> set[str]:
         """Names of the bodies that a body touched in the last control period; `ROBOT` stands for the robot's own."""
-        others = np.flatnonzero(self.loop.touching[self._label(body)])
-        return {ROBOT if i == self.model.nbody else self.model.body(int(i)).name for i in others if i not in self._own}
+        others = self.loop.touching[self._label(body)]
+        scene = {self.model.body(int(i)).name for i in np.flatnonzero(others[: self.model.nbody]) if i not in self.own}
+        return scene | {ROBOT} if others[-1] and body != ROBOT else scene
 
     @property
     def free_bodies(self) -> tuple[str, ...]:
@@ -269,9 +315,16 @@ class World:
         return {self.model.body(i).name: i for i in range(self.model.nbody)}
 
     @functools.cached_property
-    def _own(self) -> frozenset[int]:
-        """Bodies of the robot."""
-        return frozenset(np.flatnonzero(self.model.body_rootid == self.model.body(Names().base).id).tolist())
+    def own(self) -> frozenset[int]:
+        """Indices of the bodies of the robot."""
+        roots = [self.model.body(names.base).id for names in panda.arms(self.model)]
+        return frozenset(np.flatnonzero(np.isin(self.model.body_rootid, roots)).tolist())
+
+    @functools.cached_property
+    def _labels(self) -> dict[str, int]:
+        """Rows of the loop's table of contacts that stand for more than one body."""
+        names = [*(arm.label for arm in self.arms), ROBOT]
+        return {name: self.model.nbody + k for k, name in enumerate(names)}
 
     @functools.cached_property
     def _free(self) -> tuple[str, ...]:
@@ -279,4 +332,4 @@ class World:
         return tuple(self.model.body(int(self.model.jnt_bodyid[j])).name for j in joints)
 
     def _label(self, name: str) -> int:
-        return self.model.nbody if name == ROBOT else self.body(name)
+        return self._labels[name] if name in self._labels else self.body(name)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import mujoco
@@ -153,11 +154,9 @@ def test_latches_are_the_union_of_the_bindings_contacts_at_every_physics_step(sh
         data.ctrl[:] = row
         mujoco.mj_step1(model, data)
         for pair in data.contact.geom[data.contact.dist <= 0]:
-            a, b = model.geom_bodyid[pair]
-            for one, other in ((a, b), (b, a)):
-                expected[one, other] = 1
-                if one in robot:
-                    expected[-1, other] = expected[other, -1] = 1
+            a, b = ({body, *([-2, -1] if body in robot else [])} for body in model.geom_bodyid[pair])
+            for one, other in product(a, b):
+                expected[one, other] = expected[other, one] = 1
         mujoco.mj_step2(model, data)
     assert expected[-1].any()
     np.testing.assert_array_equal(shared.touched, expected)

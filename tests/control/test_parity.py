@@ -20,18 +20,31 @@ from scengen.control.loop import Loop
 from scengen.robots import panda
 
 PERIODS = 200
+WORLDS = {"one arm": ("Lift", "default", ["Panda"]), "two arms": ("TwoArmLift", "parallel", ["Panda", "Panda"])}
+
+
+@pytest.fixture(scope="module", params=WORLDS)
+def world(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """robosuite's Lift, and TwoArmLift with the arms side by side, as `made`."""
+    yield from made(*WORLDS[request.param])
 
 
 @pytest.fixture(scope="module")
 def lift() -> Iterator[Any]:
-    """robosuite's Lift at 100 Hz, without renderers, GL or log lines."""
+    """robosuite's Lift, as `made`."""
+    yield from made(*WORLDS["one arm"])
+
+
+def made(name: str, layout: str, robots: list[str]) -> Iterator[Any]:
+    """An environment of robosuite at 100 Hz, without renderers, GL or log lines."""
     logging.disable(logging.WARNING)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MUJOCO_GL", "disable")  # robosuite sets it to egl on import; the context puts it back
         import robosuite
     env = robosuite.make(
-        "Lift",
-        robots="Panda",
+        name,
+        robots=robots,
+        env_configuration=layout,
         has_renderer=False,
         has_offscreen_renderer=False,
         use_camera_obs=False,
@@ -44,16 +57,16 @@ def lift() -> Iterator[Any]:
     logging.disable(logging.NOTSET)
 
 
-def smooth_actions(seed: int, amplitude: float) -> NDArray[np.float32]:
-    """Random sums of sines below 1 Hz, shape (PERIODS, 7), with the jaw open."""
+def smooth_actions(seed: int, amplitude: float, arms: int = 1) -> NDArray[np.float32]:
+    """Random sums of sines below 1 Hz, shape (PERIODS, 7 * arms), with the jaws open."""
     rng = np.random.default_rng(seed)
     time = np.arange(PERIODS) * Loop.PERIOD
-    actions = np.zeros((PERIODS, 7))
-    for channel in range(6):
+    actions = np.zeros((PERIODS, 7 * arms))
+    for channel in range(7 * arms):
         for frequency, size, phase in rng.uniform([0.1, -0.5, 0], [1, 0.5, 2 * np.pi], (4, 3)):
             actions[:, channel] += size * np.sin(2 * np.pi * frequency * time + phase)
     actions *= amplitude
-    actions[:, 6] = -1.0
+    actions[:, 6::7] = -1.0
     return np.clip(actions, -1, 1).astype(np.float32)
 
 
@@ -61,21 +74,22 @@ def start(env: Any, cleared: bool) -> tuple[mujoco.MjData, Loop]:
     """Reset robosuite, and put a loop of ours over the same model into the same state."""
     env.reset()
     model, data = env.sim.model._model, env.sim.data._data
-    controller = env.robots[0].composite_controller.part_controllers["right"]
-    controller.new_update = cleared
-    loop = Loop(model, mujoco.MjData(model), home=controller.initial_joint)
+    controllers = [robot.composite_controller.part_controllers["right"] for robot in env.robots]
+    for controller in controllers:
+        controller.new_update = cleared
+    loop = Loop(model, mujoco.MjData(model), home=[controller.initial_joint for controller in controllers])
     mujoco.mj_copyData(loop.data, model, data)
     return data, loop
 
 
 def grip(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
-    """Position of the grip site that belongs to the present qpos [m]."""
+    """Positions of the grip sites that belong to the present qpos [m], shape (arms, 3)."""
     mujoco.mj_kinematics(model, data)
-    return data.site(panda.Names().grip_site).xpos.copy()
+    return np.array([data.site(names.grip_site).xpos for names in panda.arms(model)])
 
 
 def distance(env: Any, actions: NDArray[np.float32], cleared: bool) -> float:
-    """Largest distance of the two grip sites [m] over an episode, or until the robot touches something."""
+    """Largest distance of a grip site here and there [m] over an episode, or until the robot touches something."""
     data, loop = start(env, cleared)
     origin, path, apart = grip(loop.model, data), 0.0, 0.0
     for action in actions:
@@ -84,27 +98,28 @@ def distance(env: Any, actions: NDArray[np.float32], cleared: bool) -> float:
         if loop.touched[-1].any():
             break
         theirs = grip(loop.model, data)
-        path = max(path, float(np.linalg.norm(theirs - origin)))
-        apart = max(apart, float(np.linalg.norm(theirs - grip(loop.model, loop.data))))
+        path = max(path, float(np.linalg.norm(theirs - origin, axis=1).min()))
+        apart = max(apart, float(np.linalg.norm(theirs - grip(loop.model, loop.data), axis=1).max()))
     assert path > 0.05
     return apart
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_translation_is_robosuites_to_the_last_bits(lift: Any, seed: int) -> None:
-    actions = smooth_actions(seed, 1.0)
-    actions[:, 3:6] = 0
-    assert distance(lift, actions, cleared=True) <= 1e-12
+def test_translation_is_robosuites_to_the_last_bits(world: Any, seed: int) -> None:
+    actions = smooth_actions(seed, 1.0, len(world.robots))
+    for channel in (3, 4, 5):
+        actions[:, channel::7] = 0
+    assert distance(world, actions, cleared=True) <= 1e-12
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_translation_and_rotation_are_robosuites_to_the_last_bits(lift: Any, seed: int) -> None:
-    assert distance(lift, smooth_actions(seed, 1.0), cleared=True) <= 1e-12
+def test_translation_and_rotation_are_robosuites_to_the_last_bits(world: Any, seed: int) -> None:
+    assert distance(world, smooth_actions(seed, 1.0, len(world.robots)), cleared=True) <= 1e-12
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_robosuites_stale_first_step_stays_below_a_micrometre(lift: Any, seed: int) -> None:
-    assert distance(lift, smooth_actions(seed, 0.5), cleared=False) <= 1e-6
+def test_robosuites_stale_first_step_stays_below_a_micrometre(world: Any, seed: int) -> None:
+    assert distance(world, smooth_actions(seed, 0.5, len(world.robots)), cleared=False) <= 1e-6
 
 
 def test_a_scripted_grasp_lifts_the_cube_in_both(lift: Any) -> None:
@@ -114,7 +129,7 @@ def test_a_scripted_grasp_lifts_the_cube_in_both(lift: Any) -> None:
     for t in range(330):
         wanted = target + np.array([0, 0, 0.1 if t >= 230 else 0.0])
         action = np.zeros(7, np.float32)
-        action[:3] = np.clip((wanted - grip(model, data)) * 10, -1, 1)
+        action[:3] = np.clip((wanted - grip(model, data)[0]) * 10, -1, 1)
         action[6] = 1.0 if t >= 150 else -1.0
         lift.step(action)
         loop.step(action)
@@ -170,10 +185,11 @@ def value(model: mujoco.MjModel, kind: str, name: str, field: str) -> NDArray[np
 
 @pytest.mark.parametrize("visual", [False, True])
 @pytest.mark.parametrize("kind", FIELDS)
-def test_the_robot_compiles_to_robosuites_numbers(lift: Any, kind: str, visual: bool) -> None:
-    theirs = lift.sim.model._model
+def test_the_robot_compiles_to_robosuites_numbers(world: Any, kind: str, visual: bool) -> None:
+    theirs = world.sim.model._model
     scene = mujoco.MjSpec()
-    panda.attach(scene, visual=visual)
+    for number, base in enumerate(panda.bases(len(world.robots))):
+        panda.attach(scene, visual, number=number, base=base)
     ours = scene.compile()
     sensible = kind != "sensor" or visual  # the bare robot has no sensors
     assert names(ours, kind) == (names(theirs, kind) if sensible else set())
