@@ -17,7 +17,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
-from ..sim.world import Arm
+from ..sim.world import Arm, World
 
 OPEN, CLOSED = -1.0, 1.0
 """Gripper commands: jaw open or suction off, jaw closed or suction on."""
@@ -201,26 +201,31 @@ def until(plan: Plan, condition: Condition) -> Plan:
             return
 
 
-def together(*plans: Plan) -> Plan:
-    """Several plans at once, one for each arm in their order: actions of shape (7 * arms,).
+def together(world: World, *plans: Plan | None) -> Plan:
+    """Plans of all arms at once, in their order: actions of shape (7 * arms,). Ends with the last plan.
 
-    A plan that has ended asks for no motion and keeps its last gripper command; it must have yielded one action.
-    Ends with the last plan.
+    An arm without a plan, or whose plan has ended, is held still, with the gripper command that it has.
     """
-    last: list[Action | None] = [None] * len(plans)
-    running = list(range(len(plans)))
+    if len(plans) != len(world.arms):
+        raise ValueError(f"{len(plans)} plans for {len(world.arms)} arms; say None for an arm that is to be held still")
+    running = list(plans)
+    still = [hold(arm, math.inf) for arm in world.arms]
     while True:
-        for i in list(running):
-            try:
-                last[i] = next(plans[i])
-            except StopIteration:
-                running.remove(i)
-                if (before := last[i]) is None:
-                    raise ValueError(f"plan {i} has no action") from None
-                last[i] = np.append(np.zeros(6), before[6])
-        if not running:
+        actions: list[Action] = []
+        for i, arm in enumerate(world.arms):
+            action = None if (plan := running[i]) is None else next(plan, None)
+            if action is None and plan is not None:
+                running[i], still[i] = None, hold(arm, math.inf)  # from where it is now
+            actions.append(next(still[i]) if action is None else action)
+        if all(plan is None for plan in running):
             return
-        yield np.concatenate([action for action in last if action is not None])
+        yield np.concatenate(actions)
+
+
+def alone(arm: Arm, plan: Plan) -> Plan:
+    """A plan of one arm while all others are held still."""
+    plans = [plan if one is arm else None for one in arm.world.arms]
+    yield from together(arm.world, *plans)
 
 
 def steer(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3, grip: float | None) -> Action:

@@ -22,6 +22,7 @@ from scengen.skills.motion import (
     STEADY,
     WRIST_SPARE,
     Pace,
+    alone,
     closing_along,
     facing_down,
     go_to,
@@ -173,15 +174,45 @@ def plan(value, grip, periods):
         yield row(value, grip)
 
 
-def test_joined_plans_run_side_by_side_and_the_shorter_one_keeps_its_grip_without_motion():
-    actions = list(together(plan(0.1, OPEN, 2), plan(0.2, CLOSED, 4), plan(0.3, OPEN, 1)))
-    assert np.array(actions).shape == (4, 21)
-    first, rest = actions[0].reshape(3, 7), np.array(actions[1:]).reshape(3, 3, 7)
-    assert np.array_equal(first, [row(0.1, OPEN), row(0.2, CLOSED), row(0.3, OPEN)])
-    assert [list(r[0]) for r in rest] == [list(row(0.1, OPEN)), *[list(row(0.0, OPEN))] * 2]
-    assert all(np.array_equal(r[1], row(0.2, CLOSED)) and np.array_equal(r[2], row(0.0, OPEN)) for r in rest)
+def pair():
+    """A robot with two arms at a table."""
+    return World.load(scene_text.emit(table())[0], "panda_jaw+panda_jaw")
 
 
-def test_a_plan_without_any_action_cannot_be_joined():
-    with pytest.raises(ValueError, match="plan 1 has no action"):
-        list(together(plan(0.1, OPEN, 2), plan(0.2, CLOSED, 0)))
+def test_joined_plans_run_side_by_side_and_the_shorter_one_keeps_its_grip():
+    w, sent = pair(), []
+    for action in together(w, plan(0.1, CLOSED, 2), plan(0.2, OPEN, 4)):
+        sent.append(action)
+        w.step(action)
+    right, left = np.array(sent)[:, :7], np.array(sent)[:, 7:]
+    assert np.array_equal(right[:2], [row(0.1, CLOSED)] * 2) and np.array_equal(left, [row(0.2, OPEN)] * 4)
+    assert (right[2:, 6] == CLOSED).all() and (np.abs(right[2:, :6]) < 0.1).all()
+
+
+def test_arms_move_at_once_and_the_first_to_arrive_waits_where_it_is():
+    w = pair()
+    near, far = w.arms[0].hand + 0.03 * UP, w.arms[1].hand + np.array([0.1, 0.0, 0.1])
+    play(w, together(w, go_to(w.arms[0], near), go_to(w.arms[1], far)))
+    assert np.linalg.norm(w.arms[0].hand - near) < 0.008 and np.linalg.norm(w.arms[1].hand - far) < 0.008
+    assert w.time < 1.0  # the longer way alone takes 0.8 s
+
+
+def test_an_arm_without_a_plan_is_held_against_what_pushes_it():
+    w = pair()
+    start, end = w.arms[1].hand, w.arms[0].hand + np.array([0.0, 0.4, 0.0])
+    play(w, until(alone(w.arms[0], go_to(w.arms[0], end)), lambda: w.touching("robot0", "robot1")))
+    assert w.touched("robot0", "robot1")
+    play(w, alone(w.arms[0], push(w.arms[0], [0.0, 0.05, 0.0], lambda: w.time > 3.0)))
+    pushed = np.linalg.norm(w.arms[1].hand - start)
+    play(w, alone(w.arms[0], go_to(w.arms[0], end - np.array([0.0, 0.3, 0.0]))))
+    assert 0.005 < pushed < 0.1 and np.linalg.norm(w.arms[1].hand - start) < pushed
+
+
+def test_plans_that_end_at_once_ask_for_nothing():
+    w = pair()
+    assert list(together(w, None, None)) == list(together(w, plan(0.1, OPEN, 0), None)) == []
+
+
+def test_every_arm_needs_a_plan_or_none():
+    with pytest.raises(ValueError, match="1 plans for 2 arms"):
+        list(together(pair(), plan(0.1, OPEN, 2)))
