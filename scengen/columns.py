@@ -21,12 +21,15 @@ from .schema import (
     check_whole,
     require,
 )
-from .sim.world import EMBODIMENTS
+from .sim.world import EMBODIMENTS, action_size
 
 LARGEST_SCENE = 5_000_000
 """Letters of a scene; the largest of the seven tasks has 60 000."""
 LONGEST_WITNESS = 1_000_000
 """Control periods; one hour, the longest horizon, has 360 000."""
+
+ACTION_SIZES = frozenset(map(action_size, EMBODIMENTS))
+"""How many numbers the actions of any robot have."""
 
 ID = re.compile(r"[0-9a-f]{12}")
 VERDICTS = ("certified", "refuted", "unknown")
@@ -104,15 +107,23 @@ def _certificate(name: str, value: Any) -> StoredCertificate:
 
 
 def witness_of(numbers: np.ndarray) -> np.ndarray:
-    """The witness of a row from its numbers, shape (n, 7).
+    """The witness of a row from its numbers, shape (n, 7 * arms).
 
     Raises:
-        Malformed: it is too long, or not finite.
+        Malformed: it has another shape, is too long, or not finite.
     """
-    witness = np.asarray(numbers, np.float32).reshape(-1, 7)
+    witness = np.asarray(numbers, np.float32)
+    require(witness.ndim == 2 and witness.shape[1] in ACTION_SIZES, f"a witness of shape {witness.shape}")
     require(len(witness) < LONGEST_WITNESS, f"a witness of {len(witness)} control periods")
     require(bool(np.isfinite(witness).all()), "a witness with numbers that are not finite")
     return witness
+
+
+def check_robot(embodiment: str, witness: np.ndarray) -> None:
+    """Raise `Malformed` unless a witness consists of actions of the robot."""
+    size = action_size(embodiment)
+    told = f"a witness with {witness.shape[1]} numbers in an action; those of {embodiment} have {size}"
+    require(witness.shape[1] == size, told)
 
 
 COLUMNS: dict[str, Callable[[str, Any], Any]] = {

@@ -19,7 +19,7 @@ from . import schema, shards
 from .certificate import StoredCertificate, as_json, from_json
 from .errors import PoolError, UnknownName
 from .params import Value
-from .shards import FORMAT, SCHEMA
+from .shards import FORMAT
 
 MANIFEST = "manifest.json"
 SHARD_ROWS = 100_000
@@ -30,12 +30,12 @@ PROCESS = "process"
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 NO_WITNESS: NDArray[np.float32] = np.zeros((0, 7), np.float32)
-"""The witness of a row without one: it was not certified, or its witness was not asked for."""
+"""The witness of a row whose witness was not asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoolRow:
-    """One scenario of a pool: a field for every column of `SCHEMA`."""
+    """One scenario of a pool: a field for every column of `shards.NAMES`."""
 
     id: str
     task: str
@@ -63,7 +63,7 @@ class PoolRow:
     """The certified scene without the robot, MJCF."""
     scene_sha256: str
     witness: NDArray[np.float32] = field(repr=False, compare=False)
-    """Actions of a success as the controller received them, shape (n, 7)."""
+    """Actions of a success as the controller received them, shape (n, 7 * arms)."""
     witness_sha256: str
     certificate: StoredCertificate = field(repr=False)
 
@@ -307,7 +307,7 @@ def _written(path: Path, rows: Sequence[PoolRow]) -> dict[str, Any]:
 
 
 def _rows(path: Path, witness: bool) -> Iterator[PoolRow]:
-    for values in shards.read(path, SCHEMA.names if witness else shards.LIGHT):
+    for values in shards.read(path, shards.NAMES if witness else shards.LIGHT):
         yield PoolRow(**{"witness": NO_WITNESS, **values})
 
 

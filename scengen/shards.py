@@ -12,7 +12,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from . import columns, schema
+from .control.loop import ACTION
 from .errors import PoolError
+from .sim.world import action_size
 
 FORMAT = 3
 GROUP_ROWS = 1000
@@ -44,32 +46,43 @@ CERTIFICATE = pa.struct(
         ("versions", pa.string()),
     ]
 )
-SCHEMA = pa.schema(
-    [
-        ("id", pa.string()),
-        ("task", pa.string()),
-        ("code", pa.string()),
-        ("category", pa.string()),
-        ("split", pa.string()),
-        ("axes", pa.list_(pa.string())),
-        ("shifted", pa.string()),
-        ("seed", pa.int64()),
-        ("index", pa.int64()),
-        ("attempt", pa.int64()),
-        ("id_twin", pa.string()),
-        ("instruction", pa.string()),
-        ("horizon", pa.float64()),
-        ("params", pa.string()),
-        ("embodiment", pa.string()),
-        ("scene_xml", pa.string()),
-        ("scene_sha256", pa.string()),
-        ("witness", pa.list_(pa.list_(pa.float32(), 7))),
-        ("witness_sha256", pa.string()),
-        ("certificate", CERTIFICATE),
-    ]
-)
-"""Columns of a shard; `shifted`, `params`, `versions` and a check's `settings` and `numbers` hold JSON."""
-LIGHT = tuple(name for name in SCHEMA.names if name != "witness")
+
+
+def _schema(size: int) -> pa.Schema:
+    """The columns of a shard for robots whose actions have `size` numbers.
+
+    `shifted`, `params`, `versions` and a check's `settings` and `numbers` hold JSON.
+    """
+    return pa.schema(
+        [
+            ("id", pa.string()),
+            ("task", pa.string()),
+            ("code", pa.string()),
+            ("category", pa.string()),
+            ("split", pa.string()),
+            ("axes", pa.list_(pa.string())),
+            ("shifted", pa.string()),
+            ("seed", pa.int64()),
+            ("index", pa.int64()),
+            ("attempt", pa.int64()),
+            ("id_twin", pa.string()),
+            ("instruction", pa.string()),
+            ("horizon", pa.float64()),
+            ("params", pa.string()),
+            ("embodiment", pa.string()),
+            ("scene_xml", pa.string()),
+            ("scene_sha256", pa.string()),
+            ("witness", pa.list_(pa.list_(pa.float32(), size))),
+            ("witness_sha256", pa.string()),
+            ("certificate", CERTIFICATE),
+        ]
+    )
+
+
+SCHEMAS = {size: _schema(size) for size in sorted(columns.ACTION_SIZES)}
+"""The columns of a shard, by the numbers in an action of its robots."""
+NAMES: tuple[str, ...] = tuple(SCHEMAS[ACTION].names)
+LIGHT = tuple(name for name in NAMES if name != "witness")
 """All but the largest."""
 
 
@@ -78,7 +91,7 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]], witnesses: Sequence[NDA
 
     Args:
         rows: the columns of every row but its witness.
-        witnesses: that of every row, shape (n, 7).
+        witnesses: that of every row, shape (n, 7 * arms): all of robots with as many arms.
     """
     sink = pa.BufferOutputStream()
     pq.write_table(
@@ -95,13 +108,14 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]], witnesses: Sequence[NDA
 
 
 def _table(rows: Sequence[Mapping[str, Any]], witnesses: Sequence[NDArray[np.float32]]) -> pa.Table:
-    plain = pa.Table.from_pylist([{**row, "witness": None} for row in rows], schema=SCHEMA)
-    recordings = [np.asarray(witness, np.float32).reshape(-1, 7) for witness in witnesses]
-    offsets = np.cumsum([0, *map(len, recordings)], dtype=np.int32)
-    flat = np.concatenate(recordings).ravel() if recordings else np.zeros(0, np.float32)
-    column = pa.ListArray.from_arrays(offsets, pa.FixedSizeListArray.from_arrays(pa.array(flat), 7))
-    where = SCHEMA.get_field_index("witness")
-    return plain.set_column(where, SCHEMA.field(where), column.cast(SCHEMA.field(where).type))
+    size = action_size(rows[0]["embodiment"]) if rows else ACTION
+    of = SCHEMAS[size]
+    plain = pa.Table.from_pylist([{**row, "witness": None} for row in rows], schema=of)
+    offsets = np.cumsum([0, *map(len, witnesses)], dtype=np.int32)
+    flat = np.concatenate([np.zeros((0, size)), *witnesses], dtype=np.float32).ravel()
+    column = pa.ListArray.from_arrays(offsets, pa.FixedSizeListArray.from_arrays(pa.array(flat), size))
+    where = of.get_field_index("witness")
+    return plain.set_column(where, of.field(where), column.cast(of.field(where).type))
 
 
 def read(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -120,7 +134,7 @@ def read(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
             thrift_string_size_limit=schema.LARGEST_MANIFEST,
             thrift_container_size_limit=1_000_000,
         ) as file:
-            if not file.schema_arrow.equals(SCHEMA):
+            if not any(file.schema_arrow.equals(known) for known in SCHEMAS.values()):
                 raise ValueError(f"its columns are not those of pool format {FORMAT}")
             _check_groups(file.metadata)
             for table in _batches(file, names):
@@ -158,15 +172,19 @@ def _values(table: pa.Table) -> Iterator[dict[str, Any]]:
         if table.column(name).null_count:
             raise ValueError(f"column {name} has gaps")
     streams = [_column(table.column(name), name) for name in table.column_names]
-    for values in zip(*streams, strict=True):
-        yield dict(zip(table.column_names, values, strict=True))
+    for row in zip(*streams, strict=True):
+        values = dict(zip(table.column_names, row, strict=True))
+        if {"embodiment", "witness"} <= values.keys():
+            columns.check_robot(values["embodiment"], values["witness"])
+        yield values
 
 
 def _column(column: pa.ChunkedArray, name: str) -> Iterator[Any]:
     """Values one by one. A witness becomes an array at once: a list of numbers would need fifty times the memory."""
     if name == "witness":
         for actions in column:
-            yield columns.witness_of(actions.values.flatten().to_numpy(zero_copy_only=False))
+            flat = actions.values.flatten().to_numpy(zero_copy_only=False)
+            yield columns.witness_of(flat.reshape(-1, actions.values.type.list_size))
     else:
         check = columns.COLUMNS[name]
         for scalar in column:

@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 from ..errors import PoolError
 from ..log import different
 from ..pool import MANIFEST, PoolRow
+from ..sim.world import action_size
 from ..targets import refused, try_folder
 
 
@@ -107,7 +108,9 @@ class Journal:
             with self._told():
                 query = "SELECT scene, actions FROM record WHERE idx = ?"
                 scene, actions = self._db.execute(query, (index,)).fetchone()
-                row = PoolRow.of(json.loads(scene), np.frombuffer(actions, np.float32).reshape(-1, 7))
+                plain = json.loads(scene)
+                size = action_size(plain["embodiment"])
+                row = PoolRow.of(plain, np.frombuffer(actions, np.float32).reshape(-1, size))
             yield row
 
     def add(self, record: Record) -> None:

@@ -14,7 +14,7 @@ from ..episode import Actions, Episode
 from ..errors import BadConfig, ScengenError
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
-from ..sim.world import IDLE, JAW, World
+from ..sim.world import JAW, World, action_size
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
@@ -67,7 +67,7 @@ def certify(
             break
         checks.append(trial.check(name))
     witness = trial.witness
-    empty = np.zeros((0, 7), np.float32)
+    empty = np.zeros((0, action_size(embodiment)), np.float32)
     return Certified(
         Certificate(settings.name, tuple(checks)),
         trial.text,
@@ -154,7 +154,7 @@ class Trial:
         start = {b: (world.com(b), world.rot(b)) for b in bodies}
         episode = Episode(self.scenario, world)
         for _ in range(round(limits.seconds / Loop.PERIOD)):
-            if episode.step(world.filter(IDLE)) == "unstable":
+            if episode.step(world.filter(world.idle)) == "unstable":
                 return asdict(limits), {}, episode.reason
         self.solved_after_rest = self.scenario.success(world)
         drift = {b: float(np.linalg.norm(world.com(b) - start[b][0])) for b in bodies}

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import Loop
-from ..control.teleop import unfiltered
+from ..control.loop import ACTION, Loop
+from ..control.teleop import MOTION, unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import GaveUp
 from ..samplers.keyed import normal, spread
@@ -91,9 +91,11 @@ class Jitter:
         return World.of(model)
 
     def shaken(self, action: Action, period: int) -> Action:
-        """The action with noise on its six motion channels."""
-        shake = [self.noise * normal(self.key, "action", period, channel) for channel in range(6)]
-        return np.clip(action + np.array([*shake, 0.0]), -1.0, 1.0)
+        """The action with noise on the six motion channels of each arm."""
+        shake = np.zeros(len(action))
+        for channel in (c for c in range(len(action)) if c % ACTION < MOTION):
+            shake[channel] = self.noise * normal(self.key, "action", period, channel)
+        return np.clip(action + shake, -1.0, 1.0)
 
 
 def run(
@@ -231,7 +233,7 @@ def _live(
         return episode.step(actions[-1])
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
-        rows = np.array(actions, np.float32).reshape(-1, 7)
+        rows = np.array(actions, np.float32).reshape(-1, world.loop.size)
         return Rollout(outcome, reason, round(at, 6), rows, world.digest, source.note)
 
     while step() is None:

@@ -20,7 +20,8 @@ from pools import QUICKLY, certificate_of, make, rewritten
 from scengen import config, pool
 from scengen.certificate import StoredCertificate
 from scengen.errors import PoolError, UnknownName
-from scengen.pool import FORMAT, SCHEMA, Pool, PoolRow
+from scengen.pool import FORMAT, Pool, PoolRow
+from scengen.shards import SCHEMAS
 from scengen.validate.settings import CertifySettings
 from scengen.validate.verify import Options, verify
 
@@ -60,8 +61,8 @@ def test_a_pool_holds_the_first_certified_indices_in_order(made):
 
 
 def test_a_row_has_a_field_for_every_column():
-    assert [f.name for f in fields(PoolRow)] == SCHEMA.names
-    certificate = SCHEMA.field("certificate").type
+    assert [f.name for f in fields(PoolRow)] == SCHEMAS[7].names
+    certificate = SCHEMAS[7].field("certificate").type
     assert [f.name for f in fields(StoredCertificate)] == [f.name for f in certificate]
 
 
@@ -351,7 +352,7 @@ def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says)
     path = mine / "scenarios-00000.parquet"
     columns = pq.read_table(path).to_pydict()
     damage(columns)
-    pq.write_table(pa.table(columns, schema=pa.schema([f for f in SCHEMA if f.name in columns])), path)
+    pq.write_table(pa.table(columns, schema=pa.schema([f for f in SCHEMAS[7] if f.name in columns])), path)
     manifest = json.loads((mine / "manifest.json").read_text())
     manifest["shards"][0] |= {"bytes": path.stat().st_size, "sha256": pool.sha256(path.read_bytes())}
     (mine / "manifest.json").write_text(json.dumps(manifest))
