@@ -31,7 +31,7 @@ class Comparison:
     reason: str
     """Why robosuite's is no success, or why nothing is known; empty for a success."""
     apart: float
-    """Largest distance of the two grip sites at equal times [m]."""
+    """Largest distance of a grip site here and there at equal times [m]."""
     later: float
     """How much later robosuite's episode was decided [s]."""
 
@@ -82,7 +82,7 @@ def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
     theirs, reason, seconds, path = _played(env, row.witness, settle)
     env.close()
     together = min(len(path), len(world.path))
-    apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=1)
+    apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=-1)
     later = round(seconds - ours.seconds, 6) + 0.0  # never -0.0
     return Comparison(row.task, row.id, ours.outcome, theirs, reason, float(apart.max()), later)
 
@@ -93,26 +93,26 @@ def _lost(row: PoolRow, reason: str) -> Comparison:
 
 @dataclass
 class _Traced(World):
-    """A world that remembers where its hand was."""
+    """A world that remembers where its hands were."""
 
-    path: list[Vec3] = field(default_factory=list)
+    path: list[list[Vec3]] = field(default_factory=list)
 
     def apply(self, filtered: NDArray[np.float32]) -> None:
         super().apply(filtered)
-        self.path.append(self.arm.hand)
+        self.path.append([arm.hand for arm in self.arms])
 
 
-def _played(env: RobosuiteEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[Vec3]]:
-    """Outcome of recorded actions in robosuite, its reason, when it was decided [s], and the path of the hand.
+def _played(env: RobosuiteEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[list[Vec3]]]:
+    """Outcome of recorded actions in robosuite, its reason, when it was decided [s], and the paths of the hands.
 
     As in `rollout.replay`: the robot is idle when the actions have ended, and the goal must hold for `settle` seconds.
     """
-    rows, path = iter(actions), list[Vec3]()
+    rows, path = iter(actions), list[list[Vec3]]()
 
     def step() -> None:
         row = next(rows, None)
         env.step(env.world.idle if row is None else row)
-        path.append(env.world.arm.hand)
+        path.append([arm.hand for arm in env.world.arms])
 
     env.reset()
     while env.episode.outcome is None:

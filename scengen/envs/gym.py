@@ -15,7 +15,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from .. import config
-from ..control.loop import ACTION, Loop
+from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
 from ..errors import BadConfig, PoolError, UnknownName
@@ -24,9 +24,9 @@ from ..pictures.render import Camera
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.world import World
+from ..sim.world import World, action_size
 from ..validate.identity import check_versions
-from .observations import CAMERAS, STREAMS, Reading, check_names, proprioception
+from .observations import Reading, cameras_of, check_names, proprioception, streams_of
 
 Observation = dict[str, Reading]
 
@@ -35,8 +35,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
-    closed), at 100 Hz. They go to the controller as they are, clipped to [-1, 1], which is the paper's interface for
-    policies; `action_filter="teleop"` puts the filter of people and oracles in between (`scengen.control.teleop`).
+    closed), at 100 Hz; shape (14,) for two arms, the right one's seven first. They go to the controller as they are,
+    clipped to [-1, 1], which is the paper's interface for policies; `action_filter="teleop"` puts the filter of people
+    and oracles in between (`scengen.control.teleop`).
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
 
@@ -69,7 +70,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             render_mode: None or `rgb_array`.
             width: of all pictures [pixels].
             height: of all pictures [pixels].
-            camera: what `render` shows: one of the paper's cameras (`CAMERAS`) or any camera of the model.
+            camera: what `render` shows: one of the paper's cameras (`cameras_of`) or any camera of the model.
             action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
             settle: whether a reached goal has to last as in the certificate.
 
@@ -85,8 +86,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             observations = proprioception(self.task.embodiment)
         check_names(observations, self.task.embodiment)
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
-        self.streams = {name: STREAMS[name] for name in observations if name in STREAMS}
-        self.cameras = [name for name in observations if name in CAMERAS]
+        known, self.views = streams_of(self.task.embodiment), cameras_of(self.task.embodiment)
+        self.streams = {name: known[name] for name in observations if name in known}
+        self.cameras = [name for name in observations if name in self.views]
         self._rows = {row.id: row for folder in _folders(pool) for row in _scenarios(folder, task)}
         if not self._rows:
             raise PoolError("no pool was given")
@@ -96,7 +98,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._eye: Camera | None = None
         self._row: PoolRow = self._rows[self._order[0]]
         self.task_description = self._row.instruction
-        self.action_space = spaces.Box(-1.0, 1.0, (ACTION,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
         boxes: dict[str, spaces.Space[Any]] = {
             name: spaces.Box(-s.bound, s.bound, s.shape, np.float32) for name, s in self.streams.items()
         }
@@ -153,11 +155,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Advance one control period (10 ms).
 
         Raises:
-            ValueError: the action has another shape than (7,) or is not finite; nothing was simulated then.
+            ValueError: the action has another shape than `action_space`, or is not finite; nothing was simulated then.
         """
-        given = np.asarray(action, np.float32)
-        if given.shape != (ACTION,) or not np.isfinite(given).all():
-            raise ValueError(f"an action is {ACTION} finite numbers in [-1, 1], not {np.array2string(given)}")
+        given, size = np.asarray(action, np.float32), action_size(self.task.embodiment)
+        if given.shape != (size,) or not np.isfinite(given).all():
+            raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
         outcome, reason = self._advance(given), self._episode.reason
         terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
         if outcome == "success" and self.settle:
@@ -167,7 +169,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
-        return self._picture(CAMERAS.get(self.camera, self.camera)) if self.render_mode == "rgb_array" else None
+        return self._picture(self.views.get(self.camera, self.camera)) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Free the renderer."""
@@ -202,7 +204,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         world = self.world
         seen: Observation = {name: _clipped(s.read(world), s.bound) for name, s in self.streams.items()}
         for name in self.cameras:
-            seen[name] = self._picture(CAMERAS[name])
+            seen[name] = self._picture(self.views[name])
         return seen
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:

@@ -1,6 +1,7 @@
 """What a policy may see: the paper's streams under robosuite's names, each read only if it is asked for.
 
-Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top.
+Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top. The
+table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,16 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import UnknownName
 from ..robots.panda import JOINTS, Names
-from ..sim.world import JAW, World
+from ..sim.world import JAW, Arm, World, hands
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
 TAXELS = 8
 """Rows and columns of a tactile grid (paper, table of modalities)."""
-PADS = {
-    "robot0_tactile_left": f"{Names().hand}finger1_pad_collision",
-    "robot0_tactile_right": f"{Names().hand}finger2_pad_collision",
-}
+PADS = {"tactile_left": "finger1_pad_collision", "tactile_right": "finger2_pad_collision"}
 """The finger pad under each tactile grid. The grid spans the pad's inner face, columns along x, rows along z."""
 
 
@@ -35,41 +33,42 @@ class Stream:
     read: Callable[[World], NDArray[np.float64]]
 
 
-def _hand_quat(world: World) -> NDArray[np.float64]:
+def _hand_quat(arm: Arm) -> NDArray[np.float64]:
     quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, world.arm.hand_rot.ravel())
+    mujoco.mju_mat2Quat(quat, arm.hand_rot.ravel())
     return np.array([quat[1], quat[2], quat[3], quat[0]])
 
 
-def wrench(world: World) -> NDArray[np.float64]:
+def wrench(arm: Arm) -> NDArray[np.float64]:
     """Force [N] and torque [N m] that the hand exerts on the wrist, axes of the wrist's sensor frame, shape (6,).
 
     The same numbers as robosuite's force and torque sensors; computed on demand, since sensors in the model would
     cost time in every step.
     """
+    world = arm.world
     mujoco.mj_rnePostConstraint(world.model, world.data)
-    site = world.model.site(Names().wrist_site).id
+    site = world.model.site(Names(arm.number).wrist_site).id
     body = int(world.model.site_bodyid[site])
     local = np.empty(6)
     root = int(world.model.body_rootid[body])
     moment, force = world.data.cfrc_int[body, :3], world.data.cfrc_int[body, 3:]
-    arm = world.data.site_xpos[site] - world.data.subtree_com[root]
+    lever = world.data.site_xpos[site] - world.data.subtree_com[root]
     frame = world.data.site_xmat[site].reshape(3, 3)
     local[:3] = frame.T @ force
-    local[3:] = frame.T @ (moment - np.cross(arm, force))
+    local[3:] = frame.T @ (moment - np.cross(lever, force))
     return local
 
 
-def _world_force(world: World) -> NDArray[np.float64]:
-    frame = world.data.site(Names().wrist_site).xmat.reshape(3, 3)
-    return frame @ wrench(world)[:3]
+def _world_force(arm: Arm) -> NDArray[np.float64]:
+    frame = arm.data.site(Names(arm.number).wrist_site).xmat.reshape(3, 3)
+    return frame @ wrench(arm)[:3]
 
 
-def _tactile(pad: str) -> Callable[[World], NDArray[np.float64]]:
-    def read(world: World) -> NDArray[np.float64]:
+def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
+    def read(arm: Arm) -> NDArray[np.float64]:
         """Normal force of every contact on the pad, in the taxel where it acts [N]."""
-        grid, force = np.zeros((TAXELS, TAXELS)), np.zeros(6)
-        geom = world.model.geom(pad).id
+        world, grid, force = arm.world, np.zeros((TAXELS, TAXELS)), np.zeros(6)
+        geom = world.model.geom(f"{Names(arm.number).hand}{pad}").id
         half = world.model.geom_size[geom]
         frame, centre = world.data.geom_xmat[geom].reshape(3, 3), world.data.geom_xpos[geom]
         for i in range(world.data.ncon):
@@ -84,17 +83,31 @@ def _tactile(pad: str) -> Callable[[World], NDArray[np.float64]]:
     return read
 
 
-STREAMS: dict[str, Stream] = {
-    "robot0_eef_pos": Stream((3,), 3.0, lambda world: world.arm.hand),
-    "robot0_eef_quat": Stream((4,), 1.0, _hand_quat),
-    "robot0_joint_pos": Stream((JOINTS,), 7.0, lambda world: world.arm.joint_pos),
-    "robot0_joint_vel": Stream((JOINTS,), 100.0, lambda world: world.arm.joint_vel),
-    "robot0_gripper_qpos": Stream((2,), 0.1, lambda world: world.arm.finger_pos),
-    "force_torque": Stream((6,), 1e4, wrench),
-    "force_torque_world": Stream((3,), 1e4, _world_force),
-    **{name: Stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},
-}
-"""All streams but the cameras. Quaternions are xyzw, as robosuite's key promises."""
+def _of_arm(number: int, hand: str) -> dict[str, Stream]:
+    """The streams of one arm but the cameras. Quaternions are xyzw, as robosuite's key promises."""
+    robot, further = Names(number).arm, Names(number).arm if number else ""
+
+    def stream(shape: tuple[int, ...], bound: float, read: Callable[[Arm], NDArray[np.float64]]) -> Stream:
+        return Stream(shape, bound, lambda world: read(world.arms[number]))
+
+    found = {
+        f"{robot}eef_pos": stream((3,), 3.0, lambda arm: arm.hand),
+        f"{robot}eef_quat": stream((4,), 1.0, _hand_quat),
+        f"{robot}joint_pos": stream((JOINTS,), 7.0, lambda arm: arm.joint_pos),
+        f"{robot}joint_vel": stream((JOINTS,), 100.0, lambda arm: arm.joint_vel),
+        f"{robot}gripper_qpos": stream((2,), 0.1, lambda arm: arm.finger_pos),
+        f"{further}force_torque": stream((6,), 1e4, wrench),
+        f"{further}force_torque_world": stream((3,), 1e4, _world_force),
+        **{f"{robot}{name}": stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},
+    }
+    lacking = [] if hand == JAW else [f"{robot}{name}" for name in JAW_ONLY]
+    return {name: stream for name, stream in found.items() if name not in lacking}
+
+
+POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
+"""Streams about an arm's own pose."""
+JAW_ONLY = ("gripper_qpos", *PADS)
+"""Streams that an arm without jaw does not have."""
 
 CAMERAS = {
     "rgb_exo_right_cam": "agentview",
@@ -104,23 +117,28 @@ CAMERAS = {
 }
 """The paper's names of the cameras, and robosuite's."""
 
-JAW_ONLY = ("robot0_gripper_qpos", *PADS)
-"""Streams that a robot without jaw does not have."""
-
 
 def streams_of(embodiment: str) -> dict[str, Stream]:
-    """All streams that this robot has."""
-    return {name: stream for name, stream in STREAMS.items() if embodiment == JAW or name not in JAW_ONLY}
+    """All streams that this robot has but the cameras, one arm after the other."""
+    arms = (_of_arm(number, hand) for number, hand in enumerate(hands(embodiment)))
+    return {name: stream for arm in arms for name, stream in arm.items()}
+
+
+def cameras_of(embodiment: str) -> dict[str, str]:
+    """robosuite's names of all cameras that this robot has, by the paper's."""
+    further = [Names(number).arm for number in range(1, len(hands(embodiment)))]
+    return {**CAMERAS, **{f"{arm}rgb_gripper_cam": f"{arm}eye_in_hand" for arm in further}}
 
 
 def proprioception(embodiment: str) -> tuple[str, ...]:
     """Names of the streams about the robot's own pose."""
-    return tuple(name for name in streams_of(embodiment) if name.startswith("robot0_") and name not in PADS)
+    poses = [f"{Names(number).arm}{name}" for number in range(len(hands(embodiment))) for name in POSE]
+    return tuple(name for name in streams_of(embodiment) if name in poses)
 
 
 def check_names(names: Sequence[str], embodiment: str = JAW) -> None:
     """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera."""
-    known = [*streams_of(embodiment), *CAMERAS]
+    known = [*streams_of(embodiment), *cameras_of(embodiment)]
     for name in names:
         if name not in known:
             raise UnknownName("observation", name, known)

@@ -23,9 +23,9 @@ from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError
 from ..pool import Pool, PoolRow
-from ..robots.panda import Names
+from ..robots import panda
 from ..scenario import Scenario
-from ..sim.world import JAW, SUCTION, World
+from ..sim.world import JAW, SUCTION, World, hands
 from ..validate.identity import check_versions
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
@@ -70,11 +70,11 @@ class RobosuiteEnv(ManipulationEnv):
 
     def __init__(
         self,
-        robots: str | Sequence[str] = ROBOT,
+        robots: str | Sequence[str] | None = None,
         scenario: PoolRow | str | None = None,
         pool: str | Path | None = None,
         use_object_obs: bool = True,
-        gripper_types: str = "default",
+        gripper_types: str | Sequence[str] = "default",
         control_freq: int = 100,
         horizon: int | None = None,
         action_filter: str | None = None,
@@ -83,12 +83,12 @@ class RobosuiteEnv(ManipulationEnv):
         """Choose scenarios and build the first.
 
         Args:
-            robots: "Panda".
+            robots: "Panda", or a list of two where the task has two arms; default: what the task asks for.
             scenario: a row of a pool (`Pool.row`), or with `pool` how an id in it begins. Without it, every hard
                 reset draws one from the pool, decided by robosuite's `seed`.
             pool: folder of a pool.
             use_object_obs: also observe `<body>_pos` [m] and `<body>_quat` (xyzw) of everything that can move.
-            gripper_types: "default" is the hand that the task asks for; no other is accepted.
+            gripper_types: "default" is the hand of each arm that the task asks for; no others are accepted.
             control_freq: actions in a second.
             horizon: actions in an episode; default: the task's time limit.
             action_filter: None, the paper's interface for policies; or "teleop" for the filter that the actions of
@@ -104,13 +104,13 @@ class RobosuiteEnv(ManipulationEnv):
         self.action_filter = action_filter
         self.task = config.task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
-        hand = GRIPPERS[self.task.embodiment]
-        if gripper_types not in ("default", hand):
-            raise BadConfig(f"gripper_types = {gripper_types}; the scenarios of {self.NAME} are certified with {hand}")
+        grippers = [GRIPPERS[hand] for hand in hands(self.task.embodiment)]
+        if gripper_types != "default" and _listed(gripper_types) != grippers:
+            self._refuse("gripper_types", _listed(gripper_types), grippers)
         self.use_object_obs = use_object_obs
         super().__init__(
-            robots=robots,
-            gripper_types=hand,
+            robots=[ROBOT] * len(grippers) if robots is None else robots,
+            gripper_types=grippers,  # type: ignore[arg-type]
             control_freq=control_freq,
             horizon=round(self.task.horizon * control_freq) if horizon is None else horizon,
             **arguments,
@@ -137,16 +137,25 @@ class RobosuiteEnv(ManipulationEnv):
         return self.episode.outcome == "success"
 
     def _check_robot_configuration(self, robots: Sequence[str]) -> None:
-        if list(robots) != [ROBOT]:
-            raise BadConfig(f"robots = {', '.join(robots)}; the scenarios of {self.NAME} are certified with {ROBOT}")
+        certified = [ROBOT] * len(hands(self.task.embodiment))
+        if list(robots) != certified:
+            self._refuse("robots", robots, certified)
+        layout = self.env_configuration
+        if layout not in (layouts := ("default", "parallel") if len(certified) > 1 else ("default",)):
+            self._refuse("env_configuration", [layout], layouts[-1:])
+
+    def _refuse(self, what: str, given: Sequence[str], certified: Sequence[str]) -> None:
+        told = f"{what} = {', '.join(given)}; the scenarios of {self.NAME} are certified with {', '.join(certified)}"
+        raise BadConfig(told)
 
     def _load_model(self) -> None:
         super()._load_model()
         self.row = self._choice[int(self.rng.integers(len(self._choice)))]
         self.scenario = self.task.scenario(self.row.params)
-        robot = self.robots[0].robot_model
-        robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF))
-        self.model = SceneTask(SceneModel(self.row.scene_xml), robot)
+        robots = [robot.robot_model for robot in self.robots]
+        for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
+            robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
+        self.model = SceneTask(SceneModel(self.row.scene_xml), robots)
 
     def _initialize_sim(self, xml_string: str | None = None) -> None:
         super()._initialize_sim(xml_string)
@@ -178,8 +187,8 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _reset_internal(self) -> None:
         super()._reset_internal()
-        # robosuite's controllers looked at the arm before it was put into its initial posture: let them look again.
-        for controller in self.robots[0].part_controllers.values():
+        # robosuite's controllers looked at the arms before these took their initial posture: let them look again.
+        for controller in (part for robot in self.robots for part in robot.part_controllers.values()):
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
         self.world.filter.reset()
@@ -188,7 +197,7 @@ class RobosuiteEnv(ManipulationEnv):
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Between mj_step1 and mj_step2, in every physics step."""
         super()._pre_action(action, policy_step)
-        self.world.arm.grip = float(action[-1])
+        self.world.command(action)
         self.world.loop.watch(first=self._substep == 0)
 
     def _update_observables(self, force: bool = False) -> None:
@@ -217,9 +226,8 @@ class RobosuiteEnv(ManipulationEnv):
     def _moving(self) -> list[str]:
         """Bodies of the scene that have joints."""
         model = self.world.model
-        robot = self.world.body(Names().base)
-        jointed = np.flatnonzero((model.body_jntnum > 0) & (model.body_rootid != robot))
-        return [model.body(int(body)).name for body in jointed]
+        jointed = np.flatnonzero(model.body_jntnum > 0)
+        return [model.body(int(body)).name for body in jointed if body not in self.world.own]
 
     def _pose(self, name: str) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
         """Sensors of a body's position [m] and orientation (xyzw)."""
@@ -257,6 +265,10 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
         return known
     about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
     return type(name, (RobosuiteEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
+
+
+def _listed(names: str | Sequence[str]) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
 
 
 def _choice(task: str, scenario: PoolRow | str | None, pool: str | Path | None) -> list[PoolRow]:

@@ -62,10 +62,10 @@ class SceneModel(MujocoXML):
 
 
 class SceneTask(ManipulationTask):
-    """A scene and the robot, under the scene's own physics options."""
+    """A scene and the robots, under the scene's own physics options."""
 
-    def __init__(self, scene: SceneModel, robot: RobotModel):
-        super().__init__(mujoco_arena=scene, mujoco_robots=[robot])
+    def __init__(self, scene: SceneModel, robots: list[RobotModel]):
+        super().__init__(mujoco_arena=scene, mujoco_robots=robots)
         for tag in TEXT:
             for theirs in self.root.findall(tag):
                 self.root.remove(theirs)

@@ -23,7 +23,7 @@ from ..errors import BadConfig, ForeignCode, GaveUp, ScengenError, UnknownName, 
 from ..params import Value
 from ..pool import PoolRow
 from ..samplers.task import Task
-from ..sim.world import IDLE
+from ..sim.world import IDLE, hands
 
 
 class Policy(Protocol):
@@ -34,7 +34,7 @@ class Policy(Protocol):
         ...
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The action for the next control period, shape (7,)."""
+        """The action for the next control period, of the shape of `env.action_space`: seven numbers for each arm."""
         ...
 
 
@@ -45,36 +45,36 @@ class Idle:
     """Does nothing: whatever it solves was no problem."""
 
     def __init__(self, env: PoolEnv):
-        pass
+        self._action = np.resize(IDLE, env.action_space.shape or ())
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Nothing to remember."""
 
     def act(self, observation: Observation) -> ArrayLike:
-        """No motion, gripper open."""
-        return IDLE
+        """No motion, grippers open."""
+        return self._action
 
 
 class Random:
     """Uniformly random actions."""
 
     def __init__(self, env: PoolEnv):
-        self._random = np.random.default_rng()
+        self._random, self._shape = np.random.default_rng(), env.action_space.shape
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Begin the stream of `seed`."""
         self._random = np.random.default_rng(seed)
 
     def act(self, observation: Observation) -> ArrayLike:
-        """Seven numbers in [-1, 1]."""
-        return self._random.uniform(-1.0, 1.0, 7)
+        """Numbers in [-1, 1]."""
+        return self._random.uniform(-1.0, 1.0, self._shape)
 
 
 class Oracle:
     """The task's own scripted solution. It reads the full state: an upper bound, no competitor."""
 
     def __init__(self, env: PoolEnv):
-        self.env, self.filter = env, Filter()
+        self.env, self.filter = env, Filter(len(hands(env.task.embodiment)))
         self.sent = unfiltered if env.action_filter else self.filter
         self.identity = inspect.getsource(env.task.family)
 

@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robots import panda
 from ..sim.world import World
 
-WORLD, HAND = "world", "robot0_eef"
-"""Frames in which extrinsics are given: the world's, or the one of `robot0_eef_pos` and `robot0_eef_quat`."""
+WORLD = "world"
+"""The frame in which extrinsics are given; for a camera on a hand that of `robot0_eef_pos` and `robot0_eef_quat`, which
+is called `robot0_eef`, or the same of `robot1`."""
 TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 """MuJoCo's cameras look along -z with y up; OpenCV's, which vision tools expect, along z with y down."""
 
@@ -25,15 +27,17 @@ def calibration(world: World, name: str, width: int, height: int) -> dict[str, A
     camera = model.camera(name)
     focal = height / 2 / np.tan(np.radians(float(camera.fovy[0])) / 2)
     pose = _pose(data.cam_xpos[camera.id], data.cam_xmat[camera.id].reshape(3, 3) @ TO_OPENCV)
-    fixed = model.body_weldid[camera.bodyid[0]] == 0
-    if not fixed:
-        pose = np.linalg.inv(_pose(world.arm.hand, world.arm.hand_rot)) @ pose
+    frame, root = WORLD, model.body_rootid[camera.bodyid[0]]
+    if model.body_weldid[camera.bodyid[0]] != 0:
+        arm = next(arm for arm in world.arms if model.body(panda.Names(arm.number).base).id == root)
+        frame = f"{arm.label}_eef"
+        pose = np.linalg.inv(_pose(arm.hand, arm.hand_rot)) @ pose
     return {
         "model": "pinhole without distortion",
         "width": width,
         "height": height,
         "intrinsics": [[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]],
-        "frame": WORLD if fixed else HAND,
+        "frame": frame,
         "extrinsics": (pose.round(6) + 0.0).tolist(),  # + 0.0 turns -0.0 into 0.0
     }
 

@@ -50,8 +50,9 @@ def _add_home(spec: mujoco.MjSpec) -> None:
     """A key frame with the robot as after a reset: MuJoCo's viewer then starts where episodes start."""
     model = spec.compile()
     qpos = model.qpos0.copy()
-    joints = [*panda.Names().joints, *panda.Names().finger_joints]
-    for name, angle in zip(joints, [*panda.HOME, *panda.FINGERS], strict=True):
-        qpos[model.joint(name).qposadr[0]] = angle
+    for names in panda.arms(model):
+        fingers = panda.fingers(model, names)
+        qpos[[model.joint(name).qposadr[0] for name in names.joints]] = panda.HOME
+        qpos[fingers] = panda.FINGERS[: len(fingers)]
     spec.add_key(name="home", qpos=qpos.tolist())
     spec.compile()

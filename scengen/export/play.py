@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..control.loop import ACTION
 from ..envs.observations import Stream
 from ..episode import Actions, Episode
 from ..pictures.render import Picture
@@ -22,7 +23,7 @@ class Moment:
     streams: Mapping[str, NDArray[np.float32]]
     pictures: Mapping[str, Picture]
     actions: Actions
-    """What the controller received in the control periods of the row, shape (periods, 7)."""
+    """What the controller received in the control periods of the row, shape (periods, 7 * arms)."""
     success: bool
     """Whether the goal was reached in them."""
     done: bool
@@ -47,8 +48,10 @@ class Moment:
 
     @property
     def action(self) -> NDArray[np.float32]:
-        """The one action that, held for the whole row, asks for the same motion: the mean, and the last grip."""
-        return np.append(self.actions[:, :6].mean(axis=0), self.actions[-1, 6]).astype(np.float32)
+        """The one action that, held for the whole row, asks for the same motion: the mean, and the last grips."""
+        action = self.actions.mean(axis=0)
+        action[ACTION - 1 :: ACTION] = self.actions[-1, ACTION - 1 :: ACTION]
+        return action.astype(np.float32)
 
 
 def play(

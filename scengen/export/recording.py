@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
 
-from ..control.loop import ACTION
-from ..envs.observations import CAMERAS, Stream, proprioception, streams_of
+from ..envs.observations import CAMERAS, Stream, cameras_of, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
@@ -23,7 +22,7 @@ from ..pictures.video import check_size
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.world import World
+from ..sim.world import World, action_size
 from ..targets import try_folder
 from ..validate.identity import check_versions, versions
 from ..validate.playable import unplayable
@@ -69,9 +68,6 @@ class Settings:
         periods_between(self.fps)
         check_size(self.width, self.height)
         at_least(self, n=1, width=2, height=2)
-        for name in self.eyes:
-            if name not in CAMERAS:
-                raise UnknownName("camera", name, [NONE, *CAMERAS])
         if Path(self.to).exists():
             raise BadConfig(f"{self.to} exists already; delete it, or name another folder")
         if self.unfinished.exists():
@@ -106,6 +102,9 @@ def record(settings: Settings, find_task: Callable[[str], Task], progress: Calla
     try_folder(settings.to)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     robot, count = _robot(pools), sum(map(len, pools))
+    for name in settings.eyes:
+        if name not in (known := cameras_of(robot)):
+            raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
     streams = streams_of(robot)
     try:
@@ -140,9 +139,10 @@ def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings
     """Add one scenario's episode, and say whether it reached the goal."""
     world, success = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes)), False
     with ExitStack() as stack:
-        pictures = _camera(stack, world, settings)
+        views = cameras_of(row.embodiment)
+        pictures = _camera(stack, world, settings, views)
         for name in settings.eyes:
-            data.calibrate(name, calibration(world, CAMERAS[name], settings.width, settings.height), row.id)
+            data.calibrate(name, calibration(world, views[name], settings.width, settings.height), row.id)
         for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
             data.add(moment.values(proprioception(row.embodiment)), moment.pictures)
             success = moment.success
@@ -152,13 +152,15 @@ def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings
     return success
 
 
-def _camera(stack: ExitStack, world: World, settings: Settings) -> Callable[[], dict[str, Picture]]:
+def _camera(
+    stack: ExitStack, world: World, settings: Settings, views: Mapping[str, str]
+) -> Callable[[], dict[str, Picture]]:
     """What takes the pictures of a moment, by the paper's names; OpenGL is touched only if there are any."""
     if not settings.eyes:
         return dict
     camera = Camera(world, settings.width, settings.height)
     stack.callback(camera.close)
-    return lambda: {name: camera.take(CAMERAS[name]) for name in settings.eyes}
+    return lambda: {name: camera.take(views[name]) for name in settings.eyes}
 
 
 def _features(settings: Settings, robot: str) -> dict[str, Feature]:
@@ -168,8 +170,8 @@ def _features(settings: Settings, robot: str) -> dict[str, Feature]:
     return {
         **seen,
         "observation.state": Feature("float32", (state,)),
-        "action": Feature("float32", (ACTION,)),
-        "actions": Feature("float32", (periods_between(settings.fps), ACTION)),
+        "action": Feature("float32", (action_size(robot),)),
+        "actions": Feature("float32", (periods_between(settings.fps), action_size(robot))),
         "reward": Feature("float32"),
         "next.reward": Feature("float32"),
         "next.done": Feature("bool"),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ..errors import ScengenError, UnknownName
-from ..robots.panda import Names
+from ..robots.panda import arms
 from ..sim.world import World
 
 Picture = NDArray[np.uint8]
@@ -108,7 +108,7 @@ def fitted(world: World, aspect: float) -> mujoco.MjvCamera:
 def _corners(world: World) -> NDArray[np.float64]:
     """Corners of the boxes around all geoms of the scene but table and floor, and the hand, shape (n, 3) [m]."""
     model, data = world.model, world.data
-    apart = {model.body(name).id for name in ("world", "table", Names().base)}
+    apart = {model.body(name).id for name in ("world", "table", *(names.base for names in arms(model)))}
     geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     boxes = [
