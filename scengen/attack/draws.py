@@ -2,9 +2,11 @@
 
 import math
 from bisect import bisect
+from dataclasses import replace
 from itertools import accumulate
 
 from ..samplers.keyed import spread, unit
+from ..sim.world import Arm
 from .macros import Macro
 from .play import Arena
 from .solids import TABLE, Solid, handles, sides
@@ -40,17 +42,17 @@ def macro(arena: Arena, *key: str | int) -> Macro:
     share = unit(*key, "kind")
     ends = list(accumulate(KINDS.values()))
     kind = list(KINDS)[bisect(ends[:-1], share)]
-    return _DRAWS[kind](arena, key)
+    return replace(_DRAWS[kind](arena, key), arm=_arm(arena, key).number)
 
 
 def varied(one: Macro, *key: str | int) -> Macro:
     """The macro with its numbers changed by up to a fifth, whole ones left alone."""
     numbers = tuple(n if n == round(n) else n * (1 + spread(0.2, *key, k)) for k, n in enumerate(one.numbers))
-    return one if one.kind in ("shortcut", "replay", "answer", "follow") else Macro(one.kind, one.target, numbers)
+    return one if one.kind in ("shortcut", "replay", "answer", "follow") else replace(one, numbers=numbers)
 
 
 def _pick(arena: Arena, key: Key) -> Macro:
-    found = handles(arena.solids, arena.suction)
+    found = handles(arena.solids, _arm(arena, key).suction)
     if not found:
         return _push(arena, key)
     solid = found[int(len(found) * unit(*key, "target"))]
@@ -118,6 +120,12 @@ _DRAWS = {
     "throw": _throw,
     "wait": _wait,
 }
+
+
+def _arm(arena: Arena, key: Key) -> Arm:
+    """Any of the robot's."""
+    arms = arena.world.arms
+    return arms[int(len(arms) * unit(*key, "arm"))]
 
 
 def _target(arena: Arena, key: Key, table: bool) -> Solid:

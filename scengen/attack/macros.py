@@ -28,10 +28,10 @@ from ..control.loop import Loop
 from ..geometry import UP, Vec3, about_z, heading, rotation
 from ..robots.jaw import FINGER, PALM_ABOVE, TIP
 from ..scenario import Plan
-from ..sim.world import ROBOT, World
+from ..sim.world import ROBOT, Arm, World
 from ..skills import suction
 from ..skills.jaw import grasp, release
-from ..skills.motion import CLOSED, OPEN, Pace, closing_along, go_to, hold, push, retreat, turn_to
+from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hold, push, retreat, turn_to
 from .solids import Solid, held
 
 FAST = Pace(0.30, 0.02, give_up=2.5)
@@ -59,24 +59,31 @@ class Macro:
     target: str = ""
     """A solid or body of the scene; empty for moves of the hand alone."""
     numbers: tuple[float, ...] = ()
+    arm: int = 0
+    """Number of the arm that makes the move; the others are held still."""
 
     def __str__(self) -> str:
         numbers = ", ".join(f"{number:.3g}" for number in self.numbers)
-        return f"{self.kind} {self.target}".rstrip() + (f" ({numbers})" if numbers else "")
+        by = f" by {ROBOT}{self.arm}" if self.arm else ""
+        return f"{self.kind} {self.target}".rstrip() + by + (f" ({numbers})" if numbers else "")
 
 
 @dataclass(frozen=True)
 class Field:
-    """A world with its solids: what the plan of a macro looks at."""
+    """An arm and the solids of its world: what the plan of a macro looks at."""
 
-    world: World
+    arm: Arm
     solids: Mapping[str, Solid]
-    suction: bool
+
+    @property
+    def world(self) -> World:
+        return self.arm.world
 
 
-def plan(field: Field, macro: Macro) -> Plan:
+def plan(world: World, solids: Mapping[str, Solid], macro: Macro) -> Plan:
     """The moves of one macro from wherever the hand is."""
-    return KINDS[macro.kind](field, macro)
+    arm = world.arms[macro.arm]
+    return alone(arm, KINDS[macro.kind](Field(arm, solids), macro))
 
 
 # --- taking and leaving -----------------------------------------------------------------------
@@ -86,52 +93,51 @@ def _pick(field: Field, macro: Macro) -> Plan:
     height, skew, which, lift = macro.numbers
     solid, world = field.solids[macro.target], field.world
     centre, up = solid.centre(world), solid.reach(world, UP)
-    yield from release(world.arm, 0.05)
-    if field.suction:
+    yield from release(field.arm, 0.05)
+    if field.arm.suction:
         yield from _suck(field, centre + up * UP, skew)
     else:
         closing = about_z(skew) @ solid.level_axes(world)[round(which)][0]
         low, high = max(TIP + 0.003 - up, up - DEEPEST), max(up - 0.004, 0.0)
         at = centre + (low + height * (high - low)) * UP if low < high else centre
-        rot = closing_along(world.arm, closing)
-        yield from _rise(world, float(at[2]) + ABOVE)
-        yield from go_to(world.arm, at + ABOVE * UP, rot, FAST, OPEN)
-        yield from go_to(world.arm, at, rot, CLOSE, OPEN)
-        yield from grasp(world.arm)
-    yield from retreat(world.arm, lift, FAST)
+        rot = closing_along(field.arm, closing)
+        yield from _rise(field.arm, float(at[2]) + ABOVE)
+        yield from go_to(field.arm, at + ABOVE * UP, rot, FAST, OPEN)
+        yield from go_to(field.arm, at, rot, CLOSE, OPEN)
+        yield from grasp(field.arm)
+    yield from retreat(field.arm, lift, FAST)
 
 
 def _suck(field: Field, spot: Vec3, skew: float) -> Plan:
-    arm = field.world.arm
+    arm = field.arm
     rot = closing_along(arm, about_z(skew) @ arm.hand_rot[:, 1])
-    yield from _rise(field.world, float(spot[2]) + ABOVE)
+    yield from _rise(arm, float(spot[2]) + ABOVE)
     yield from go_to(arm, spot + 0.02 * UP, rot, FAST, OPEN)
     yield from suction.suck(arm, spot, rot, give_up=1.5)
 
 
 def _place(field: Field, macro: Macro) -> Plan:
     u, v, drop, speed = macro.numbers
-    world = field.world
     yield from _over(field, macro.target, u, v, drop + 0.01)
     if drop <= 0.0:
         yield from _down(field, macro.target, 0.04, speed)
-    yield from release(world.arm)
-    yield from retreat(world.arm, ABOVE, FAST)
+    yield from release(field.arm)
+    yield from retreat(field.arm, ABOVE, FAST)
 
 
 def _press(field: Field, macro: Macro) -> Plan:
     u, v, seconds, speed = macro.numbers
     yield from _over(field, macro.target, u, v, AIR)
     yield from _down(field, macro.target, 0.04, speed)
-    yield from _blindly(field.world, -speed * UP, seconds)
-    yield from retreat(field.world.arm, ABOVE, FAST)
+    yield from _blindly(field.arm, -speed * UP, seconds)
+    yield from retreat(field.arm, ABOVE, FAST)
 
 
 def _release(field: Field, macro: Macro) -> Plan:
     seconds, rise = macro.numbers
-    yield from release(field.world.arm, seconds)
+    yield from release(field.arm, seconds)
     if rise > 0.0:
-        yield from retreat(field.world.arm, rise, FAST)
+        yield from retreat(field.arm, rise, FAST)
 
 
 def _catch(field: Field, macro: Macro) -> Plan:
@@ -140,12 +146,12 @@ def _catch(field: Field, macro: Macro) -> Plan:
     world, body = field.world, macro.target
     end, gone, last = world.time + longest, False, 0.0
     while world.time < end:
-        away = float(np.linalg.norm(world.com(body) - world.arm.hand))
+        away = float(np.linalg.norm(world.com(body) - field.arm.hand))
         if gone and away < min(last, CATCH):
             break
         gone, last = gone or away > GONE, away
         yield np.append(np.zeros(6), OPEN)
-    yield from grasp(world.arm)
+    yield from grasp(field.arm)
 
 
 # --- pushing ----------------------------------------------------------------------------------
@@ -153,10 +159,10 @@ def _catch(field: Field, macro: Macro) -> Plan:
 
 def _push(field: Field, macro: Macro) -> Plan:
     direction, height, offset, way, speed = macro.numbers
-    solid, world, arm = field.solids[macro.target], field.world, field.world.arm
+    solid, world, arm = field.solids[macro.target], field.world, field.arm
     u = heading(math.degrees(direction))
     across = np.array([-u[1], u[0], 0.0])
-    if (load := held(world)) is None:
+    if (load := held(arm)) is None:
         radius, below, lag = FINGER, TIP, np.zeros(3)
         rot = closing_along(arm, across)
     else:
@@ -167,10 +173,10 @@ def _push(field: Field, macro: Macro) -> Plan:
     start = centre - (solid.reach(world, u) + radius + AIR) * u + offset * solid.reach(world, across) * across
     z = centre[2] - up + height * 2 * up
     start[2] = z if load is None else max(z, centre[2] - up + below + 0.002)
-    yield from _rise(world, float(centre[2] + up + below + 0.03 + lag[2]))
+    yield from _rise(arm, float(centre[2] + up + below + 0.03 + lag[2]))
     yield from go_to(arm, [*(start + lag)[:2], arm.hand[2]], rot, FAST, CLOSED)
     yield from go_to(arm, start + lag, rot, CLOSE, CLOSED)
-    yield from _blindly(world, speed * u, way / speed)
+    yield from _blindly(arm, speed * u, way / speed)
     yield from retreat(arm, ABOVE, FAST)
 
 
@@ -179,21 +185,21 @@ def _push(field: Field, macro: Macro) -> Plan:
 
 def _move(field: Field, macro: Macro) -> Plan:
     x, y, z, speed = macro.numbers
-    arm, way = field.world.arm, np.array([x, y, z])
+    arm, way = field.arm, np.array([x, y, z])
     limit = float(np.linalg.norm(way)) / speed + 0.7
     yield from go_to(arm, arm.hand + way, pace=Pace(speed, 0.002, limit))
 
 
 def _turn(field: Field, macro: Macro) -> Plan:
     x, y, z, rate = macro.numbers
-    arm = field.world.arm
+    arm = field.arm
     goal = rotation(np.array([x, y, z])) @ arm.hand_rot
     yield from turn_to(arm, goal, rate, give_up=0.7 + math.sqrt(x * x + y * y + z * z) / rate)
 
 
 def _shake(field: Field, macro: Macro) -> Plan:
     x, y, z, spin, period, duration = macro.numbers
-    arm, start = field.world.arm, field.world.time
+    arm, start = field.arm, field.world.time
     while (since := field.world.time - start) < duration:
         sign = 1.0 if since % period < period / 2 else -1.0
         yield np.array([sign * x, sign * y, sign * z, 0.0, 0.0, sign * spin, arm.grip])
@@ -201,19 +207,19 @@ def _shake(field: Field, macro: Macro) -> Plan:
 
 def _throw(field: Field, macro: Macro) -> Plan:
     x, y, z, seconds = macro.numbers
-    arm, start = field.world.arm, field.world.time
+    arm, start = field.arm, field.world.time
     while (since := field.world.time - start) < seconds + 0.2:
         yield np.array([x, y, z, 0.0, 0.0, 0.0, OPEN if since > seconds else arm.grip])
 
 
 def _wait(field: Field, macro: Macro) -> Plan:
     (seconds,) = macro.numbers
-    yield from hold(field.world.arm, seconds)
+    yield from hold(field.arm, seconds)
 
 
 def _go(field: Field, macro: Macro) -> Plan:
     x, y, z, a, b, c, grip = macro.numbers
-    yield from go_to(field.world.arm, [x, y, z], rotation(np.array([a, b, c])), CLOSE, grip)
+    yield from go_to(field.arm, [x, y, z], rotation(np.array([a, b, c])), CLOSE, grip)
 
 
 KINDS: Mapping[str, Callable[[Field, Macro], Plan]] = {
@@ -236,16 +242,16 @@ KINDS: Mapping[str, Callable[[Field, Macro], Plan]] = {
 # --- parts of plans -----------------------------------------------------------------------------
 
 
-def _rise(world: World, height: float) -> Plan:
+def _rise(arm: Arm, height: float) -> Plan:
     """Straight up to a height [m], if the hand is lower."""
-    if world.arm.hand[2] < height - FAST.within:
-        yield from go_to(world.arm, [*world.arm.hand[:2], height], pace=FAST)
+    if arm.hand[2] < height - FAST.within:
+        yield from go_to(arm, [*arm.hand[:2], height], pace=FAST)
 
 
 def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
     """Bring what the hand holds, or its finger tips, over a point of a solid's upper face."""
-    solid, world, arm = field.solids[target], field.world, field.world.arm
-    load = held(world)
+    solid, world, arm = field.solids[target], field.world, field.arm
+    load = held(arm)
     below = TIP if load is None else field.solids[load].reach(world, UP)
     lag = np.zeros(3) if load is None else arm.hand - field.solids[load].centre(world)
     (a, first), (b, second) = solid.level_axes(world)
@@ -256,19 +262,19 @@ def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
     slope = -(normal[0] * (top - solid.centre(world))[0] + normal[1] * (top - solid.centre(world))[1]) / normal[2]
     top[2] += slope + float(half[int(np.argmax(np.abs(rot[2])))]) / normal[2]
     goal = top + lag + (below + above) * UP
-    yield from _rise(world, float(goal[2]) + 0.02)
+    yield from _rise(arm, float(goal[2]) + 0.02)
     yield from go_to(arm, [*goal[:2], max(goal[2], arm.hand[2])], pace=LADEN, grip=CLOSED)
     yield from go_to(arm, goal, pace=CLOSE, grip=CLOSED)
 
 
 def _down(field: Field, target: str, farthest: float, speed: float) -> Plan:
     """Lower what the hand holds, or closed fingers, until it touches the target's body, by `farthest` [m] at most."""
-    world, body = field.world, field.solids[target].body
-    tool, end = held(world) or ROBOT, world.time + farthest / speed
-    yield from push(world.arm, -speed * UP, lambda: world.touching(tool, body) or world.time > end, CLOSED)
+    arm, world, body = field.arm, field.world, field.solids[target].body
+    tool, end = held(arm) or arm.label, world.time + farthest / speed
+    yield from push(arm, -speed * UP, lambda: world.touching(tool, body) or world.time > end, CLOSED)
 
 
-def _blindly(world: World, velocity: Vec3, seconds: float) -> Plan:
+def _blindly(arm: Arm, velocity: Vec3, seconds: float) -> Plan:
     """Push at a constant velocity for some time, whatever is in the way."""
-    end = world.time + seconds - Loop.PERIOD / 2
-    yield from push(world.arm, velocity, lambda: world.time > end, give_up=seconds + 1.0)
+    world, end = arm.world, arm.world.time + seconds - Loop.PERIOD / 2
+    yield from push(arm, velocity, lambda: world.time > end, give_up=seconds + 1.0)

@@ -12,10 +12,10 @@ from ..control.teleop import unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import BadConfig, GaveUp
 from ..scenario import Plan, Scenario
-from ..sim.world import SUCTION, World
+from ..sim.world import World
 from ..validate.rollout import STILL, STILL_FOR
 from . import macros
-from .macros import Field, Macro
+from .macros import Macro
 from .signature import Signature, signature, starts
 from .solids import Solid, solids
 from .witness import again, follow, trace
@@ -92,7 +92,8 @@ class Arena:
         self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
         self.world = World.load(scene_xml, embodiment)
         self._places = starts(self.world)
-        self.start = Node(self.world.state(), 0.0, np.zeros((0, 7), np.float32), self.signature())
+        nothing = np.zeros((0, self.world.loop.size), np.float32)
+        self.start = Node(self.world.state(), 0.0, nothing, self.signature())
         found = trace(scenario, self.world, witness)
         if found is None:
             raise BadConfig(
@@ -108,16 +109,6 @@ class Arena:
         """The solids of the scene."""
         return solids(self.world)
 
-    @cached_property
-    def field(self) -> Field:
-        """What the plans of macros look at."""
-        return Field(self.world, self.solids, self.suction)
-
-    @property
-    def suction(self) -> bool:
-        """Whether the hand is a suction cup."""
-        return self.embodiment == SUCTION
-
     def plan(self, macro: Macro, raw: bool) -> Plan:
         """The moves of one macro."""
         match macro.kind:
@@ -131,7 +122,7 @@ class Arena:
                 answer = self.scenario.answer()
                 assert answer is not None, "only families with an answer are guessed at"
                 return answer.act(self.world, macro.numbers[0])
-        return macros.plan(self.field, macro)
+        return macros.plan(self.world, self.solids, macro)
 
     def stage(self, k: int) -> Node:
         """The state at the beginning of phase `k` of the witness."""
@@ -187,7 +178,7 @@ class _Run:
             self._macro(macro)
             if self.episode.outcome is not None:
                 break
-            actions = np.array(self.rows, np.float32).reshape(-1, 7)
+            actions = self._actions()
             state, left = self.world.state(), self.arena.signature()
             node = Node(state, self.episode.held, actions, left, node.after(macro))
             self.nodes.append(node)
@@ -238,6 +229,9 @@ class _Run:
         left: Signature | None = None,
     ) -> Played:
         left = left or self.arena.signature()
-        actions = np.array(self.rows, np.float32).reshape(-1, 7)
         notes, nodes = tuple(self.notes), tuple(self.nodes)
-        return Played(outcome, reason, round(seconds, 6), actions, self.world.digest, left, notes, nodes)
+        return Played(outcome, reason, round(seconds, 6), self._actions(), self.world.digest, left, notes, nodes)
+
+    def _actions(self) -> Actions:
+        """What the controller has received so far."""
+        return np.array(self.rows, np.float32).reshape(-1, self.world.loop.size)

@@ -5,11 +5,13 @@ A task in which a wrong try costs nothing asks for patience instead of insight.
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
 
 from ..geometry import UP, Vec3
+from ..sim.world import Arm
 from .macros import Macro
 from .play import Arena, Attempt
 from .solids import TABLE, Solid, handles, sides
@@ -31,17 +33,23 @@ SHIFTS = (0.010, 0.025, -0.010, -0.025)
 
 
 def retries(arena: Arena) -> Iterator[Attempt]:
-    """All families in turn, each with what promises most first."""
-    makers = (carried, tipped, dropped_again, shaken, placed, bare, shifted)
-    families = (make(arena) for make in makers)
-    for round_ in zip_longest(*families):
+    """All families in turn, of every arm, each with what promises most first."""
+    makers = (carried, tipped, dropped_again, shaken, placed, bare)
+    families = [_by(arm, make(arena, arm)) for make in makers for arm in arena.world.arms]
+    for round_ in zip_longest(*families, shifted(arena)):
         yield from (attempt for attempt in round_ if attempt)
 
 
-def carried(arena: Arena) -> Iterator[Attempt]:
+def _by(arm: Arm, attempts: Iterator[Attempt]) -> Iterator[Attempt]:
+    """Attempts with all their moves made by one arm."""
+    for attempt in attempts:
+        yield replace(attempt, macros=tuple(replace(macro, arm=arm.number) for macro in attempt.macros))
+
+
+def carried(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body picked and brought against, over and onto every other body."""
-    for one, other in _pairs(arena):
-        for pick in _picks(arena, one):
+    for one, other in _pairs(arena, arm):
+        for pick in _picks(arena, arm, one):
             pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(arena, other))
             yield Attempt(RETRY, (pick, *pushes[:2]))
             yield Attempt(RETRY, (pick, *pushes[2:]))
@@ -50,7 +58,7 @@ def carried(arena: Arena) -> Iterator[Attempt]:
             yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in SHARES[:3])))
 
 
-def bare(arena: Arena) -> Iterator[Attempt]:
+def bare(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """Every body pushed from all sides, high and low, then pressed, with the bare hand."""
     for solid in _targets(arena):
         for height in (0.8, 0.3):
@@ -60,41 +68,41 @@ def bare(arena: Arena) -> Iterator[Attempt]:
         yield Attempt(RETRY, tuple(Macro("press", solid.name, (u, 0.0, 0.5, 0.1)) for u in SHARES[:3]))
 
 
-def placed(arena: Arena) -> Iterator[Attempt]:
+def placed(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body put down at one share of a face after the other."""
-    for one, other in _pairs(arena):
-        for pick in _picks(arena, one)[:1]:
+    for one, other in _pairs(arena, arm):
+        for pick in _picks(arena, arm, one)[:1]:
             moves: list[Macro] = []
             for share in SHARES:
                 moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
             yield Attempt(RETRY, tuple(moves))
 
 
-def tipped(arena: Arena) -> Iterator[Attempt]:
+def tipped(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """What the witness holds, tipped one way and the other."""
-    for k in _holding(arena):
-        for axis in _axes(arena, k):
+    for k in _holding(arena, arm):
+        for axis in _axes(arena, arm, k):
             for tilt in TILTS[:2]:
                 yield Attempt(RETRY, _seesawing(axis, math.radians(tilt)), k)
                 yield Attempt(RETRY, _seesawing(-axis, math.radians(tilt)), k)
-        for axis in _axes(arena, k):
+        for axis in _axes(arena, arm, k):
             steps = [math.radians(tilt) for tilt in reversed(TILTS)]
             yield Attempt(RETRY, tuple(move for tilt in steps for move in _seesawing(axis, tilt)), k)
 
 
-def shaken(arena: Arena) -> Iterator[Attempt]:
+def shaken(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """What the witness holds, shaken level and upwards, with the wrist at rest and turning."""
     for spin in (1.0, 0.0):
-        for k in _holding(arena):
-            for along in (*_axes(arena, k), UP):
+        for k in _holding(arena, arm):
+            for along in (*_axes(arena, arm, k), UP):
                 for period in (0.3, 0.6):
                     shake = Macro("shake", "", (*map(float, along), spin, period, 3.0))
                     yield Attempt(RETRY, (shake, Macro("wait", "", (0.5,))), k)
 
 
-def dropped_again(arena: Arena) -> Iterator[Attempt]:
+def dropped_again(arena: Arena, arm: Arm) -> Iterator[Attempt]:
     """Let go where the witness does, but elsewhere along the face beneath; caught as it comes back, let go again."""
-    for k, body in arena.trace.releases:
+    for k, body in arena.trace.releases(arm.number):
         for along in _tangents(arena, k, body):
             again = (Macro("release", "", (0.15, 0.0)), Macro("catch", body, (2.5,)), _move(along, STEP))
             moves = (_move(along, BEGIN), *again * CATCHES)
@@ -116,9 +124,9 @@ def shifted(arena: Arena) -> Iterator[Attempt]:
 # --- what to try it on ------------------------------------------------------------------------
 
 
-def _pairs(arena: Arena) -> Iterator[tuple[Solid, Solid]]:
+def _pairs(arena: Arena, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
     """What may be taken and what it may be brought to, those that matter in the witness first."""
-    taken, targets = handles(arena.solids, arena.suction), _targets(arena)
+    taken, targets = handles(arena.solids, arm.suction), _targets(arena)
     known = arena.trace.handled
     ranked = sorted(taken, key=lambda solid: known.index(solid.body) if solid.body in known else len(known))
     found = [(i + k, one, other) for i, one in enumerate(ranked) for k, other in enumerate(targets)]
@@ -135,9 +143,9 @@ def _targets(arena: Arena) -> list[Solid]:
     return sorted(found, key=lambda solid: (solid.name != solid.body, order[solid.name]))
 
 
-def _picks(arena: Arena, solid: Solid) -> list[Macro]:
+def _picks(arena: Arena, arm: Arm, solid: Solid) -> list[Macro]:
     arena.rewind()
-    fits = [0] if arena.suction else sides(arena.world, arena.solids, solid)[:1]
+    fits = [0] if arm.suction else sides(arena.world, arena.solids, solid)[:1]
     return [Macro("pick", solid.name, (0.6, 0.0, float(which), 0.2)) for which in fits]
 
 
@@ -148,18 +156,18 @@ def _angles(arena: Arena, solid: Solid) -> list[float]:
     return [angle + turn for angle in angles for turn in (0.0, math.pi)]
 
 
-def _holding(arena: Arena) -> list[int]:
+def _holding(arena: Arena, arm: Arm) -> list[int]:
     """Stages of the witness at which something has been in the hand for a whole phase, the middle one first."""
-    stages = arena.trace.stages[: arena.phases]
-    found = [k for k in range(1, len(stages)) if stages[k].holds and stages[k - 1].holds]
-    found = found or [k for k in range(1, len(stages)) if stages[k].holds]
+    holds = [stage.holds[arm.number] for stage in arena.trace.stages[: arena.phases]]
+    found = [k for k in range(1, len(holds)) if holds[k] and holds[k - 1]]
+    found = found or [k for k in range(1, len(holds)) if holds[k]]
     return sorted(found, key=lambda k: abs(k - found[len(found) // 2]))[:3]
 
 
-def _axes(arena: Arena, k: int) -> Sequence[Vec3]:
+def _axes(arena: Arena, arm: Arm, k: int) -> Sequence[Vec3]:
     """The level axes of what is held at a stage, the longer one last."""
     arena.rewind(k)
-    body = arena.trace.stages[k].holds
+    body = arena.trace.stages[k].holds[arm.number]
     assert body is not None
     return [along for along, _ in arena.solids[body].level_axes(arena.world)]
 

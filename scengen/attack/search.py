@@ -221,4 +221,4 @@ def _first(attempt: Attempt) -> tuple[int | None, str, str]:
         return attempt.stage, "", ""
     one = attempt.macros[0]
     what = str(one.numbers) if one.kind in ("follow", "answer", "shake", "turn", "move") else one.target
-    return attempt.stage, one.kind, what
+    return attempt.stage, f"{one.kind} {one.arm}", what

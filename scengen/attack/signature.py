@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import Vec3
-from ..robots.panda import Names
 from ..sim.world import ROBOT, World
 
 MOVES = 0.005
 """How far the centre of mass of a body goes that counts as moved [m]."""
 
 Pair = tuple[str, str]
-"""Names of two bodies in alphabetical order; the whole robot is `ROBOT`."""
+"""Names of two bodies in alphabetical order; see `robots` for the robot."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def pairs(world: World) -> frozenset[Pair]:
     names = scene_bodies(world)
     loose = [i for i in names if world.model.body_weldid[i] != 0]
     for i in loose:
-        for k, name in [*names.items(), (world.model.nbody, ROBOT)]:
+        for k, name in [*names.items(), *robots(world).items()]:
             if i != k and touched[i, k]:
                 found.add((min(names[i], name), max(names[i], name)))
     return frozenset(found)
@@ -62,6 +61,14 @@ def pairs(world: World) -> frozenset[Pair]:
 
 def scene_bodies(world: World) -> dict[int, str]:
     """Names of all bodies by number, without the robot's and without the floor."""
-    model = world.model
-    robot = model.body_rootid[model.body(Names().base).id]
-    return {b: model.body(b).name for b in range(1, model.nbody) if model.body_rootid[b] != robot}
+    return {b: world.model.body(b).name for b in range(1, world.model.nbody) if b not in world.own}
+
+
+def robots(world: World) -> dict[int, str]:
+    """What stands for the robot in pairs, by its row in the table of contacts: `ROBOT`; of two arms, the label of each.
+
+    Which arm has touched a thing belongs to how a goal was reached: one that does the work of both is a way around.
+    """
+    if len(world.arms) == 1:
+        return {len(world.loop.touched) - 1: ROBOT}
+    return {world.model.nbody + k: arm.label for k, arm in enumerate(world.arms)}

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..geometry import UP, Mat3, Outline, Vec3, corners, gap
 from ..robots.jaw import FINGER, OPENED, PALM_ABOVE, SPAN
-from ..robots.panda import Names
-from ..sim.world import ROBOT, World
+from ..sim.world import Arm, World
 
 TABLE = "table"
 PARTS = 6
@@ -125,23 +124,21 @@ def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
     return sorted(rooms, key=lambda which: -rooms[which])
 
 
-def held(world: World) -> str | None:
+def held(arm: Arm) -> str | None:
     """The free body in the hand: between fingers that are closed but apart, or on a cup that is sealed."""
-    arm = world.arm
-    fingers = arm.finger_pos
+    world, fingers = arm.world, arm.finger_pos
     if arm.grip < 0 or not (abs(float(fingers[0] - fingers[1])) > EMPTY if len(fingers) else arm.sealed):
         return None
-    touched = [body for body in world.free_bodies if world.touching(ROBOT, body)]
+    touched = [body for body in world.free_bodies if world.touching(arm.label, body)]
     return min(touched, key=lambda body: float(np.linalg.norm(world.com(body) - arm.hand)), default=None)
 
 
 def _bodies(world: World) -> list[int]:
     """Every body of the scene that stands for itself: not of the robot, not the floor, no part of a free body."""
     model = world.model
-    robot = model.body(Names().base).id
-    own = [b for b in range(1, model.nbody) if model.body_rootid[b] != model.body_rootid[robot]]
+    scene = [b for b in range(1, model.nbody) if b not in world.own]
     free = {world.body(name) for name in world.free_bodies}
-    return [b for b in own if not any(a in free for a in _ancestors(world, b))]
+    return [b for b in scene if not any(a in free for a in _ancestors(world, b))]
 
 
 def _ancestors(world: World, body: int) -> list[int]:

@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import Loop
+from ..control.loop import ACTION, Loop
 from ..control.teleop import ALPHA, MOTION
 from ..episode import Actions, Episode
 from ..geometry import Mat3, Vec3, between, rotation
 from ..scenario import Plan, Scenario
 from ..sim.world import ROBOT, World
-from ..skills.motion import STEP, STIFFNESS, go_to
+from ..skills.motion import STEP, STIFFNESS, go_to, together
 from .macros import CLOSE, Macro
-from .signature import Pair, Signature, pairs, signature, starts
+from .signature import Pair, Signature, pairs, robots, signature, starts
 from .solids import held
 
 SHORTEST = 0.20
@@ -38,8 +38,8 @@ class Stage:
     held: float
     """How long the goal has held [s]."""
     signature: Signature
-    holds: str | None
-    """The free body in the hand; see `solids.held`."""
+    holds: tuple[str | None, ...]
+    """The free body in each hand; see `solids.held`."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,17 @@ class Trace:
 
     actions: Actions
     hands: NDArray[np.float64]
-    """Where the hand was before each action and after the last one [m], shape (n + 1, 3)."""
+    """Where each hand was before each action and after the last one [m], shape (n + 1, arms, 3)."""
     rots: NDArray[np.float64]
-    """Its orientation, shape (n + 1, 3, 3)."""
+    """Their orientations, shape (n + 1, arms, 3, 3)."""
     stages: tuple[Stage, ...]
     """Beginnings of phases in order, and the end: phase k goes from stage k to stage k + 1."""
     signature: Signature
     """When the goal was reached."""
     events: tuple[tuple[int, Pair], ...]
     """Contacts that there were none of at the start: the row of the first one of each, in order."""
+    _robots: frozenset[str]
+    """What stands for the robot in them."""
 
     @property
     def phases(self) -> list[tuple[int, int]]:
@@ -67,32 +69,31 @@ class Trace:
     @property
     def handled(self) -> tuple[str, ...]:
         """Bodies that the robot touched, in that order."""
-        pairs = [pair for _, pair in self.events if ROBOT in pair]
-        return tuple(one if other == ROBOT else other for one, other in pairs)
+        touched = [body for _, pair in self.events if self._robots & {*pair} for body in pair]
+        return tuple(dict.fromkeys(body for body in touched if body not in self._robots))
 
     @property
     def concerned(self) -> tuple[str, ...]:
         """Bodies that touched anything new, the latest one first: they are nearest to the goal."""
-        bodies = [body for _, pair in reversed(self.events) for body in pair if body != ROBOT]
+        bodies = [body for _, pair in reversed(self.events) for body in pair if body not in self._robots]
         return tuple(dict.fromkeys(bodies))
 
-    @property
-    def releases(self) -> tuple[tuple[int, str], ...]:
-        """Stages at which the gripper opens, each with the body that it lets go of."""
-        opens = [(k, s) for k, s in enumerate(self.stages[1:-1], 1) if self.actions[s.row][6] <= 0]
-        return tuple((k, s.holds) for k, s in opens if s.holds and self.actions[s.row - 1][6] > 0)
+    def releases(self, arm: int) -> tuple[tuple[int, str], ...]:
+        """Stages at which the gripper of an arm opens, each with the body that it lets go of."""
+        grip = self.actions[:, ACTION * arm + ACTION - 1]
+        opens = [(k, s.row, s.holds[arm]) for k, s in enumerate(self.stages[1:-1], 1) if grip[s.row] <= 0]
+        return tuple((k, body) for k, row, body in opens if body and grip[row - 1] > 0)
 
 
 def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
     """Replay a witness and take it apart; None if it does not reach the goal."""
     world.reset()
     start, episode = starts(world), Episode(scenario, world)
-    hands, rots, marks, events = [world.arm.hand], [world.arm.hand_rot], [_Mark.of(world)], list[tuple[int, Pair]]()
+    poses, marks, events = [_poses(world)], [_Mark.of(world)], list[tuple[int, Pair]]()
     states = [(world.state(), 0.0, signature(world, start))]
     for action in actions:
         outcome = episode.step(action)
-        hands.append(world.arm.hand)
-        rots.append(world.arm.hand_rot)
+        poses.append(_poses(world))
         marks.append(_Mark.of(world))
         states.append((world.state(), episode.held, signature(world, start)))
         events += [(len(marks) - 2, pair) for pair in sorted(marks[-1].touched[1] - marks[-2].touched[1])]
@@ -100,32 +101,38 @@ def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
             break
     if episode.outcome != "success":
         return None
-    left, rows = signature(world, start), actions[: len(hands) - 1]
-    cuts = _cuts(marks, np.array(hands))
-    stages = tuple(Stage(row, *states[row], marks[row].holds) for row in cuts)
-    return Trace(rows, np.array(hands), np.array(rots), stages, left, tuple(events))
+    left, rows = signature(world, start), actions[: len(poses) - 1]
+    hands, rots = (np.array(of_all) for of_all in zip(*poses, strict=True))
+    stages = tuple(Stage(row, *states[row], marks[row].holds) for row in _cuts(marks, hands))
+    return Trace(rows, hands, rots, stages, left, tuple(events), frozenset(robots(world).values()))
+
+
+def _poses(world: World) -> tuple[list[Vec3], list[Mat3]]:
+    """Where the hands are, and their orientations."""
+    return [arm.hand for arm in world.arms], [arm.hand_rot for arm in world.arms]
 
 
 @dataclass(frozen=True)
 class _Mark:
     """What is compared from one period to the next to find where a phase ends."""
 
-    closed: bool
-    """Whether the gripper is told to close."""
+    closed: tuple[bool, ...]
+    """Whether each gripper is told to close."""
     touched: tuple[bool, frozenset[Pair]]
     """Whether the robot touches a free body, and all contacts since the start."""
-    holds: str | None
+    holds: tuple[str | None, ...]
 
     @classmethod
     def of(cls, world: World) -> "_Mark":
         touches = any(world.touching(ROBOT, body) for body in world.free_bodies)
-        return cls(world.arm.grip > 0, (touches, pairs(world)), held(world))
+        closed, holds = tuple(arm.grip > 0 for arm in world.arms), tuple(map(held, world.arms))
+        return cls(closed, (touches, pairs(world)), holds)
 
 
 def _cuts(marks: list[_Mark], hands: NDArray[np.float64]) -> list[int]:
-    """Rows at which phases begin, the end included: changes of gripper and contacts, and pauses of the hand."""
+    """Rows at which phases begin, the end included: changes of gripper and contacts, and pauses of all hands."""
     end, least = len(marks) - 1, round(SHORTEST / Loop.PERIOD)
-    speed = np.linalg.norm(np.diff(hands, axis=0), axis=1) / Loop.PERIOD
+    speed = np.linalg.norm(np.diff(hands, axis=0), axis=2).max(axis=1) / Loop.PERIOD
     grips = {i - 1 for i in range(2, end) if marks[i].closed != marks[i - 1].closed}
     touches = {i for i in range(1, end) if marks[i].touched != marks[i - 1].touched}
     pauses = {i for i in range(1, end) if speed[i] >= SLOW > speed[i - 1]}
@@ -145,42 +152,48 @@ def _cuts(marks: list[_Mark], hands: NDArray[np.float64]) -> list[int]:
 
 
 def follow(world: World, path: Trace, macro: Macro) -> Plan:
-    """A stretch of a witness once more, from wherever the hand is.
+    """A stretch of a witness once more, from wherever the hands are.
 
     Numbers of the macro: first row, last row, pace, 1 for mirrored left for right, displacement of the whole [m].
-    What the witness asked for is asked for again; the hand is kept to the way by feedback.
+    What the witness asked for is asked for again; the hands are kept to the way by feedback.
     """
     first, last, pace, mirrored, *shift = macro.numbers
-    arm, begin, end = world.arm, round(first), round(last)
-    base, sign = path.hands[begin] + np.array(shift), MIRROR if mirrored else np.ones(3)
-    if float(np.linalg.norm(base - arm.hand)) > AWAY:
-        yield from go_to(arm, base, path.rots[begin], CLOSE, float(path.actions[max(begin - 1, 0)][6]))
+    begin, end = round(first), round(last)
+    sign = MIRROR if mirrored else np.ones(3)
+    bases, before = path.hands[begin] + np.array(shift), path.actions[max(begin - 1, 0)].reshape(-1, ACTION)
+    way = [
+        go_to(arm, base, rot, CLOSE, float(grip)) if float(np.linalg.norm(base - arm.hand)) > AWAY else None
+        for arm, base, rot, grip in zip(world.arms, bases, path.rots[begin], before[:, -1], strict=True)
+    ]
+    yield from together(world, *way)
     now = float(begin)
     while now < end:
         row = min(int(now), end - 1)
-        aim = base + sign * (path.hands[row] - path.hands[begin])
-        turn = between(arm.hand_rot, _aim(path, begin, row, sign))
-        asked = np.array(path.actions[row], float)
-        asked[:3] = pace * sign * asked[:3] + STIFFNESS * (aim - arm.hand) / STEP[:3]
-        asked[3:6] = turn / STEP[3:] if pace != 1 or mirrored else asked[3:6] + turn / STEP[3:] / 2
-        asked[:6] = np.clip(asked[:6], -1.0, 1.0)
-        yield asked
+        wanted = np.array(path.actions[row], float)
+        for arm, base, asked in zip(world.arms, bases, wanted.reshape(-1, ACTION), strict=True):
+            aim = base + sign * (path.hands[row, arm.number] - path.hands[begin, arm.number])
+            rots = path.rots[:, arm.number]
+            turn = between(arm.hand_rot, _aim(rots[begin], rots[row], sign))
+            asked[:3] = pace * sign * asked[:3] + STIFFNESS * (aim - arm.hand) / STEP[:3]
+            asked[3:6] = turn / STEP[3:] if pace != 1 or mirrored else asked[3:6] + turn / STEP[3:] / 2
+            asked[:6] = np.clip(asked[:6], -1.0, 1.0)
+        yield wanted
         now += pace
 
 
-def _aim(path: Trace, begin: int, row: int, sign: Vec3) -> Mat3:
-    """Where the hand is to point, mirrored about the beginning of the stretch if asked for."""
+def _aim(begin: Mat3, now: Mat3, sign: Vec3) -> Mat3:
+    """Where a hand is to point, mirrored about the beginning of the stretch if asked for."""
     if sign[1] > 0:
-        return path.rots[row]
-    return rotation(-sign * between(path.rots[begin], path.rots[row])) @ path.rots[begin]
+        return now
+    return rotation(-sign * between(begin, now)) @ begin
 
 
 def again(actions: Actions, raw: bool) -> Plan:
     """Recorded actions once more: as they were received, or as they must be asked for to come through the filter."""
-    before = np.zeros(MOTION)
+    before = np.zeros((actions.shape[1] // ACTION, MOTION))
     for action in np.asarray(actions, float):
-        asked = action.copy()
+        asked, motion = action.copy(), action.reshape(-1, ACTION)[:, :MOTION]
         if not raw:
-            asked[:MOTION] = np.clip(before + (action[:MOTION] - before) / ALPHA, -1.0, 1.0)
-        before = action[:MOTION]
+            asked.reshape(-1, ACTION)[:, :MOTION] = np.clip(before + (motion - before) / ALPHA, -1.0, 1.0)
+        before = motion
         yield asked
