@@ -16,7 +16,7 @@ from rich.table import Table
 
 from . import config
 from .control import native
-from .control.loop import Loop
+from .control.loop import ACTION, Loop
 from .envs.gym import PoolEnv
 from .episode import Actions
 from .pictures.render import NoPictures
@@ -24,12 +24,14 @@ from .pool import Pool, PoolRow
 from .robots import panda
 from .runs.generate import Settings, generate
 from .sim import scene_text
-from .sim.world import World
+from .sim.world import JAW, World
 from .validate.rollout import Rollout, run
 from .validate.settings import QUICK
 
 LIMITS = {
     "rollout_to_raw": (1.25, "at most"),
+    "two_arms_to_raw": (1.25, "at most"),
+    "two_arms_to_one": (2.3, "at most"),
     "robosuite_to_ours": (8.0, "at least"),
     "scenario_to_first_step_ms": (20.0, "at most"),
     "env_step_to_raw": (1.4, "at most"),
@@ -51,6 +53,7 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
     """
     result = {
         "rollout_to_raw": rollout_to_raw(repeats),
+        **two_arms(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
         **gym_costs(repeats),
@@ -58,6 +61,8 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
     table = Table("measure", "value", "limit", "what", title="bench", title_justify="left")
     told = {
         "rollout_to_raw": "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
+        "two_arms_to_raw": "a control period of two arms (controllers, contacts) / mj_step of the same states",
+        "two_arms_to_one": "a control period of two arms / of one in the same scene, each arm moving alike",
         "robosuite_to_ours": "robosuite's env.step / our control period, on the same compiled Lift model",
         "scenario_to_first_step_ms": "from parameter values to the first physics step, warm (ms)",
         "env_step_to_raw": "the Gymnasium environment's step, proprioception only / mj_step of the same states",
@@ -85,6 +90,30 @@ def rollout_to_raw(repeats: int) -> float:
 
     raw = _bare(world, rollout().actions)
     return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
+
+
+def two_arms(repeats: int) -> dict[str, float]:
+    """A control period of two arms over the bare mj_step calls, and over a control period of one arm."""
+    text = scene_text.emit(config.task("domino_single").draw("id", 0, 0).scenario.build())[0]
+    one, two = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2))
+    single = _waving()
+    double = np.hstack([single, single])
+
+    def play(world: World, actions: Actions) -> Callable[[], None]:
+        def steps() -> None:
+            world.reset()
+            for action in actions:
+                world.apply(action)
+
+        return steps
+
+    alone, both, raw = play(one, single), play(two, double), _bare(two, double)
+    alone(), both()  # warm
+    found = [(_seconds(both), _seconds(alone), _seconds(raw)) for _ in range(repeats)]
+    return {
+        "two_arms_to_raw": statistics.median(pair / bare for pair, _, bare in found),
+        "two_arms_to_one": statistics.median(pair / lone for pair, lone, _ in found),
+    }
 
 
 def gym_costs(repeats: int) -> dict[str, float]:
@@ -178,7 +207,7 @@ def robosuite_to_ours(repeats: int) -> float:
     env = _lift()
     model = env.sim.model._model
     loop = Loop(model, mujoco.MjData(model), home=panda.HOME)
-    actions = 0.3 * np.sin(0.05 * np.arange(TICKS)[:, None] + np.arange(7)).astype(np.float32)
+    actions = _waving()
 
     def theirs() -> None:
         for action in actions:
@@ -227,6 +256,11 @@ def scenario_to_first_step(repeats: int) -> float:
         mujoco.mj_step(world.model, world.data)
         times.append(1000 * (time.perf_counter() - start))
     return statistics.median(times[2:])
+
+
+def _waving() -> Actions:
+    """Actions of one arm that moves about in the air, shape (TICKS, 7)."""
+    return 0.3 * np.sin(0.05 * np.arange(TICKS)[:, None] + np.arange(ACTION)).astype(np.float32)
 
 
 def _seconds(work: Callable[[], object]) -> float:
