@@ -6,7 +6,7 @@ from pathlib import Path
 from .. import config
 from ..attack.evidence import Hit
 from ..config import read, search_path
-from ..envs.observations import CAMERAS
+from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
@@ -39,7 +39,7 @@ class Settings:
     @property
     def eye(self) -> str | None:
         """The camera by its name in the model."""
-        return CAMERAS.get(self.camera, self.camera) if self.camera else None
+        return cameras_of(ALL).get(self.camera, self.camera) if self.camera else None
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that make no sense."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownName
-from ..robots.panda import JOINTS, Names
+from ..robots.panda import JOINTS, MOST_ARMS, Names
 from ..sim.world import JAW, Arm, World, hands
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
@@ -136,7 +136,11 @@ def proprioception(embodiment: str) -> tuple[str, ...]:
     return tuple(name for name in streams_of(embodiment) if name in poses)
 
 
-def check_names(names: Sequence[str], embodiment: str = JAW) -> None:
+ALL = "+".join([JAW] * MOST_ARMS)
+"""The robot that has every stream and camera that any has."""
+
+
+def check_names(names: Sequence[str], embodiment: str = ALL) -> None:
     """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera."""
     known = [*streams_of(embodiment), *cameras_of(embodiment)]
     for name in names:
