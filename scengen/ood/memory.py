@@ -3,7 +3,7 @@
 Played again as it is, a memory is open-loop replay. Object-centric, it is what MimicGen makes new demonstrations with
 (Mandlekar et al. 2023, arXiv:2310.17596): the path is cut where the hand turns to another body, each part is kept
 relative to that body, and it is followed by feedback wherever the body now is. Nobody annotates anything here: the cuts
-follow from contacts.
+follow from contacts. Of two arms each follows its own path.
 """
 
 import math
@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attack.solids import held
-from ..control.loop import Loop
+from ..control.loop import ACTION, Loop
 from ..episode import Actions
 from ..errors import GaveUp
 from ..geometry import Mat3, Vec3, about_z, between
-from ..robots.panda import Names
 from ..scenario import Plan
-from ..sim.world import ROBOT, World
-from ..skills.motion import STEP, STIFFNESS, Pace, go_to
+from ..sim.world import Arm, World
+from ..skills.motion import STEP, STIFFNESS, Pace, go_to, together
 
 ARRIVE = Pace(0.30, 0.01, 2.0)
 """How the hand is brought to where a part begins. If it does not get there in time the path goes on all the same."""
@@ -35,7 +34,7 @@ GROUND = {"world", "table"}
 
 @dataclass(frozen=True)
 class Part:
-    """A stretch of the path that belongs to one body."""
+    """A stretch of a hand's path that belongs to one body."""
 
     first: int
     """Row of its first action."""
@@ -48,20 +47,20 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What is kept of a rollout that reached its goal."""
+class Path:
+    """What one arm did."""
 
     actions: Actions
-    """As the controller received them."""
+    """Of this arm, shape (n, 7)."""
     hands: NDArray[np.float64]
     """Where the hand was before each action [m], shape (n, 3)."""
     rots: NDArray[np.float64]
     """Its orientation then, shape (n, 3, 3)."""
     parts: tuple[Part, ...]
 
-    def follow(self, world: World) -> Plan:
-        """The path again, each part relative to its body as it now is; actions are meant for the controller as are."""
-        arm, ends = world.arm, [*(part.first for part in self.parts[1:]), len(self.actions)]
+    def follow(self, arm: Arm) -> Plan:
+        """The path again, each part relative to its body as it now is."""
+        world, ends = arm.world, [*(part.first for part in self.parts[1:]), len(self.actions)]
         for part, end in zip(self.parts, ends, strict=True):
             turn, origin = np.eye(3), part.pos
             if part.body is not None:
@@ -83,29 +82,49 @@ class Memory:
         return float(self.actions[row - 1][6]) if row else -1.0
 
 
+@dataclass(frozen=True)
+class Memory:
+    """What is kept of a rollout that reached its goal."""
+
+    actions: Actions
+    """As the controller received them."""
+    paths: tuple[Path, ...]
+    """Of every arm."""
+
+    def follow(self, world: World) -> Plan:
+        """The paths of all arms again; actions are meant for the controller as they are."""
+        yield from together(world, *(path.follow(arm) for path, arm in zip(self.paths, world.arms, strict=True)))
+
+
 def remember(world: World, actions: Actions) -> Memory:
     """Play a solution again in its own world, and keep what an object-centric memory keeps."""
     world.reset()
-    poses, hands, rots, aims = [], [], [], _Aims(world)
+    poses, bodies = list[dict[str, tuple[Vec3, Mat3]]](), _bodies(world)
+    hands, every = list[list[tuple[Vec3, Mat3]]](), [_Aims(arm, bodies) for arm in world.arms]
     for action in actions:
-        poses.append({body: (world.pos(body), world.rot(body)) for body in aims.bodies})
-        hands.append(world.arm.hand)
-        rots.append(world.arm.hand_rot)
+        poses.append({body: (world.pos(body), world.rot(body)) for body in bodies})
+        hands.append([(arm.hand, arm.hand_rot) for arm in world.arms])
         world.apply(action)
-        aims.look()
-    parts = list[Part]()
-    for row, body in enumerate(_next(aims.touched)):
-        if not parts or parts[-1].body != body:
-            pos, rot = poses[row][body] if body else (np.zeros(3), np.eye(3))
-            parts.append(Part(row, body, pos, rot))
-    return Memory(actions, np.array(hands), np.array(rots), tuple(parts))
+        for aims in every:
+            aims.look()
+    paths = list[Path]()
+    for number, aims in enumerate(every):
+        parts = list[Part]()
+        for row, body in enumerate(_next(aims.touched)):
+            if not parts or parts[-1].body != body:
+                pos, rot = poses[row][body] if body else (np.zeros(3), np.eye(3))
+                parts.append(Part(row, body, pos, rot))
+        own = actions[:, ACTION * number : ACTION * (number + 1)]
+        where, rots = (np.array(of_all) for of_all in zip(*(row[number] for row in hands), strict=True))
+        paths.append(Path(own, where, rots, tuple(parts)))
+    return Memory(actions, tuple(paths))
 
 
 class _Aims:
-    """Watches what the hand goes to: what it touches, what touches that which it carries, where that falls to."""
+    """Watches what a hand goes to: what it touches, what touches that which it carries, where that falls to."""
 
-    def __init__(self, world: World):
-        self.world, self.bodies = world, _bodies(world)
+    def __init__(self, arm: Arm, bodies: list[str]):
+        self.arm, self.world, self.bodies = arm, arm.world, bodies
         self.touched = list[str | None]()
         """The body touched in each control period."""
         self.in_hand: str | None = None
@@ -118,13 +137,13 @@ class _Aims:
 
     def look(self) -> None:
         """Note what the control period that has passed shows."""
-        world, row, body = self.world, len(self.touched), held(self.world)
+        world, row, body = self.world, len(self.touched), held(self.arm)
         if body != self.in_hand:
             if self._carried:
                 self.leaving, self.falling = self.in_hand, (str(self.in_hand), row)
             self.in_hand, self.periods = body, 0
         self.periods += 1
-        robot, carried = world.touching_bodies(ROBOT), self._carried
+        robot, carried = world.touching_bodies(self.arm.label), self._carried
         if self.leaving not in robot:
             self.leaving = None
         found = robot | (world.touching_bodies(carried) if carried else set())
@@ -145,7 +164,7 @@ class _Aims:
         touched = [body for body in self.bodies if body in found]
         if self.touched and self.touched[-1] in touched:
             return self.touched[-1]
-        hand = self.world.arm.hand
+        hand = self.arm.hand
         return min(touched, key=lambda body: float(np.linalg.norm(self.world.com(body) - hand)), default=None)
 
 
@@ -165,7 +184,5 @@ def _upright(turn: Mat3) -> Mat3:
 
 def _bodies(world: World) -> list[str]:
     """Names of all bodies of the scene that somebody may go to."""
-    model = world.model
-    robot = model.body(Names().base).id
-    names = [model.body(i).name for i in range(model.nbody) if model.body_rootid[i] != robot]
+    names = [world.model.body(i).name for i in range(world.model.nbody) if i not in world.own]
     return [name for name in names if name and name not in GROUND]
