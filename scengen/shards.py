@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from . import columns, schema
 from .control.loop import ACTION
 from .errors import PoolError
-from .sim.world import action_size
 
 FORMAT = 3
 GROUP_ROWS = 1000
@@ -108,7 +107,7 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]], witnesses: Sequence[NDA
 
 
 def _table(rows: Sequence[Mapping[str, Any]], witnesses: Sequence[NDArray[np.float32]]) -> pa.Table:
-    size = action_size(rows[0]["embodiment"]) if rows else ACTION
+    size = witnesses[0].shape[1] if witnesses else ACTION
     of = SCHEMAS[size]
     plain = pa.Table.from_pylist([{**row, "witness": None} for row in rows], schema=of)
     offsets = np.cumsum([0, *map(len, witnesses)], dtype=np.int32)
