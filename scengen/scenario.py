@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .assets.prop import TABLE_HALF
 from .errors import NoOracle
 from .params import canonical, check_bounds
-from .robots.panda import REACH, SHOULDER
+from .robots.panda import BASE, REACH, SHOULDER
 from .sim.world import World
 from .symmetry import Symmetry
 
@@ -82,9 +82,16 @@ def on_table(what: str, points: ArrayLike, margin: float = 0.0) -> Refutation | 
     return require(far <= TABLE_HALF - margin, f"{what} leaves the table", farthest=far, edge=TABLE_HALF - margin)
 
 
-def within_reach(what: str, *points: ArrayLike) -> Refutation | None:
-    """Require that the grip site can come to each point [m], by a bound that no posture exceeds (`panda.REACH`)."""
-    away = max(float(np.linalg.norm(np.asarray(point, float) - SHOULDER)) for point in points)
+def within_reach(what: str, *points: ArrayLike, base: NDArray[np.float64] = BASE) -> Refutation | None:
+    """Require that the grip site can come to each point [m], by a bound that no posture exceeds (`panda.REACH`).
+
+    Args:
+        what: names the points.
+        points: in world axes.
+        base: where the arm in question stands [m]; one arm in the middle by default, else see `panda.bases`.
+    """
+    shoulder = SHOULDER + base - BASE
+    away = max(float(np.linalg.norm(np.asarray(point, float) - shoulder)) for point in points)
     return require(away <= REACH, f"{what} is out of reach", distance=away, reach=REACH)
 
 

@@ -1,0 +1,75 @@
+"""A shelf with one slot: two upright dividers on a base, chamfered at the mouth between them."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+
+MESH = mujoco.mjtGeom.mjGEOM_MESH
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlotShelf(Prop):
+    """What stands in the slot stands across x, between the dividers. The origin is the middle of the foot.
+
+    \\  | . |  /        The mouth is wider than the gap by a chamfer on each side: what comes down beside the
+     | |   | |         middle is led in.
+     |_|___|_|
+    |__base___|
+    """
+
+    gap: float = param(0.046, "m", 0.010, 0.10)
+    """Between the dividers."""
+    height: float = param(0.140, "m", 0.02, 0.20)
+    """Of the dividers above the base, on which a thing in the slot stands."""
+    length: float = param(0.200, "m", 0.05, 0.30)
+    """Of the slot, along y."""
+    divider: float = param(0.018, "m", 0.012, 0.04)
+    """Thickness of a divider."""
+    chamfer: float = param(0.010, "m", 0.0, 0.012)
+    """Of the dividers' upper inner edges, at 45 deg."""
+    base: float = param(0.020, "m", 0.005, 0.04)
+    """Thickness of the base."""
+    friction: float = param(0.3, "1", 0.05, 1.5)
+    rgba: Rgba = (0.55, 0.42, 0.30, 1.0)
+
+    @property
+    def width(self) -> float:
+        """Along x [m]."""
+        return self.gap + 2 * self.divider
+
+    @property
+    def top(self) -> float:
+        """Height of the dividers' upper edges above the foot [m]."""
+        return self.base + self.height
+
+    @property
+    def half(self) -> NDArray[np.float64]:
+        """Half the lengths of the slot along x, y and z [m]."""
+        return np.array([self.gap, self.length, self.height]) / 2
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        half = self.length / 2
+        foot = [self.width / 2, half, self.base / 2]
+        solid(body, "base", foot, [0.0, 0.0, self.base / 2], friction=self.friction, rgba=self.rgba)
+        inner, outer = self.gap / 2, self.width / 2
+        profile = [
+            (inner, self.base),
+            (outer, self.base),
+            (outer, self.top),
+            (inner + self.chamfer, self.top),
+            (inner, self.top - self.chamfer),
+        ]
+        for name, side in (("near", -1.0), ("far", 1.0)):
+            corners = [[side * x, y, z] for x, z in profile for y in (-half, half)]
+            spec.add_mesh(name=name, uservert=np.array(corners).ravel().tolist())
+            wall = solid(body, name, (), type=MESH, friction=self.friction, rgba=self.rgba)
+            wall.meshname = name
+
+
+if __name__ == "__main__":
+    show(SlotShelf())

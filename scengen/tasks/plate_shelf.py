@@ -1,0 +1,337 @@
+"""T06 plate-shelf-hetbi: stand a plate on edge in the slot of a shelf, with a suction cup and a jaw.
+
+                                  | |   | |
+      ______            ______    | |   | |        The plate lies on its small foot, the slot is as wide as the plate
+      \\____\\__________/____/     | |   | |        is high. From the front the plate is as wide as the slot is long.
+    ------------------------------+-+---+-+---
+
+Bottleneck: neither hand can do it alone. The jaw cannot take the plate from the table: a hand level with the lip would
+have its palm under the table. The cup takes it by its broad face, but cannot follow it between the dividers, nor point
+far enough away from the robot to hold it upright there. So the cup lifts the plate and holds it out, the jaw takes the
+lip, the cup lets go, and the jaw turns the plate on edge and puts it in.
+
+Decisions, where the paper (App. B, T05 and T06) says no more than "cutlery plate", "slot" and "incline":
+
+* The plate is deep, on a small foot, with a level lip: its "slight incline". Its thickness and its two diameters in
+  training are of the paper's list (App. C); the others are axes.
+* The dividers are lower than the plate, so that the jaw that holds it by the lip never meets them, and higher than its
+  middle, so that a cup there does.
+* In the slot means: on edge within 10 deg, along the slot, with its middle between the dividers and its rim on the
+  slot's floor, and let go. Leaning against the shelf from outside is not.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from ..assets.plate import Plate
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.slot_shelf import SlotShelf
+from ..geometry import UP, Mat3, Vec3, corners, gap, shortest
+from ..params import param
+from ..predicates import fallen
+from ..robots import panda
+from ..robots.jaw import PAD, TIP, pinch
+from ..robots.suction import REACHES
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.world import ROBOT, Arm, World
+from ..skills import jaw, suction
+from ..skills.motion import (
+    COARSE,
+    OPEN,
+    STEADY,
+    Condition,
+    Pace,
+    alone,
+    closing_along,
+    facing_down,
+    go_to,
+    hold,
+    push,
+    retreat,
+    together,
+    turn_to,
+    until,
+)
+
+LEAN = math.radians(10.0)
+"""Largest angle between the plate's axis and the level, and between it and the slot's normal [rad]."""
+DEEP = 0.008
+"""Largest height of the rim's lowest point above the slot's floor [m]."""
+LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
+"""From the arm with the cup to the one with the jaw."""
+SIDEWAYS: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+"""The jaw's hand, level, points at the other arm; it closes up and down. Upside down it would run into joint 6."""
+FORWARDS: Mat3 = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""A hand that is level and points away from the robot."""
+MEETING: Vec3 = np.array([-0.05, 0.0, TABLE_TOP + 0.22])
+"""Where the plate changes hands [m]. The palm of a level hand that closes up and down reaches 0.104 m below the lip."""
+ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
+"""Where the cup's hand is out of the way [m]."""
+STAND_OFF, OVERLAP = 0.06, 0.010
+"""Distance of the open jaw from the lip before it moves in, and how far the lip then is beyond the grip site [m]."""
+OVER = 0.04
+"""Between the plate and the dividers before it is lowered [m]."""
+GENTLY = Pace(0.06, 0.002)
+"""Towards the lip: what pushes the plate peels it off the cup."""
+CLOSING = 0.45
+"""How long the jaw needs for something as thin as a plate [s]: `jaw.time_to_grip` at 2 mm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlateShelf(Scenario):
+    """A plate on the table and a shelf with a slot."""
+
+    HOLD = 0.5
+
+    plate_x: float = param(-0.08, "m", -0.3, 0.2)
+    plate_y: float = param(-0.06, "m", -0.35, 0.35)
+    shelf_x: float = param(0.14, "m", -0.1, 0.3)
+    shelf_y: float = param(0.0, "m", -0.3, 0.3)
+    shelf_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
+    plate: Plate = Plate()
+    shelf: SlotShelf = SlotShelf(height=0.130)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        return self._scene(self.plate, self.shelf)
+
+    def _scene(self, plate: Plate, shelf: SlotShelf) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, plate, "plate", self.start)
+        place(scene, shelf, "shelf", self.foot, math.radians(self.shelf_yaw), free=False)
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        return not world.touching(ROBOT, "plate") and self.on_edge(world) and self.within(world)
+
+    def on_edge(self, world: World) -> bool:
+        """Whether the plate stands on edge, along the slot."""
+        normal, across = world.rot("plate")[:, 2], world.rot("shelf")[:, 0]
+        return bool(abs(normal[2]) < math.sin(LEAN) and abs(normal @ across) > math.cos(LEAN))
+
+    def within(self, world: World) -> bool:
+        """Whether the plate's middle is between the dividers and its rim on the slot's floor."""
+        half = self.shelf.half
+        place = world.rot("shelf").T @ (self.middle(world) - self.foot) - self.shelf.base * UP
+        between = abs(place[0]) < half[0] and abs(place[1]) < half[1] and place[2] < self.shelf.height
+        return bool(between and self.lowest(world) - self.foot[2] - self.shelf.base < DEEP)
+
+    def middle(self, world: World) -> Vec3:
+        """The plate's middle now, at half its height [m]."""
+        return world.pos("plate") + self.plate.height / 2 * world.rot("plate")[:, 2]
+
+    def lowest(self, world: World) -> float:
+        """Height of the rim's lowest point now [m]."""
+        normal = world.rot("plate")[:, 2]
+        faces = (world.pos("plate")[2] + h * normal[2] for h in (self.plate.rise, self.plate.height))
+        return float(min(faces) - self.plate.radius * math.sqrt(1.0 - min(1.0, normal[2] ** 2)))
+
+    def failure(self, world: World) -> str | None:
+        return "the plate fell off the table" if fallen(world, "plate") else None
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Lift the plate with the cup, hand it over to the jaw, put it in with the jaw."""
+        giver, taker = world.arms
+        yield from together(world, self.present(giver), self.wait_beside(taker))
+        yield from self.hand_over(world)
+        yield from together(world, self.leave(giver), hold(taker, 0.0))
+        yield from alone(taker, self.put_on_edge(taker))
+        yield from alone(taker, self.put_in(taker))
+
+    def present(self, arm: Arm) -> Plan:
+        """Lift the plate with the cup and hold it out."""
+        yield from self.lift(arm)
+        yield from suction.carry(arm, "plate", MEETING, 0.0, Pace(0.20, 0.003))
+
+    def lift(self, arm: Arm) -> Plan:
+        """Suck the plate in its middle and lift it higher than the shelf."""
+        face = arm.world.pos("plate") + self.plate.thickness * UP
+        down = facing_down()
+        yield from go_to(arm, face + 0.03 * UP, down, STEADY, OPEN)
+        yield from suction.suck(arm, face, down)
+        high = arm.world.pos("plate") + (self.shelf.top + OVER) * UP
+        yield from suction.carry(arm, "plate", high, 0.0, Pace(0.15, 0.01))
+
+    def lip(self, world: World) -> Vec3:
+        """The leftmost point of the lip, at half its thickness, while the plate is level [m]."""
+        return world.pos("plate") + (self.plate.rise + self.plate.thickness / 2) * UP + self.plate.radius * LEFT
+
+    def wait_beside(self, arm: Arm) -> Plan:
+        """Bring the open jaw beside the place where the lip is going to be, and where it comes up."""
+        away = max(MEETING[1], self.plate_y) + self.plate.radius + STAND_OFF
+        high = MEETING[2] + self.plate.rise + self.plate.thickness / 2
+        yield from go_to(arm, [MEETING[0], away, high], SIDEWAYS, STEADY, OPEN)
+
+    def hand_over(self, world: World) -> Plan:
+        """The jaw takes the lip, then the cup lets go."""
+        giver, taker = world.arms
+        yield from alone(taker, go_to(taker, self.lip(world) + STAND_OFF * LEFT, SIDEWAYS, STEADY, OPEN))
+        yield from alone(taker, go_to(taker, self.lip(world) - OVERLAP * LEFT, SIDEWAYS, GENTLY, OPEN))
+        yield from alone(taker, jaw.grasp(taker, CLOSING))
+        yield from alone(giver, hold(giver, 0.15, OPEN))
+
+    def leave(self, arm: Arm) -> Plan:
+        """Up, and out of the way."""
+        yield from retreat(arm, 0.10)
+        yield from go_to(arm, ASIDE, pace=COARSE)
+
+    def put_on_edge(self, arm: Arm) -> Plan:
+        """Tip the hand down, so that the plate hangs under it, and then turn it: rolled first, it would swing."""
+        yield from turn_to(arm, facing_down(), 0.8)
+        yield from retreat(arm, 0.08, STEADY)
+        yield from turn_to(arm, closing_along(arm, arm.world.rot("shelf")[:, 0]), 1.2)
+
+    def put_in(self, arm: Arm) -> Plan:
+        """Over the slot, along it, down until the rim is on the floor; let go."""
+        world, shelf = arm.world, self.shelf
+        above = self.foot + (shelf.top + self.plate.radius + OVER) * UP
+        for pace in (STEADY, Pace(0.10, 0.004)):  # once more: what hangs in the pinch has swung
+            yield from self.bring(arm, above, pace)
+        floor = self.foot[2] + shelf.base
+        yield from push(arm, -0.06 * UP, lambda: self.lowest(world) < floor + DEEP / 2, give_up=6.0)
+        yield from jaw.release(arm)
+        yield from retreat(arm)
+
+    def bring(self, arm: Arm, target: Vec3, pace: Pace) -> Plan:
+        """Take the held plate's middle to `target` [m], its axis across the slot."""
+        world, rot = arm.world, arm.world.rot("plate")
+        across = world.rot("shelf")[:, 0]
+        turn = shortest(rot[:, 2], math.copysign(1.0, float(rot[:, 2] @ across)) * across)
+        com = target + turn @ (world.com("plate") - self.middle(world))
+        yield from jaw.carry(arm, "plate", com, turn @ rot, pace)
+
+    # --- what must not work ---------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "cup_alone_as_upright_as_it_goes": Shortcut(self._cup_alone),
+            "cup_alone_flat_on_the_slot": Shortcut(self._lay_flat),
+            "let_go_without_partner": Shortcut(self._let_go),
+            "jaw_alone": Shortcut(self._jaw_alone),
+            "jaw_inserts_flat": Shortcut(self._insert_flat),
+        }
+
+    def _cup_alone(self, world: World) -> Plan:
+        """Turn the plate as upright as the cup's hand goes, lower it into the slot until something stops it, let go."""
+        arm = world.arms[0]
+        above = self.foot + (self.shelf.top + self.plate.radius + OVER) * UP
+
+        def plan() -> Plan:
+            yield from self.lift(arm)
+            yield from suction.carry(arm, "plate", above - 0.08 * np.array([1.0, 0.0, 0.0]), 0.0, Pace(0.15, 0.02))
+            yield from until(turn_to(arm, FORWARDS, 0.8, give_up=9.0), _after(world, 3.0))
+            yield from until(
+                go_to(arm, arm.hand + above - self.middle(world), pace=Pace(0.15, 0.005)), _after(world, 4.0)
+            )
+            yield from push(arm, -0.05 * UP, _after(world, 4.0), give_up=5.0)
+            yield from suction.let_go(arm)
+
+        yield from alone(arm, plan())
+
+    def _lay_flat(self, world: World) -> Plan:
+        """Lay the plate over the slot with the cup, in the hope that it falls in."""
+        arm = world.arms[0]
+
+        def plan() -> Plan:
+            yield from self.lift(arm)
+            above = self.foot + (self.shelf.top + 0.02) * UP
+            yield from suction.carry(arm, "plate", above, 0.0, Pace(0.20, 0.01))
+            yield from suction.let_go(arm)
+
+        yield from alone(arm, plan())
+
+    def _let_go(self, world: World) -> Plan:
+        """Hold the plate out, and let go while nobody has it."""
+        giver, taker = world.arms
+        yield from together(world, self.present(giver), self.wait_beside(taker))
+        yield from alone(giver, suction.let_go(giver))
+        yield from alone(taker, self.put_on_edge(taker))
+
+    def _jaw_alone(self, world: World) -> Plan:
+        """Come down across the plate's lip with the jaw, and lift."""
+        arm = world.arms[1]
+        rim = world.pos("plate") + (self.plate.radius - self.plate.lip) * LEFT + (self.plate.rise + TIP) * UP
+        yield from alone(arm, jaw.pick(arm, rim, closing=LEFT, lift=0.2))
+        yield from alone(arm, go_to(arm, self.foot + (self.shelf.top + self.plate.radius + OVER) * UP))
+        yield from alone(arm, jaw.release(arm))
+
+    def _insert_flat(self, world: World) -> Plan:
+        """Hand the plate over, and lower it on the slot without turning it on edge."""
+        giver, taker = world.arms
+        yield from together(world, self.present(giver), self.wait_beside(taker))
+        yield from self.hand_over(world)
+        yield from alone(giver, self.leave(giver))
+        here = self.foot + (self.shelf.top + 0.01) * UP - self.middle(world)
+        yield from alone(taker, go_to(taker, taker.hand + here, pace=Pace(0.15, 0.01)))
+        yield from alone(taker, jaw.release(taker))
+        yield from alone(taker, go_to(taker, taker.hand + STAND_OFF * LEFT))
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        return {
+            "holed_plate": self._scene(replace(self.plate, hole=0.020), self.shelf),
+            "closed_slot": self._scene(self.plate, replace(self.shelf, gap=0.010)),
+        }
+
+    # --- what must hold -------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        plate, shelf = self.plate, self.shelf
+        yield on_table("the plate", corners(self.start, 0.0, 2 * [2 * plate.radius]))
+        yield on_table("the shelf", self._outline)
+        apart = gap(self._outline, corners(self.start, 0.0, 2 * [2 * plate.radius]))
+        yield require(apart > 0.01, "plate and shelf stand in each other's place", apart=apart)
+        flat = plate.foot - math.sqrt(2.0) * REACHES
+        yield require(flat > 0.01, "the cup does not fit on the plate's foot", room=flat)
+        slack = shelf.gap - plate.height
+        yield require(slack > 0.004, "the plate is higher than the slot is wide", slack=slack)
+        above = 2 * plate.radius - OVERLAP - TIP - shelf.height
+        yield require(above > 0.005, "the jaw that holds the lip meets the dividers", above=above)
+        stem = shelf.height - plate.radius
+        yield require(stem > 0.005, "the cup in the plate's middle does not meet the dividers", above=stem)
+        grip, weight = plate.friction * pinch(plate.thickness), 9.81 * plate.mass
+        yield require(grip > 2 * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
+        right, left = panda.bases(2)
+        yield within_reach("the plate", self.start, base=right)
+        yield within_reach("the slot", self.foot + (shelf.top + 2 * plate.radius + OVER) * UP, base=left)
+
+    def features(self) -> Mapping[str, float]:
+        plate = self.plate
+        lever = plate.radius - OVERLAP
+        return {
+            "slack": self.shelf.gap - plate.height,
+            "droop": 9.81 * plate.mass * lever / (pinch(plate.thickness) * PAD / 2),
+            "radius": plate.radius,
+            "carried": float(np.linalg.norm(self.foot - self.start)),
+            "slot_yaw": math.radians(self.shelf_yaw),
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def start(self) -> Vec3:
+        """Where the plate stands [m]."""
+        return np.array([self.plate_x, self.plate_y, TABLE_TOP])
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the shelf stands [m]."""
+        return np.array([self.shelf_x, self.shelf_y, TABLE_TOP])
+
+    @property
+    def _outline(self) -> np.ndarray:
+        return corners(self.foot, math.radians(self.shelf_yaw), (self.shelf.width, self.shelf.length))
+
+
+def _after(world: World, seconds: float) -> Condition:
+    """Holds from some time on: for moves that may not come to their end."""
+    end = world.time + seconds
+    return lambda: world.time > end
