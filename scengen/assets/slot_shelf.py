@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..params import param
-from .prop import Prop, Rgba, show, solid
+from .prop import PRIORITY, Prop, Rgba, show, solid
 
 MESH = mujoco.mjtGeom.mjGEOM_MESH
 
@@ -24,7 +24,7 @@ class SlotShelf(Prop):
 
     gap: float = param(0.046, "m", 0.010, 0.10)
     """Between the dividers."""
-    height: float = param(0.140, "m", 0.02, 0.20)
+    height: float = param(0.140, "m", 0.02, 0.28)
     """Of the dividers above the base, on which a thing in the slot stands."""
     length: float = param(0.200, "m", 0.05, 0.30)
     """Of the slot, along y."""
@@ -34,7 +34,8 @@ class SlotShelf(Prop):
     """Of the dividers' upper inner edges, at 45 deg."""
     base: float = param(0.020, "m", 0.005, 0.04)
     """Thickness of the base."""
-    friction: float = param(0.3, "1", 0.05, 1.5)
+    friction: float = param(0.1, "1", 0.02, 1.5)
+    """Polished: its own counts, whatever touches it, and nothing sticks fast between the dividers."""
     rgba: Rgba = (0.55, 0.42, 0.30, 1.0)
 
     @property
@@ -55,7 +56,8 @@ class SlotShelf(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half = self.length / 2
         foot = [self.width / 2, half, self.base / 2]
-        solid(body, "base", foot, [0.0, 0.0, self.base / 2], friction=self.friction, rgba=self.rgba)
+        look = {"friction": self.friction, "rgba": self.rgba, "priority": PRIORITY + 1}
+        solid(body, "base", foot, [0.0, 0.0, self.base / 2], **look)
         inner, outer = self.gap / 2, self.width / 2
         profile = [
             (inner, self.base),
@@ -67,7 +69,7 @@ class SlotShelf(Prop):
         for name, side in (("near", -1.0), ("far", 1.0)):
             corners = [[side * x, y, z] for x, z in profile for y in (-half, half)]
             spec.add_mesh(name=name, uservert=np.array(corners).ravel().tolist())
-            wall = solid(body, name, (), type=MESH, friction=self.friction, rgba=self.rgba)
+            wall = solid(body, name, (), type=MESH, **look)
             wall.meshname = name
 
 

@@ -1,0 +1,150 @@
+"""A plate stands in the slot if it stands there, it takes both arms to put it there, and dropping it breaks it."""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from controls import (
+    ablated,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    play_shortcut,
+    solution,
+    unchecked,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.prop import TABLE_TOP
+from scengen.geometry import UP, rotation
+from scengen.params import values, with_values
+from scengen.tasks.plate_shelf import ALONG, BREAKS, DEEP, LEAN, PlateShelf
+from scengen.validate.rollout import replay
+
+TASK = config.task("plate_shelf_hetbi")
+NOMINAL = PlateShelf()
+
+
+def standing(world, scenario, along=0.0, up=0.0, lean=0.0, yaw=0.0):
+    """Put the plate on edge into the slot, its middle in the middle, changed by some lengths [m] and angles [rad]."""
+    about_z, about_y = rotation(math.radians(scenario.shelf_yaw) * UP + yaw * UP), rotation(np.array([0, lean, 0]))
+    rot = about_z @ about_y @ rotation(np.array([0, math.pi / 2, 0]))
+    middle = scenario.foot + (scenario.shelf.base + scenario.plate.radius + up) * UP + along * about_z[:, 1]
+    free, quat = world.data.joint("plate_free").qpos, np.empty(4)
+    mujoco.mju_mat2Quat(quat, rot.ravel())
+    free[:3], free[3:] = middle - scenario.plate.height / 2 * rot[:, 2], quat
+    world.step(world.idle)
+    return world
+
+
+@pytest.fixture(scope="module")
+def world():
+    """One world for tests that put the plate somewhere themselves; each resets it."""
+    return load(TASK, NOMINAL)
+
+
+@pytest.mark.parametrize(
+    ("change", "counts"),
+    [
+        ({}, True),
+        ({"along": ALONG - 0.003}, True),
+        ({"along": ALONG + 0.003}, False),
+        ({"up": DEEP - 0.002}, True),
+        ({"up": DEEP + 0.002}, False),
+        ({"lean": 0.07}, True),
+        ({"up": 0.1, "lean": math.pi / 2}, False),
+    ],
+)
+def test_what_counts_as_in_the_slot(world, change, counts):
+    world.reset()
+    assert NOMINAL.success(standing(world, NOMINAL, **change)) == counts
+
+
+def test_a_plate_that_leans_or_is_askew_by_more_than_ten_degrees_does_not_count(world):
+    for angle, counts in ((LEAN - 0.02, True), (LEAN + 0.02, False)):
+        for which in ("lean", "yaw"):
+            world.reset()
+            assert NOMINAL.on_edge(standing(world, NOMINAL, up=0.3, **{which: angle})) == counts
+
+
+@pytest.mark.parametrize(("share", "breaks"), [(0.8, False), (1.7, True)])
+def test_a_fall_breaks_the_plate_from_the_height_of_a_textbook(world, share, breaks):
+    """v^2 = 2 g h. A fall is looked at every 10 ms, in which it gains 0.1 m/s: at 1.7 h it is seen for certain."""
+    world.reset()
+    height, broken = BREAKS**2 / (2 * 9.81), False
+    standing(world, NOMINAL, up=share * height)
+    for _ in range(30):
+        world.step(world.idle)
+        broken = broken or NOMINAL.failure(world) == "the plate was dropped"
+    assert broken == breaks
+
+
+# --- two arms -------------------------------------------------------------------------------
+
+
+def test_both_arms_touch_the_plate_in_the_solution_and_never_each_other():
+    rollout, world = solution(TASK, NOMINAL), load(TASK, NOMINAL)
+    assert replay(NOMINAL, world, rollout.actions, TASK.horizon).solved
+    assert world.touched("robot0", "plate") and world.touched("robot1", "plate")
+    assert not world.touched("robot0", "robot1") and not world.touched("robot0", "shelf")
+
+
+@pytest.mark.parametrize("parked", [0, 1])
+def test_with_one_arm_parked_the_witness_fails(parked):
+    actions = solution(TASK, NOMINAL).actions.copy()
+    actions[:, 7 * parked : 7 * parked + 7] = [0, 0, 0, 0, 0, 0, -1]
+    world = load(TASK, NOMINAL)
+    assert not replay(NOMINAL, world, actions, TASK.horizon).solved
+    assert not world.touched(f"robot{parked}", "plate")
+
+
+def test_ablations_fail_at_what_they_take_away():
+    ends = ablated(TASK, NOMINAL)
+    assert not any(rollout.solved for rollout, _ in ends.values())
+    assert not ends["holed_plate"][1].touched("robot1", "plate")
+
+
+def test_a_cup_on_the_lip_does_alone_between_low_dividers_what_it_cannot_between_high_ones():
+    scenario = TASK.draw("id", 0, 1).scenario
+    low = with_values(unchecked(PlateShelf)(), {**values(scenario), "proud": 0.065})
+    assert play_shortcut(TASK, low, "cup_on_the_lip").solved
+    end = play_shortcut(TASK, scenario, "cup_on_the_lip")
+    assert end.outcome == "failure" and end.reason == "the plate was dropped"
+
+
+# --- what must hold -------------------------------------------------------------------------
+
+
+def test_every_constraint_refutes_what_violates_it():
+    plate = NOMINAL.plate
+    each_refuted_for_its_own_reason(
+        [
+            PlateShelf(plate_y=-0.35),
+            PlateShelf(shelf_y=0.3, shelf_x=0.3, shelf_yaw=-30.0, gap=0.09),
+            PlateShelf(plate_x=-0.05),
+            PlateShelf(plate=replace(plate, foot=0.028)),
+            PlateShelf(gap=0.026),
+            PlateShelf(gap=0.036),
+            PlateShelf(proud=0.05),
+            PlateShelf(plate=replace(plate, mass=0.9)),
+            PlateShelf(plate_x=0.2, plate_y=0.28, shelf_x=-0.1),
+            PlateShelf(shelf_x=0.3, shelf_y=-0.2),
+        ]
+    )
+
+
+@settings(deadline=None, max_examples=20)
+@given(anywhere(PlateShelf))
+def test_anything_within_bounds_builds_or_is_refuted(scenario):
+    builds_or_is_refuted(scenario)
+
+
+def test_the_plate_stands_on_the_cups_side_in_training():
+    """Only the axis `across` puts it on the other one."""
+    assert all(TASK.draw("id", 0, i).scenario.plate_y < 0 for i in range(20))
+    assert all(TASK.draw("across", 0, i).scenario.plate_y > 0 for i in range(20))
+    assert NOMINAL.start[2] == TABLE_TOP
