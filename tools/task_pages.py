@@ -1,6 +1,7 @@
 """docs/tasks: a page for each task, from its family, its task file, one certificate and docs/axes.md. `make docs`
 
-`python tools/task_pages.py [task ...]`; pages of tasks that are not named stay as they are. Pictures need OpenGL.
+`python tools/task_pages.py [task ...]`; pages of tasks that are not named stay as they are. docs/tasks.png shows the
+first scene of all tasks. Pictures need OpenGL.
 """
 
 import inspect
@@ -10,14 +11,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
 
 from scengen import config
 from scengen.pictures.film import Take, strip
-from scengen.pictures.render import Picture
+from scengen.pictures.render import Picture, camera
 from scengen.samplers.axis import spell
 from scengen.samplers.dists import Fixed
 from scengen.samplers.task import ID, Task
+from scengen.sim import scene_text
 from scengen.validate.certify import Certified, certify
 
 FOLDER = Path("docs/tasks")
@@ -26,6 +29,8 @@ ATTACKS = Path("docs/attacks.md")
 SCENARIO = 0
 """Index of the training scenario that is shown."""
 FRAMES, WIDTH, HEIGHT = 8, 320, 240
+OVERVIEW, COLUMNS, SMALL = Path("docs/tasks.png"), 4, (300, 225)
+"""All tasks in one picture: scenes in a row, width and height of each [pixels]."""
 
 
 def main(*names: str) -> None:
@@ -41,6 +46,19 @@ def main(*names: str) -> None:
         _save(FOLDER / f"{name}.jpg", strip(take, FRAMES, WIDTH, HEIGHT))
         (FOLDER / f"{name}.md").write_text(page(task, certified, take.seconds))
         print(f"wrote {FOLDER / name}.md", flush=True)
+    Image.fromarray(overview()).save(OVERVIEW, optimize=True)
+
+
+def overview() -> Picture:
+    """The start of the same training scenario of every task, side by side."""
+    scenes = []
+    for task in map(config.task, config.tasks()):
+        scene_xml = scene_text.emit(task.draw(ID, 0, SCENARIO).scenario.build())[0]
+        with camera(scene_xml, task.embodiment, *SMALL) as view:
+            scenes.append(view.take())
+    empty = np.full_like(scenes[0], 255)
+    scenes += [empty] * (-len(scenes) % COLUMNS)
+    return np.vstack([np.hstack(scenes[k : k + COLUMNS]) for k in range(0, len(scenes), COLUMNS)])
 
 
 def page(task: Task, certified: Certified, seconds: float) -> str:
