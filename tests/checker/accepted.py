@@ -10,7 +10,7 @@ PLAIN = (
     "single_quick", "single_full", "single_axis", "single_severity", "single_composed", "single_composed_of_three",
     "single_sobol", "single_hypercube", "single_grid", "single_workers", "select_id", "select_composed", "galileo_id",
     "galileo_severity", "cage_id", "cage_severity", "seesaw_id", "seesaw_axis", "tool_id", "tool_composed",
-    "packing_id", "packing_axis", "single_kept",
+    "packing_id", "packing_axis", "shelf_id", "single_kept",
 )  # fmt: skip
 """Bases that are accepted as they are."""
 

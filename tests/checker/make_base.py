@@ -1,6 +1,6 @@
 """Make the pools that the corpus of the checker is forged from: `python tests/checker/make_base.py`.
 
-Each is made by the command line, as a user would, with one or two scenarios. All seven tasks are there, with training
+Each is made by the command line, as a user would, with one or two scenarios. All tasks are there, with training
 splits, axes, severities, composed splits, an axis of the command line's own, overridden ranges and settings, other
 samplers, and scenarios that were kept although they failed. Most have one jittered run instead of four, and so settings
 of their own: what the corpus tests does not depend on that, and they are made in seconds.
@@ -61,11 +61,15 @@ POOLS: dict[str, tuple[str, ...]] = {
     "tool_composed": ("task=tool_retrieve", "split=long_handle@1+turned_hook@1", "n=1", *QUICKLY),
     "packing_id": ("task=packing", "n=1", *QUICKLY),
     "packing_axis": ("task=packing", "split=thin_heavy", "n=1", *QUICKLY),
+    "shelf_id": ("task=plate_shelf_hetbi", "n=1", *QUICKLY),
 }
 """Arguments of `scengen generate`, by the name of the pool."""
 
 
-KEPT = ("single_quick", "single_severity", "select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id")
+KEPT = (
+    "single_quick", "single_severity", "select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id",
+    "shelf_id",
+)  # fmt: skip
 """Those in the repository."""
 
 

@@ -178,6 +178,11 @@ OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
         "lighter_piece": (_scaled("piece_1/lying", "mass", 0.9), SAME),
         "wider_bin": (lambda d: d.scene('(name="bin/far"[^>]*pos=)"(\\S+)', r'\1"0.08'), SAME),
     },
+    "shelf_id": {
+        "lighter_plate": (lambda d: d.scene('(<inertial [^>]*mass=)"0.04', r'\1"0.03'), SAME),
+        "rough_shelf": (_attribute("shelf/near", "friction", "0.6"), SAME),
+        "floor_of_the_slot_lower": (_scaled("shelf/base", "size", 0.99), SAME),
+    },
 }
 
 

@@ -46,12 +46,12 @@ def on_screen(world, camera, points, aspect):
 
 @pytest.mark.parametrize("task", config.tasks())
 def test_the_default_view_holds_everything_that_stands_on_the_table(task):
-    """All corners in the scene of nominal values, and the hand; it is as near as that and `CLOSEST` allow."""
+    """All corners in the scene of nominal values, and the hands; it is as near as that and `CLOSEST` allow."""
     loaded = config.task(task)
     world = World.load(scene_text.emit(loaded.family().build())[0], loaded.embodiment)
     model, data = world.model, world.data
-    others = {world.body(name) for name in ("world", "table", "robot0_base")}
-    points = [world.arm.hand]
+    others = {world.body("world"), world.body("table"), *world.own}
+    points = [arm.hand for arm in world.arms]
     for geom in range(model.ngeom):
         if model.body_rootid[model.geom_bodyid[geom]] not in others:
             frame, box = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
