@@ -123,7 +123,9 @@ class Draft:
 
     def idle(self) -> None:
         """Solve the first scenario by doing nothing."""
-        self.played(np.zeros((0, 7)))
+        from scengen.sim.world import action_size
+
+        self.played(np.zeros((0, action_size(self.row["embodiment"]))))
 
     def timed(self, periods: int, seconds: float) -> None:
         """Let the certificate of the first scenario say how long its witness is."""
@@ -163,9 +165,11 @@ class Draft:
 
 @cache
 def _read(path: Path) -> Any:
+    from scengen.sim.world import action_size
+
     rows = pq.read_table(path).to_pylist()
     for row in rows:
-        row["witness"] = np.array(row["witness"], np.float32).reshape(-1, 7)
+        row["witness"] = np.array(row["witness"], np.float32).reshape(-1, action_size(row["embodiment"]))
         row["params"], row["shifted"] = json.loads(row["params"]), json.loads(row["shifted"])
         certificate = row["certificate"]
         certificate["versions"] = json.loads(certificate["versions"])
