@@ -179,8 +179,8 @@ OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
         "wider_bin": (lambda d: d.scene('(name="bin/far"[^>]*pos=)"(\\S+)', r'\1"0.08'), SAME),
     },
     "shelf_id": {
-        "lighter_plate": (lambda d: d.scene('(<inertial [^>]*mass=)"0.04', r'\1"0.03'), SAME),
-        "rough_shelf": (_attribute("shelf/near", "friction", "0.6"), SAME),
+        "white_plate": (_attribute("plate/bottom_0", "rgba", "1 1 1 1"), SAME),
+        "smoother_foot": (_attribute("plate/bottom_0", "friction", "0.58"), SAME),
         "floor_of_the_slot_lower": (_scaled("shelf/base", "size", 0.99), SAME),
     },
 }
