@@ -275,10 +275,7 @@ def faithful(task: Task, scenario: Scenario) -> bool:
 @cache
 def _faithful(scenario: Scenario, horizon: float, embodiment: str) -> bool:
     memory = _remembered(scenario, horizon, embodiment)
-    if memory is None:
-        return False
-    world = _world(scenario, embodiment)
-    return run(scenario, world, memory.follow, horizon, until_settled=True, raw=True).solved
+    return memory is not None and _follows(memory, scenario, horizon, embodiment)
 
 
 @cache
@@ -286,6 +283,11 @@ def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> Memory |
     world = _world(scenario, embodiment)
     rollout = run(scenario, world, scenario.oracle, horizon, until_settled=True)
     return remember(world, rollout.actions) if rollout.solved else None
+
+
+def _follows(memory: Memory, scenario: Scenario, horizon: float, embodiment: str) -> bool:
+    world = _world(scenario, embodiment)
+    return run(scenario, world, memory.follow, horizon, until_settled=True, raw=True).solved
 
 
 def _world(scenario: Scenario, embodiment: str) -> World:
@@ -306,5 +308,4 @@ def replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
 
 def follows(task: Task, memory: Memory, scenario: Scenario) -> bool:
     """Whether an object-centric memory solves a scenario."""
-    world = _world(scenario, task.embodiment)
-    return run(scenario, world, memory.follow, task.horizon, until_settled=True, raw=True).solved
+    return _follows(memory, scenario, task.horizon, task.embodiment)

@@ -222,7 +222,7 @@ def _try(path: AxisPath, seed: int, fraction: float, index: int) -> dict[str, An
     found: tuple[bool | None, bool | None] = (None, None)
     if actions is not None:
         twin = with_values(scenario, path.values(fraction, seed, index))
-        found = (False, False) if twin.infeasible() else try_both(task, actions, twin)[:2]
+        found = (False, False) if twin.infeasible() else try_both(task, actions, twin)
     return {"index": index, "fraction": fraction, REPLAY: found[0], ORACLE: found[1]}
 
 

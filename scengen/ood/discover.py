@@ -10,7 +10,7 @@ One trial is a memory played in one scenario, and its oracle where the memory fa
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -133,7 +133,7 @@ def discover(
                 asked.ask("forest", _uncertain(asked.records, len(known), random)[: ends[1] - asked.spent])
         else:
             asked.ask("hypercube", _hypercube(ends[1] - asked.spent, len(known), random))
-        asked.ask("shrink", _alone(asked.records)[: max(0, ends[2] - asked.spent)], twins=True)
+        asked.ask("shrink", _alone(asked.records)[: max(0, ends[2] - asked.spent)])
         boxes = _boxes(asked.records)
         room = max(1, (settings.budget - asked.spent) // FRESH)
         tested = [(box, asked.confirm(number, box)) for number, box in enumerate(boxes[:room])]
@@ -173,12 +173,12 @@ class _Asked:
     @property
     def records(self) -> list[dict[str, Any]]:
         """The trials of the search itself, without those that confirm."""
-        return [r for r in self.log.records[: self.spent] if r["stage"] != "confirm"]
+        return [r for r in self._numbered(0) if r["stage"] != "confirm"]
 
-    def ask(self, stage: str, points: Sequence[tuple[Point, int | None]], twins: bool = False) -> None:
+    def ask(self, stage: str, points: Sequence[tuple[Point, int | None]]) -> None:
         """Try points, each in the twin that is named, or in the next one."""
         items = [
-            (stage, point, ("search", (self.spent + k) % TWINS if twin is None else twin))
+            _Item(self.spent + k, stage, point, (self.spent + k) % TWINS if twin is None else twin)
             for k, (point, twin) in enumerate(points)
         ]
         self._run(partial(_try, self.trials), items)
@@ -186,36 +186,55 @@ class _Asked:
     def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
         """Try a box in fresh twins."""
         begin = self.spent
-        items = [("confirm", box.plain, ("fresh", number * FRESH + k)) for k in range(FRESH)]
+        items = [_Item(begin + k, "confirm", box.ranges, TWINS + number * FRESH + k) for k in range(FRESH)]
         self._run(partial(_confirm, self.trials), items)
-        return self.log.records[begin : self.spent]
+        return self._numbered(begin)
 
-    def _run(self, work: Callable[[Any], dict[str, Any]], items: Sequence[Any]) -> None:
-        ready = len(self.log.records) - self.spent
-        for record in each(work, items[ready:] if ready > 0 else items, self.settings.workers, LIMITS, _lost):
+    def _run(self, work: Callable[["_Item"], dict[str, Any]], items: Sequence["_Item"]) -> None:
+        tried = {record["number"] for record in self.log.records}
+        todo = [item for item in items if item.number not in tried]
+        for record in each(work, todo, self.settings.workers, LIMITS, _lost):
             self.log.add(record)
             self.progress(record["stage"], len(self.log.records), self.settings.budget)
         self.spent += len(items)
 
-
-def _lost(item: Any, reason: str) -> dict[str, Any]:
-    stage, point, (_, number) = item
-    return {"stage": stage, "point": point, "twin": number, "outcome": UNSOLVED, "reason": reason}
-
-
-def _try(trials: "_Trials", item: tuple[str, Point, tuple[str, int]]) -> dict[str, Any]:
-    stage, point, (_, number) = item
-    trained, memory = trials.twin(number)
-    return {"stage": stage, "point": point, "twin": number, "outcome": trials.outcome(trained, memory, point)}
+    def _numbered(self, begin: int) -> list[dict[str, Any]]:
+        """The trials from number `begin` on, in order: with several workers they end in any."""
+        asked = (record for record in self.log.records if begin <= record["number"] < self.spent)
+        return sorted(asked, key=lambda record: record["number"])
 
 
-def _confirm(trials: "_Trials", item: tuple[str, Any, tuple[str, int]]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Item:
+    """A trial that is to be made."""
+
+    number: int
+    """In the search."""
+    stage: str
+    point: tuple[tuple[float, ...], ...]
+    """A `Point`; where a box is to be confirmed, its ranges."""
+    twin: int
+
+    def record(self, outcome: str, **more: Any) -> dict[str, Any]:
+        """What came of it, as plain data."""
+        return {**asdict(self), "outcome": outcome, **more}
+
+
+def _lost(item: _Item, reason: str) -> dict[str, Any]:
+    return item.record(UNSOLVED, reason=reason)
+
+
+def _try(trials: "_Trials", item: _Item) -> dict[str, Any]:
+    return item.record(trials.outcome(*trials.twin(item.twin), item.point))
+
+
+def _confirm(trials: "_Trials", item: _Item) -> dict[str, Any]:
     """A box in one fresh twin, at a random place; the control is a move of the same parameters within training."""
-    stage, box, (_, number) = item
-    trained, memory = trials.twin(TWINS + number)
+    box, number = item.point, item.twin - TWINS
+    trained, memory = trials.twin(item.twin)
     outcome, control, task, seed = INFEASIBLE, None, trials.task, trials.seed
     for attempt in range(DRAWS):
-        point = [(i, low + unit("discover", seed, number, attempt, i) * (high - low)) for i, low, high in box]
+        point = [(i, low + unit("discover", seed, number, attempt, int(i)) * (high - low)) for i, low, high in box]
         outcome = trials.outcome(trained, memory, point)
         if outcome != INFEASIBLE:
             break
@@ -223,7 +242,7 @@ def _confirm(trials: "_Trials", item: tuple[str, Any, tuple[str, int]]) -> dict[
         names = [trials.known[int(i)].parameter.name for i, *_ in box]
         control = behaviour.moved_within(task, names, seed, number, trained)
     worked = control is not None and behaviour.follows(task, memory, control)
-    return {"stage": stage, "point": box, "twin": number, "outcome": outcome, "control": worked}
+    return item.record(outcome, control=worked)
 
 
 @dataclass(frozen=True)
@@ -335,10 +354,6 @@ class _Box:
     """Ranges of places in one or two regions."""
 
     ranges: tuple[tuple[int, float, float], ...]
-
-    @property
-    def plain(self) -> list[list[float]]:
-        return [list(r) for r in self.ranges]
 
     def holds(self, point: Iterable[Sequence[float]]) -> bool:
         places = {int(i): place for i, place in point}

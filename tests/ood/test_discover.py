@@ -96,6 +96,15 @@ def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
     assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole, "nothing is tried twice"
 
 
+def test_two_workers_find_what_one_does_whatever_order_trials_end_in(planted, tmp_path):
+    alone = discover(TASK, QUICK, Settings(budget=100), tmp_path / "one")
+    folder = tmp_path / "two"
+    assert discover(TASK, QUICK, Settings(budget=100, workers=2), folder) == alone
+    head, *lines = (folder / "trials.jsonl").read_text().splitlines(keepends=True)
+    (folder / "trials.jsonl").write_text("".join([head, lines[1], lines[0], lines[5], *lines[7:20]]))
+    assert discover(TASK, QUICK, Settings(budget=100, workers=2), folder) == alone, "also after a kill in the middle"
+
+
 def test_a_search_that_finds_nothing_says_so(planted, tmp_path, monkeypatch):
     monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS)
     search = discover(TASK, QUICK, Settings(budget=40), tmp_path)
