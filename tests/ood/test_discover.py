@@ -96,13 +96,17 @@ def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
     assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole, "nothing is tried twice"
 
 
-def test_two_workers_find_what_one_does_whatever_order_trials_end_in(planted, tmp_path):
-    alone = discover(TASK, QUICK, Settings(budget=100), tmp_path / "one")
-    folder = tmp_path / "two"
-    assert discover(TASK, QUICK, Settings(budget=100, workers=2), folder) == alone
-    head, *lines = (folder / "trials.jsonl").read_text().splitlines(keepends=True)
-    (folder / "trials.jsonl").write_text("".join([head, lines[1], lines[0], lines[5], *lines[7:20]]))
-    assert discover(TASK, QUICK, Settings(budget=100, workers=2), folder) == alone, "also after a kill in the middle"
+def test_two_workers_try_what_one_does_also_after_a_kill_in_the_middle(planted, tmp_path):
+    def tried(folder):
+        return sorted(line.split('"outcome"')[0] for line in (folder / "trials.jsonl").read_text().splitlines()[1:])
+
+    one, two = tmp_path / "one", tmp_path / "two"
+    alone = discover(TASK, QUICK, Settings(budget=300), one)
+    assert alone.findings and discover(TASK, QUICK, Settings(budget=300, workers=2), two) == alone
+    head, *lines = (two / "trials.jsonl").read_text().splitlines(keepends=True)
+    (two / "trials.jsonl").write_text("".join([head, lines[1], lines[0], lines[5], *lines[7:20]]))
+    assert discover(TASK, QUICK, Settings(budget=300, workers=2), two) == alone
+    assert tried(two) == tried(one), "none is left out, none is made twice"
 
 
 def test_a_search_that_finds_nothing_says_so(planted, tmp_path, monkeypatch):
