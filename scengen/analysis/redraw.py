@@ -8,6 +8,7 @@ from ..errors import BadConfig, Infeasible, PoolError
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..validate import survey
 from ..validate.stored import task_of_manifest
 
 
@@ -47,15 +48,21 @@ def redrawn(
 
     Raises:
         BadConfig: the pool is a chosen subset, for which there are no proposals.
-        PoolError: other scenarios come out than the pool holds.
+        PoolError: other scenarios come out than the pool holds, or more draws than it counts; or it counts so many
+            that no run can have made them.
     """
     if pool.chosen:
         raise BadConfig(f"{pool.folder} is a subset of another pool, chosen and not drawn; give the pool it came from")
+    if why := survey.too_large(pool):
+        raise PoolError(f"{pool.folder}: {why}")
     task = task_of(pool, search)
     design = task.design(pool.sampler)
     ids = dict(pool.columns("index", "id"))
     found: list[Redrawn] = []
+    untold = 0  # tries at a training scenario that an axis could not start from
     for index in range(pool.indices):
+        if why := survey.too_many(pool, index, len(found) + untold):
+            raise PoolError(f"{pool.folder}: {why}")
         try:
             for p in task.proposals(pool.split, pool.seed, index, design):
                 certified = index in ids and p.refutation is None
@@ -65,8 +72,8 @@ def redrawn(
                         "the family has changed since, generate the pool again"
                     )
                 found.append(Redrawn(index, p.scenario, p.quantiles, p.refutation is None, certified))
-        except Infeasible:
-            pass  # without a training scenario of this index there was nothing for the axis to move
+        except Infeasible as error:
+            untold += error.tries  # there was no training scenario of this index that the axis could move
         progress(index + 1, pool.indices)
     return found
 

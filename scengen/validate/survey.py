@@ -64,12 +64,12 @@ def patience(pool: Pool, seconds: float) -> float:
     return seconds * (1 + len(pool) // ROWS_IN_TIME)
 
 
-def too_many(pool: Pool, drawn: Mapping[int, Drawn]) -> str:
-    """Why what has been drawn so far cannot be what a manifest counts; empty if it can."""
-    proposals, told = sum(d.proposals for d in drawn.values()), pool.funnel.get("proposed", 0)
+def too_many(pool: Pool, indices: int, proposals: int) -> str:
+    """Why what has been drawn so far, `proposals` at `indices`, cannot be what a manifest counts; empty if it can."""
+    told = pool.funnel.get("proposed", 0)
     if proposals <= told:
         return ""
-    return f"the funnel tells of {told} draws; {len(drawn)} of its {pool.indices} indices alone give {proposals}"
+    return f"the funnel tells of {told} draws; {indices} of its {pool.indices} indices alone give {proposals}"
 
 
 def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:

@@ -171,7 +171,7 @@ class _Run:
         limits, begun = self.options.limits, time.monotonic()
         patience = survey.patience(self.pool, limits.seconds) if limits else float("inf")
         for piece in survey.chunks(self.pool.indices):
-            if why := survey.too_many(self.pool, self.drawn):
+            if why := survey.too_many(self.pool, len(self.drawn), sum(d.proposals for d in self.drawn.values())):
                 self.found.of_pool(MANIFEST, "refuted", why)
                 return
             if time.monotonic() - begun > patience:

@@ -103,6 +103,18 @@ def test_a_pool_that_does_not_come_out_again_is_refused(made, tmp_path):
         redrawn(Pool.open(other))
 
 
+def test_a_manifest_that_counts_more_indices_than_it_tells_of_draws_does_not_keep_anybody_busy(made, tmp_path):
+    other = shutil.copytree(made, tmp_path / "other")
+    manifest = json.loads((other / "manifest.json").read_text())
+    told = manifest["funnel"]["proposed"]
+    (other / "manifest.json").write_text(json.dumps({**manifest, "indices": 12_000}))
+    with pytest.raises(PoolError, match=f"funnel tells of {told} draws"):
+        redrawn(Pool.open(other))
+    (other / "manifest.json").write_text(json.dumps({**manifest, "indices": 12_000_000}))
+    with pytest.raises(PoolError, match="12000000 indices for 2 scenarios are too many"):
+        redrawn(Pool.open(other))
+
+
 def test_the_command_tells_about_a_pool_and_refuses_a_chosen_one(made, tmp_path, capsys):
     assert cli.run(("bias", f"pool={made}", f"json={tmp_path / 'b.json'}")) == 0
     assert json.loads((tmp_path / "b.json").read_text())["certified"]["accepted"] == 2
