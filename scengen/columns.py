@@ -24,7 +24,7 @@ from .schema import (
 from .sim.world import EMBODIMENTS, action_size
 
 LARGEST_SCENE = 5_000_000
-"""Letters of a scene; the largest of the seven tasks has 60 000."""
+"""Letters of a scene; the largest scenes have 60 000."""
 LONGEST_WITNESS = 1_000_000
 """Control periods; one hour, the longest horizon, has 360 000."""
 

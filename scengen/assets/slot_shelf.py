@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, show, solid
@@ -47,11 +46,6 @@ class SlotShelf(Prop):
     def top(self) -> float:
         """Height of the dividers' upper edges above the foot [m]."""
         return self.base + self.height
-
-    @property
-    def half(self) -> NDArray[np.float64]:
-        """Half the lengths of the slot along x, y and z [m]."""
-        return np.array([self.gap, self.length, self.height]) / 2
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half = self.length / 2

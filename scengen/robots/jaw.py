@@ -22,7 +22,9 @@ OVERLAP = 0.001
 SPAN = 0.133
 """Width of the open jaw along, its fingers included [m]; 0.109 at the tips."""
 SPAN_CLOSED = 0.054
-"""Width of the closed jaw along, its fingers included [m]; 0.030 at the tips."""
+"""Width of the closed jaw along, its fingers included [m]."""
+TIPS_CLOSED = 0.030
+"""The same at the tips [m]."""
 FINGER = 0.0105
 """How far the fingers, open or closed, reach across, to either side [m]: half their width. 0.0088 at the tips."""
 TIP = 0.0092

@@ -26,6 +26,8 @@ PITCH = 0.015
 """Distance of neighbouring pads' middles [m]; with `PAD` the cup covers a square of 27 mm."""
 REACHES = (PITCH + PAD) / 2
 """How far the cup reaches to each side of the grip site [m]: a face must go on that far to take all four pads."""
+TUBE = 0.011
+"""Radius of the tube between flange and bellows [m]."""
 MASS = 0.3
 """Mass of the tool [kg]: robosuite's Panda hand without its fingers."""
 
@@ -33,7 +35,7 @@ _LIP = 0.004
 """Thickness of the pads [m]."""
 _RUBBER = (0.13, 0.13, 0.15, 1.0)
 _METAL = (0.75, 0.76, 0.78, 1.0)
-_STEM = ((0.031, 0.0, 0.020, _METAL), (0.011, 0.020, 0.078, _METAL), (0.017, 0.078, LENGTH - _LIP, _RUBBER))
+_STEM = ((0.031, 0.0, 0.020, _METAL), (TUBE, 0.020, 0.078, _METAL), (0.017, 0.078, LENGTH - _LIP, _RUBBER))
 """Radius, lower and upper end along the hand's axis [m] and colour of flange plate, tube and bellows."""
 
 

@@ -41,8 +41,8 @@ from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, shortest
 from ..params import param
 from ..predicates import fallen
 from ..robots import panda
-from ..robots.jaw import PAD, TIP, pinch
-from ..robots.suction import REACHES
+from ..robots.jaw import PAD, TIP, TIPS_CLOSED, pinch
+from ..robots.suction import REACHES, TUBE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
@@ -78,10 +78,6 @@ FORWARDS: Mat3 = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The cup's hand, level, points away from the robot; of four rolls the one with which it gets farthest."""
 BREAKS = 0.35
 """Speed of a fall that the plate does not survive [m/s]."""
-TUBE = 0.011
-"""Radius of the cup's tube, which the dividers stop [m]: `robots.suction`."""
-TIPS = 0.030
-"""Width of the tips of a closed jaw along [m]: `robots.jaw.SPAN_CLOSED`."""
 AIR = 0.002
 """Between the plate's foot and the divider as it goes down [m]."""
 ALONG = 0.03
@@ -363,9 +359,9 @@ class PlateShelf(Scenario):
         yield require(flat > 0.01, "the cup does not fit on the plate's foot", room=flat)
         yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
         beside = shelf.gap - AIR - plate.rise - plate.thickness / 2  # from the lip to the divider that is nearer to it
-        room = beside - (TIPS + plate.thickness) / 2
+        room = beside - (TIPS_CLOSED + plate.thickness) / 2
         yield require(room > 0.0, "the fingers that hold the lip meet the dividers", room=room)
-        left = TUBE - self.proud
+        left = TUBE - self.proud  # the dividers stop the tube
         yield require(left > 2 * DEEP, "a cup on the lip puts the plate into the slot alone", left=left)
         grip, weight = plate.friction * pinch(plate.thickness), 9.81 * plate.mass
         yield require(grip > 2 * weight, "the jaw does not hold the plate", grip=grip, weight=weight)

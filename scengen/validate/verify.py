@@ -21,7 +21,7 @@ from .spot import excluded_share
 from .stored import settings_of, task_of_manifest
 
 LIMITS = Limits(300.0, 4000)
-"""Of one scenario: the slowest of the seven tasks takes 40 s at level full, and 300 MB."""
+"""Of one scenario: the slowest takes 40 s at level full, and 300 MB."""
 
 MOST_FAULTS = 100
 """Refuted scenarios after which the others are not looked at: the pool is refuted, however many it has."""
