@@ -49,7 +49,8 @@ class Episode:
 
     def begin(self) -> None:
         """Let the events of the coming control period happen."""
-        self.scenario.events(self.world)
+        with self.world.events():
+            self.scenario.events(self.world)
 
     def judge(self) -> Outcome | None:
         """Decide what the control period that has passed means. Failure comes before success, success before time."""

@@ -45,6 +45,13 @@ class Unstable(ScengenError):
     """MuJoCo raised a warning, so that nothing simulated after it means anything."""
 
 
+class NoEvent(ScengenError):
+    """Something tried to change, outside of a scenario's `events`, what only events may change."""
+
+    def __init__(self, what: str):
+        super().__init__(f"{what} outside of events; only Scenario.events may do that, called by Episode.begin")
+
+
 class NoOracle(ScengenError):
     """A family without a scripted solution was asked for one."""
 

@@ -131,7 +131,19 @@ class Scenario(abc.ABC):
         return None
 
     def events(self, world: World) -> None:  # noqa: B027
-        """Events of the scene itself, called before every control period. Draws nothing: all values are parameters."""
+        """Events of the scene itself, called before every control period. Draws nothing: all values are parameters.
+
+        What they must know of the episode so far is in `world.memory`, which nothing else may write: a family has no
+        state. Nor may anything else call `arm.jam` or `world.move`.
+        """
+
+    def pending(self, world: World) -> bool:
+        """Whether something is still going to happen by itself, although everything is at rest and nobody acts.
+
+        As long as it is, no episode ends because everything is at rest, and the rest check ends with it. A family whose
+        events answer what the robot does should say when they are over; of one that does not, nothing is known.
+        """
+        return type(self).events is not Scenario.events
 
     def oracle(self, world: World) -> Plan:
         """A scripted solution, which may read the full state but acts only through the robot.

@@ -204,13 +204,10 @@ class _Run:
     def _idle(self) -> None:
         """Nothing, until something is decided or everything has been at rest for a while."""
         still = 0
-        while self.episode.outcome is None and (self.episode.held or self._eventful or still * Loop.PERIOD < STILL_FOR):
+        while self.episode.outcome is None and (self.episode.held or still * Loop.PERIOD < STILL_FOR):
             self._step(self.world.idle)
-            still = 0 if np.abs(self.world.data.qvel).max() >= STILL else still + 1
-
-    @property
-    def _eventful(self) -> bool:
-        return type(self.arena.scenario).events is not Scenario.events
+            moving = np.abs(self.world.data.qvel).max() >= STILL or self.arena.scenario.pending(self.world)
+            still = 0 if moving else still + 1
 
     def _settled(self) -> Played:
         reached = self.world.time

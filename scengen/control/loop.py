@@ -167,10 +167,18 @@ class Loop:
     def watch(self, first: bool) -> None:
         """Latch the contacts of a physics step that somebody else makes, between its mj_step1 and mj_step2.
 
-        A suction cup that is switched on but not sealed is switched off for this step. `first`: whether the step
-        begins a control period.
+        A suction cup that is switched on but not sealed is switched off for this step, and a jammed gripper opened.
+        `first`: whether the step begins a control period.
         """
         _watch(self._scene, self._arms, self._owner, self._latches, first)
+
+    def jam(self, arm: int, on: bool) -> None:
+        """Force the gripper of an arm open from the next physics step on, or leave it to its commands again.
+
+        A jaw is driven to its open end, a suction cup shut off. The commands that come meanwhile are followed below:
+        what a jaw does afterwards is what it would do without the jam, from where it is.
+        """
+        self._arms[arm]["state"]["jammed"] = float(on)
 
     def state(self) -> NDArray[np.float64]:
         """All that the future depends on, in one vector: integration state, controller, latches, warnings."""
@@ -268,7 +276,9 @@ def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, fir
     _latch(scene, owner, latches)
     for i in range(arms.shape[0]):
         at = arms[i].at
-        if at.cup != osc.NONE and _pads_in_contact(scene, at.pad) < osc.SEAL:
+        if at.cup == osc.NONE:
+            osc.force_open(at, arms[i].state)
+        elif arms[i].state.jammed != 0.0 or _pads_in_contact(scene, at.pad) < osc.SEAL:
             native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
 
 

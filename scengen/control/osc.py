@@ -72,11 +72,12 @@ STATE = np.dtype(
         ("goal_pos", np.float64, (3,)),
         ("goal_rot", np.float64, (3, 3)),
         ("jaw", np.float64, (2,)),
+        ("jammed", np.float64),
         ("posture", np.float64, (JOINTS,)),
     ]
 )
 """What the controller remembers: goal in the base frame [m], jaw command in [-1, 1] or, in its first place, suction
-off (0) or on (1), initial angles [rad]."""
+off (0) or on (1), whether the gripper is forced open (1) whatever is commanded, initial angles [rad]."""
 
 WORK = np.dtype(
     [
@@ -142,6 +143,7 @@ def start(state: NDArray[np.void], posture: ArrayLike) -> None:
     """Put the controller's memory into the condition after a reset, with the initial joint angles [rad]."""
     state["goal_pos"] = state["goal_rot"] = 0.0  # set by the first action, before its first use
     state["jaw"] = 0.0  # PandaGripper.current_action: half open until told otherwise; a cup's suction is off
+    state["jammed"] = 0.0
     state["posture"] = posture
 
 
@@ -187,13 +189,23 @@ def apply(at: np.record, state: np.record, work: np.record) -> None:
     _write_torques(at, work)
     if at.cup == NONE:
         _write_jaw(at, state)
+        force_open(at, state)
 
 
 @njit
 def suck(at: np.record, state: np.record, touching: int) -> None:
     """Write the suction of this physics step into ctrl: what is asked for, if `touching` pads close the lip."""
     pull = float64s(at.ctrl + 8 * at.cup, 1)
-    pull[0] = state.jaw[0] if touching >= SEAL else 0.0
+    pull[0] = state.jaw[0] if touching >= SEAL and state.jammed == 0.0 else 0.0
+
+
+@njit
+def force_open(at: np.record, state: np.record) -> None:
+    """Write into ctrl what opens a jammed jaw: the ends of the ranges that full opening stands for."""
+    if state.jammed != 0.0:
+        left, right = float64s(at.ctrlrange + 16 * at.jaw[0], 2), float64s(at.ctrlrange + 16 * at.jaw[1], 2)
+        float64s(at.ctrl + 8 * at.jaw[0], 1)[0] = left[1]
+        float64s(at.ctrl + 8 * at.jaw[1], 1)[0] = right[0]
 
 
 @njit

@@ -224,10 +224,10 @@ class RobosuiteEnv(ManipulationEnv):
         self.episode.begin()
 
     def _moving(self) -> list[str]:
-        """Bodies of the scene that have joints."""
+        """Bodies of the scene that have joints, or that events can move."""
         model = self.world.model
-        jointed = np.flatnonzero(model.body_jntnum > 0)
-        return [model.body(int(body)).name for body in jointed if body not in self.world.own]
+        free = np.flatnonzero((model.body_jntnum > 0) | (model.body_mocapid >= 0))
+        return [model.body(int(body)).name for body in free if body not in self.world.own]
 
     def _pose(self, name: str) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
         """Sensors of a body's position [m] and orientation (xyzw)."""

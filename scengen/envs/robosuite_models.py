@@ -22,8 +22,8 @@ from robosuite.models.tasks import ManipulationTask  # noqa: E402
 
 _advice.disabled = False
 
-TEXT = ("compiler", "option", "visual")
-"""What the scene says about physics and light, in place of what robosuite puts into every model."""
+TEXT = ("compiler", "option", "size", "visual", "custom")
+"""What the scene says about physics, memory and light, in place of what robosuite puts into every model."""
 
 
 @register_gripper

@@ -3,7 +3,8 @@
 import functools
 import hashlib
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Self
@@ -14,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..control.loop import ACTION, Loop
 from ..control.teleop import Filter
-from ..errors import UnknownName, Unstable
+from ..errors import NoEvent, UnknownName, Unstable
 from ..geometry import Mat3, Vec3
 from ..robots import panda, suction
 from ..robots.panda import MOST_ARMS, Names
 from . import scene_text
+from .memory import Memory
 
 ROBOT = "robot"
 """Stands for any body of the robot in questions about contact, whichever arm."""
@@ -128,6 +130,17 @@ class Arm:
         """The action without motion that keeps the gripper command, shape (7,)."""
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.grip])
 
+    def jam(self, on: bool) -> None:
+        """Force the gripper open, or switch the suction off, whatever is commanded, until it is told `jam(False)`.
+
+        Acts in every physics step and belongs to the state.
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+        """
+        self.world.check_event("jamming a gripper")
+        self.world.loop.jam(self.number, on)
+
     @functools.cached_property
     def wrist_range(self) -> tuple[float, float]:
         """Limits of the last joint [rad]."""
@@ -149,9 +162,14 @@ class World:
     filter: Filter = field(init=False)
     arms: tuple[Arm, ...] = field(init=False)
     """All arms of the robot; an action holds seven numbers for each, in this order."""
+    memory: Memory = field(init=False)
+    """What has happened in the episode, by the names that the scene was told to `remember`; all 0 at the start."""
+    _happening: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self.arms = tuple(Arm(self, names.number) for names in panda.arms(self.model))
+        this = weakref.proxy(self)
+        self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
         self.filter = Filter(len(self.arms))
 
     @classmethod
@@ -213,6 +231,42 @@ class World:
         """Remember the gripper commands of an action, shape (7 * arms,), that has been simulated, here or elsewhere."""
         for arm in self.arms:
             arm.grip = float(action[ACTION * arm.number + ACTION - 1])
+
+    # --- events ---------------------------------------------------------------------------
+
+    @contextmanager
+    def events(self) -> Iterator[None]:
+        """The moment before a control period in which a scenario's events happen; an `Episode` opens it."""
+        self._happening = True
+        try:
+            yield
+        finally:
+            self._happening = False
+
+    def check_event(self, what: str) -> None:
+        """Raise `NoEvent` unless events happen now. `what` names what is done."""
+        if not self._happening:
+            raise NoEvent(what)
+
+    def move(self, body: str, pos: ArrayLike, turn: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> None:
+        """Put a mocap body, such as a patch that marks the goal, elsewhere, from the coming control period on.
+
+        It pushes nothing away: such bodies are for being looked at. Belongs to the state.
+
+        Args:
+            pos: of its origin [m].
+            turn: its orientation (wxyz).
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+            UnknownName: there is no mocap body of that name.
+        """
+        self.check_event(f"moving {body}")
+        mocap = self.model.body_mocapid
+        if body not in self._bodies or mocap[self.body(body)] < 0:
+            raise UnknownName("mocap body", body, [name for name, b in self._bodies.items() if mocap[b] >= 0])
+        self.data.mocap_pos[mocap[self.body(body)]] = pos
+        self.data.mocap_quat[mocap[self.body(body)]] = turn
 
     # --- questions ------------------------------------------------------------------------
 

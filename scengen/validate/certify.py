@@ -12,6 +12,7 @@ from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
 from ..episode import Actions, Episode
 from ..errors import BadConfig, ScengenError
+from ..geometry import Mat3, Vec3
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.world import JAW, World, action_size
@@ -147,18 +148,27 @@ class Trial:
         return {"overlap": self.settings.overlap}, {"deepest": depth}, reason
 
     def _rest(self) -> "Finding":
-        """Nobody acts; the goal is watched too, at the start and at the end of the time."""
+        """Nobody acts; the goal is watched too, at the start and at the end of the time, or before the first event."""
         world, limits = self.world, self.settings.rest
-        self.solved_at_start = self.scenario.success(world)
         bodies = [b for b in world.free_bodies if b not in self.scenario.MOVING]
-        start = {b: (world.com(b), world.rot(b)) for b in bodies}
-        episode = Episode(self.scenario, world)
+
+        def seen() -> tuple[dict[str, tuple[Vec3, Mat3]], bool]:
+            return {b: (world.com(b), world.rot(b)) for b in bodies}, self.scenario.success(world)
+
+        start, self.solved_at_start = seen()
+        end, self.solved_after_rest = start, self.solved_at_start
+        episode, waiting = Episode(self.scenario, world), self.scenario.pending(world)
         for _ in range(round(limits.seconds / Loop.PERIOD)):
             if episode.step(world.filter(world.idle)) == "unstable":
                 return asdict(limits), {}, episode.reason
-        self.solved_after_rest = self.scenario.success(world)
-        drift = {b: float(np.linalg.norm(world.com(b) - start[b][0])) for b in bodies}
-        turn = {b: _angle(world.rot(b), start[b][1]) for b in bodies}
+            if waiting and not self.scenario.pending(world):
+                break  # what the event has set in motion is no lack of rest
+            if waiting:
+                end, self.solved_after_rest = seen()
+        else:
+            end, self.solved_after_rest = seen()
+        drift = {b: float(np.linalg.norm(end[b][0] - start[b][0])) for b in bodies}
+        turn = {b: _angle(end[b][1], start[b][1]) for b in bodies}
         worst, most = (
             max(drift, key=drift.__getitem__, default=""),
             max(turn, key=turn.__getitem__, default=""),

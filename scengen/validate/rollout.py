@@ -115,12 +115,11 @@ def run(
 
     Args:
         horizon: time limit for reaching the goal [s].
-        until_settled: the episode may end once the plan has ended and everything is at rest, provided that the scene
-            has no events of its own.
+        until_settled: the episode may end once the plan has ended, everything is at rest, and no event is pending.
         raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
     """
     world.reset()
-    stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
+    stillness = _Stillness(scenario, world) if until_settled else None
     return _live(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
 
 
@@ -134,7 +133,7 @@ def replay(
 ) -> Rollout:
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
-    stillness = _Stillness(world) if until_settled and _uneventful(scenario) else None
+    stillness = _Stillness(scenario, world) if until_settled else None
     return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
 
 
@@ -144,10 +143,6 @@ def try_shortcut(
     """Play a tempting plan as a certificate does: within the time limit, or where it must come to rest, beyond it."""
     patience = PATIENCE if shortcut.to_rest else 1.0
     return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True, raw=raw)
-
-
-def _uneventful(scenario: Scenario) -> bool:
-    return type(scenario).events is Scenario.events
 
 
 class _Planned:
@@ -206,13 +201,13 @@ class _Recorded:
 
 
 class _Stillness:
-    """Watches whether everything has come to rest after the actions have ended."""
+    """Watches whether everything has come to rest after the actions have ended, with no event to come."""
 
-    def __init__(self, world: World):
-        self.world, self.periods = world, 0
+    def __init__(self, scenario: Scenario, world: World):
+        self.scenario, self.world, self.periods = scenario, world, 0
 
     def lasts(self) -> bool:
-        moving = np.abs(self.world.data.qvel).max() >= STILL
+        moving = np.abs(self.world.data.qvel).max() >= STILL or self.scenario.pending(self.world)
         self.periods = 0 if moving else self.periods + 1
         return self.periods * Loop.PERIOD >= STILL_FOR
 

@@ -1,0 +1,39 @@
+"""A square mark on the table: the place where something is to go. Nothing collides with it."""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+
+from ..geometry import quat
+from ..params import param
+from .prop import Prop, Rgba, show, shown
+
+SHEET = 0.001
+"""Thickness of each of the two sheets [m]: enough to be drawn before the table."""
+TURNED_OVER = quat("x", math.pi)
+"""Orientation (wxyz) in which the lower side of a patch is up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Patch(Prop):
+    """Two sheets back to back: what lies on the table is seen, and what is turned down is hidden inside it.
+
+    An event that is to change how a patch looks turns it over. Which side is up belongs to the state then, and every
+    renderer shows it.
+    """
+
+    size: float = param(0.14, "m", 0.02, 0.4)
+    """Length of a side."""
+    rgba: Rgba = (0.30, 0.78, 0.36, 1.0)
+    below: Rgba = (0.05, 0.36, 0.12, 1.0)
+    """Colour of the lower side."""
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        half = [self.size / 2, self.size / 2, SHEET / 2]
+        shown(body, "upper", self.rgba, size=half, pos=[0.0, 0.0, SHEET / 2])
+        shown(body, "lower", self.below, size=half, pos=[0.0, 0.0, -SHEET / 2])
+
+
+if __name__ == "__main__":
+    show(Patch())
