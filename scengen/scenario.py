@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .assets.prop import TABLE_HALF
 from .errors import NoOracle
+from .orientation import UPRIGHT, Orientation
 from .params import canonical, check_bounds
 from .robots.panda import BASE, REACH, SHOULDER
 from .sim.world import World
@@ -182,6 +183,11 @@ class Scenario(abc.ABC):
         new insight to solve them. A certificate records them in its first check.
         """
         return {}
+
+    @property
+    def orientation(self) -> Orientation:
+        """How every picture of this scenario is held before a policy; people see it upright (`show`, `film`)."""
+        return UPRIGHT
 
     @property
     def id(self) -> str:

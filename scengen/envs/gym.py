@@ -26,7 +26,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size
 from ..validate.identity import check_versions
-from .observations import Reading, cameras_of, check_names, proprioception, streams_of
+from .observations import Reading, cameras_of, check_names, poses_of, proprioception, streams_of
 
 Observation = dict[str, Reading]
 
@@ -40,6 +40,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     and oracles in between (`scengen.control.teleop`).
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
+    Some scenarios are seen turned or mirrored (`Scenario.orientation`): then every picture is, `render` included, while
+    actions and all other streams stay as they are; `seen_<body>_pos` is where the picture lets a body appear.
 
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot was left idle for a
@@ -67,6 +69,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             task: name of the task; scenarios of others are refused.
             pool: folder of a pool, or several.
             observations: names of streams and cameras; what is not asked for costs nothing. Proprioception if None.
+                Privileged are `<body>_pos` [m] and `<body>_quat` (xyzw) of what can move; and `seen_<body>_pos` [m], if
+                the family turns pictures.
             render_mode: None or `rgb_array`.
             width: of all pictures [pixels].
             height: of all pictures [pixels].
@@ -75,7 +79,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             settle: whether a reached goal has to last as in the certificate.
 
         Raises:
-            ScengenError: a pool is missing, damaged, of another version or task; a name is unknown.
+            ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
+                seen turned by a quarter are not square.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
@@ -84,14 +89,18 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.task: Task = config.task(task)
         if observations is None:
             observations = proprioception(self.task.embodiment)
-        check_names(observations, self.task.embodiment)
+        poses = poses_of(self.task.family(), lambda: self.scenario.orientation)
+        check_names(observations, self.task.embodiment, poses)
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
-        known, self.views = streams_of(self.task.embodiment), cameras_of(self.task.embodiment)
+        known, self.views = {**streams_of(self.task.embodiment), **poses}, cameras_of(self.task.embodiment)
         self.streams = {name: known[name] for name in observations if name in known}
         self.cameras = [name for name in observations if name in self.views]
         self._rows = {row.id: row for folder in _folders(pool) for row in _scenarios(folder, task)}
         if not self._rows:
             raise PoolError("no pool was given")
+        if self._sees and width != height:
+            for row in self._rows.values():
+                self.task.scenario(row.params).orientation.check_size(width, height)
         self._order = list(self._rows)
         self._next = 0
         self._world: World | None = None
@@ -210,7 +219,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _picture(self, camera: str) -> NDArray[np.uint8]:
         if self._eye is None:
             self._eye = Camera(self.world, *self.size)
-        return self._eye.take(camera).copy()
+        return self._scenario.orientation.apply(self._eye.take(camera)).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
         row = self._row

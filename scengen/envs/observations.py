@@ -2,9 +2,12 @@
 
 Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top. The
 table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name.
+
+Where a scenario is seen turned or mirrored (`Scenario.orientation`), its pictures are, and no other stream: poses stay
+in the axes in which actions are meant. `seen_<body>_pos` tells what such a picture suggests, to policies without eyes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -12,7 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownName
+from ..geometry import Mat3
+from ..orientation import Orientation
 from ..robots.panda import JOINTS, MOST_ARMS, Names
+from ..scenario import Scenario
 from ..sim.world import JAW, Arm, World, hands
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
@@ -33,9 +39,10 @@ class Stream:
     read: Callable[[World], NDArray[np.float64]]
 
 
-def _hand_quat(arm: Arm) -> NDArray[np.float64]:
+def xyzw(rot: Mat3) -> NDArray[np.float64]:
+    """A rotation as a quaternion in the order that robosuite's keys promise, shape (4,)."""
     quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, arm.hand_rot.ravel())
+    mujoco.mju_mat2Quat(quat, rot.ravel())
     return np.array([quat[1], quat[2], quat[3], quat[0]])
 
 
@@ -92,7 +99,7 @@ def _of_arm(number: int, hand: str) -> dict[str, Stream]:
 
     found = {
         f"{robot}eef_pos": stream((3,), 3.0, lambda arm: arm.hand),
-        f"{robot}eef_quat": stream((4,), 1.0, _hand_quat),
+        f"{robot}eef_quat": stream((4,), 1.0, lambda arm: xyzw(arm.hand_rot)),
         f"{robot}joint_pos": stream((JOINTS,), 7.0, lambda arm: arm.joint_pos),
         f"{robot}joint_vel": stream((JOINTS,), 100.0, lambda arm: arm.joint_vel),
         f"{robot}gripper_qpos": stream((2,), 0.1, lambda arm: arm.finger_pos),
@@ -102,6 +109,30 @@ def _of_arm(number: int, hand: str) -> dict[str, Stream]:
     }
     lacking = [] if hand == JAW else [f"{robot}{name}" for name in JAW_ONLY]
     return {name: stream for name, stream in found.items() if name not in lacking}
+
+
+def turns_pictures(family: type[Scenario]) -> bool:
+    """Whether scenarios of a family may be seen turned or mirrored."""
+    return family.orientation is not Scenario.orientation
+
+
+def poses_of(scenario: Scenario, orientation: Callable[[], Orientation]) -> dict[str, Stream]:
+    """Privileged streams of everything in a scenario that can move: robosuite's names, and where pictures show it.
+
+    Args:
+        orientation: how the pictures of the running scenario are held; asked only if its family turns any.
+    """
+
+    def of(body: str) -> dict[str, Stream]:
+        poses = {
+            f"{body}_pos": Stream((3,), 3.0, lambda world: world.pos(body)),
+            f"{body}_quat": Stream((4,), 1.0, lambda world: xyzw(world.rot(body))),
+        }
+        seen = Stream((3,), 3.0, lambda world: orientation().seen_at(world.pos(body)))
+        return {**poses, f"seen_{body}_pos": seen} if turns_pictures(type(scenario)) else poses
+
+    movable = [body.name for body in scenario.build().bodies if body.joints]
+    return {name: stream for body in movable for name, stream in of(body).items()}
 
 
 POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
@@ -140,9 +171,9 @@ ALL = "+".join([JAW] * MOST_ARMS)
 """The robot that has every stream and camera that any has."""
 
 
-def check_names(names: Sequence[str], embodiment: str = ALL) -> None:
-    """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera."""
-    known = [*streams_of(embodiment), *cameras_of(embodiment)]
+def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> None:
+    """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera nor one of `poses`."""
+    known = [*streams_of(embodiment), *cameras_of(embodiment), *poses]
     for name in names:
         if name not in known:
             raise UnknownName("observation", name, known)

@@ -27,11 +27,14 @@ from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, hands
 from ..validate.identity import check_versions
+from .observations import turns_pictures
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
 # isort: split
+from robosuite import macros
 from robosuite.environments.base import REGISTERED_ENVS
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+from robosuite.utils.mjcf_utils import IMAGE_CONVENTION_MAPPING
 from robosuite.utils.observables import Observable, sensor
 from robosuite.utils.transform_utils import convert_quat
 
@@ -50,6 +53,10 @@ class RobosuiteEnv(ManipulationEnv):
     robosuite. `info` holds `scenario`, `success` and `reason`, why there is none and never will be.
     Goal, failures and events of the scene follow the certificate's clock of 100 Hz under any `control_freq`; the
     certificate itself holds for 100 Hz and robosuite's default controller.
+
+    Where a scenario is seen turned or mirrored (`Scenario.orientation`), every camera observation is, depth and
+    segmentation included; `seen_<body>_pos`, of modality "seen", is where the picture lets a body appear. `<body>_pos`,
+    the robot's own pose and actions stay as they are.
     """
 
     NAME: ClassVar[str] = ""
@@ -87,7 +94,8 @@ class RobosuiteEnv(ManipulationEnv):
             scenario: a row of a pool (`Pool.row`), or with `pool` how an id in it begins. Without it, every hard
                 reset draws one from the pool, decided by robosuite's `seed`.
             pool: folder of a pool.
-            use_object_obs: also observe `<body>_pos` [m] and `<body>_quat` (xyzw) of everything that can move.
+            use_object_obs: also observe `<body>_pos` [m] and `<body>_quat` (xyzw) of everything that can move; and
+                `seen_<body>_pos` [m], if the family turns pictures.
             gripper_types: "default" is the hand of each arm that the task asks for; no others are accepted.
             control_freq: actions in a second.
             horizon: actions in an episode; default: the task's time limit.
@@ -96,7 +104,8 @@ class RobosuiteEnv(ManipulationEnv):
             arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
 
         Raises:
-            ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite.
+            ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite;
+                pictures that are seen turned by a quarter are not square.
         """
         check_filter(action_filter)
         if action_filter and control_freq != round(1 / Loop.PERIOD):
@@ -152,6 +161,8 @@ class RobosuiteEnv(ManipulationEnv):
         super()._load_model()
         self.row = self._choice[int(self.rng.integers(len(self._choice)))]
         self.scenario = self.task.scenario(self.row.params)
+        for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
+            self.scenario.orientation.check_size(width, height)
         robots = [robot.robot_model for robot in self.robots]
         for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
             robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
@@ -175,10 +186,24 @@ class RobosuiteEnv(ManipulationEnv):
                 observables[name] = Observable(name=name, sensor=read, sampling_rate=self.control_freq)
         return observables
 
+    def _create_camera_sensors(self, *arguments: Any, **named: Any) -> tuple[list[Callable[..., Any]], list[str]]:
+        """robosuite's, with the pictures held as the running scenario has them."""
+        sensors, names = super()._create_camera_sensors(*arguments, **named)
+        return [self._held(read) for read in sensors], names
+
+    def _held(self, read: Callable[[Any], NDArray]) -> Callable[[Any], NDArray]:
+        rows = IMAGE_CONVENTION_MAPPING[macros.IMAGE_CONVENTION]  # 1: the first row is at the bottom; -1: on top
+
+        @sensor(modality=read.__modality__)  # type: ignore[attr-defined]
+        def picture(cache: Any) -> NDArray:
+            return self.scenario.orientation.apply(read(cache)[::-rows])[::-rows]
+
+        return picture
+
     def _reset_observables(self) -> None:
         """Another scenario may hold other things."""
         fresh = self._setup_observables()
-        things = {name for name, observable in self._observables.items() if observable.modality == "object"}
+        things = {name for name, observable in self._observables.items() if observable.modality in ("object", "seen")}
         for name in things - fresh.keys():
             del self._observables[name]
         for name in fresh.keys() - self._observables.keys():
@@ -230,7 +255,7 @@ class RobosuiteEnv(ManipulationEnv):
         return [model.body(int(body)).name for body in free if body not in self.world.own]
 
     def _pose(self, name: str) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
-        """Sensors of a body's position [m] and orientation (xyzw)."""
+        """Sensors of a body's position [m], orientation (xyzw), and of where pictures show it [m]."""
         body = self.world.body(name)
 
         @sensor(modality="object")
@@ -241,7 +266,12 @@ class RobosuiteEnv(ManipulationEnv):
         def quat(_: Any) -> NDArray[np.float64]:
             return convert_quat(np.array(self.sim.data.body_xquat[body]), to="xyzw")
 
-        return {f"{name}_pos": pos, f"{name}_quat": quat}
+        @sensor(modality="seen")
+        def seen(_: Any) -> NDArray[np.float64]:
+            return self.scenario.orientation.seen_at(self.sim.data.body_xpos[body])
+
+        poses = {f"{name}_pos": pos, f"{name}_quat": quat}
+        return {**poses, f"seen_{name}_pos": seen} if turns_pictures(self.task.family) else poses
 
 
 del REGISTERED_ENVS[RobosuiteEnv.__name__]  # only its subclasses have a task

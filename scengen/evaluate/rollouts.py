@@ -13,7 +13,6 @@ import numpy as np
 
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
-from ..envs.observations import check_names
 from ..errors import BadConfig, PoolError, ScengenError, at_least
 from ..log import Log
 from ..parallel import each
@@ -59,7 +58,6 @@ class Settings:
 
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
-        check_names(self.observations or [])
         check_filter(self.action_filter)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
 

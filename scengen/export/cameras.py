@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ..orientation import UPRIGHT, Orientation
 from ..robots import panda
 from ..sim.world import World
 
@@ -16,16 +17,18 @@ TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 """MuJoCo's cameras look along -z with y up; OpenCV's, which vision tools expect, along z with y down."""
 
 
-def calibration(world: World, name: str, width: int, height: int) -> dict[str, Any]:
+def calibration(world: World, name: str, width: int, height: int, orientation: Orientation = UPRIGHT) -> dict[str, Any]:
     """Intrinsics and extrinsics of a camera, rounded to a micrometre, as plain data.
 
     `intrinsics` is the 3 x 3 matrix K in pixels; the middle of the first pixel lies at (0.5, 0.5). `extrinsics` is the
-    4 x 4 matrix that takes points from the camera's frame (x right, y down, z ahead) to `frame` [m].
+    4 x 4 matrix that takes points from the camera's frame (x right, y down, z ahead) to `frame` [m]. Where pictures are
+    turned or mirrored, K takes points to the pixels in which they are seen: the camera stands where it stood.
     """
     model, data = world.model, world.data
     mujoco.mj_camlight(model, data)  # the control loop leaves cameras one physics step behind
     camera = model.camera(name)
     focal = height / 2 / np.tan(np.radians(float(camera.fovy[0])) / 2)
+    intrinsics = np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
     pose = _pose(data.cam_xpos[camera.id], data.cam_xmat[camera.id].reshape(3, 3) @ TO_OPENCV)
     frame, root = WORLD, model.body_rootid[camera.bodyid[0]]
     if model.body_weldid[camera.bodyid[0]] != 0:
@@ -36,9 +39,9 @@ def calibration(world: World, name: str, width: int, height: int) -> dict[str, A
         "model": "pinhole without distortion",
         "width": width,
         "height": height,
-        "intrinsics": [[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]],
+        "intrinsics": (orientation.pixels(width, height) @ intrinsics + 0.0).tolist(),  # + 0.0 turns -0.0 into 0.0
         "frame": frame,
-        "extrinsics": (pose.round(6) + 0.0).tolist(),  # + 0.0 turns -0.0 into 0.0
+        "extrinsics": (pose.round(6) + 0.0).tolist(),
     }
 
 

@@ -112,13 +112,15 @@ class DataSet:
         self._file, self._writer = 0, None
 
     def calibrate(self, camera: str, calibration: dict[str, Any], scenario: str) -> None:
-        """Say how a camera stands in the next episode.
+        """Say how a camera stands in the next episode, and how its pictures are turned.
 
         Raises:
-            BadConfig: it stood elsewhere before; a data set has one calibration for each camera.
+            BadConfig: that was different before; a data set has one calibration for each camera.
         """
         if self._cameras.setdefault(camera, calibration) != calibration:
-            raise BadConfig(f"{camera} stands elsewhere in scenario {scenario} than before it; record it by itself")
+            raise BadConfig(
+                f"{camera} stands elsewhere in scenario {scenario} than before it, or is turned; record it by itself"
+            )
 
     def add(self, values: Mapping[str, Any], pictures: Mapping[str, Picture]) -> None:
         """Append a row to the present episode."""

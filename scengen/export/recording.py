@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ..envs.observations import CAMERAS, Stream, cameras_of, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
+from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
@@ -138,11 +139,12 @@ def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
 def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:
     """Add one scenario's episode, and say whether it reached the goal."""
     world, success = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes)), False
+    held, size = scenario.orientation, (settings.width, settings.height)
     with ExitStack() as stack:
         views = cameras_of(row.embodiment)
-        pictures = _camera(stack, world, settings, views)
+        pictures = _camera(stack, world, settings, views, held)
         for name in settings.eyes:
-            data.calibrate(name, calibration(world, views[name], settings.width, settings.height), row.id)
+            data.calibrate(name, calibration(world, views[name], *size, held), row.id)
         for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
             data.add(moment.values(proprioception(row.embodiment)), moment.pictures)
             success = moment.success
@@ -153,14 +155,19 @@ def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings
 
 
 def _camera(
-    stack: ExitStack, world: World, settings: Settings, views: Mapping[str, str]
+    stack: ExitStack, world: World, settings: Settings, views: Mapping[str, str], held: Orientation
 ) -> Callable[[], dict[str, Picture]]:
-    """What takes the pictures of a moment, by the paper's names; OpenGL is touched only if there are any."""
+    """What takes the pictures of a moment, by the paper's names, as policies see them; without any, no OpenGL either.
+
+    Raises:
+        BadConfig: they are seen turned by a quarter and are not square.
+    """
     if not settings.eyes:
         return dict
+    held.check_size(settings.width, settings.height)
     camera = Camera(world, settings.width, settings.height)
     stack.callback(camera.close)
-    return lambda: {name: camera.take(views[name]) for name in settings.eyes}
+    return lambda: {name: held.apply(camera.take(views[name])) for name in settings.eyes}
 
 
 def _features(settings: Settings, robot: str) -> dict[str, Feature]:

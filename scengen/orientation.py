@@ -1,0 +1,83 @@
+"""How a picture is held before somebody: upright, turned by quarters, or as in a mirror; the eight ways of Exif.
+
+What is turned is the picture alone. Actions, the robot's own pose and all privileged poses stay in world axes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BadConfig
+from .geometry import Vec3
+
+FACED = np.array([-0.05, 0.0])
+"""Where the axis of the camera "agentview", in the middle of its pictures, meets the table: x and y [m]."""
+RIGHT_AND_UP = np.array([[0.0, 1.0], [-1.0, 0.0]])
+"""Takes x and y to the picture's right and up, for cameras that look at the table from the front or from above."""
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """An exchange of left and right, then quarter turns. Applied to pictures it moves pixels and changes none."""
+
+    turns: int = 0
+    """Quarter turns, counter-clockwise."""
+    mirrored: bool = False
+    """Whether left and right are exchanged before that."""
+
+    def apply(self, picture: NDArray) -> NDArray:
+        """The picture as it is seen: shape (height, width, ...), first row on top; odd turns swap width and height."""
+        seen = picture[:, ::-1] if self.mirrored else picture
+        return np.ascontiguousarray(np.rot90(seen, self.turns))
+
+    def check_size(self, width: int, height: int) -> None:
+        """Raise unless what is seen has the size of the picture [pixels], so that one shape serves all scenarios.
+
+        Raises:
+            BadConfig: an odd turn of a picture that is not square.
+        """
+        if self.turns % 2 and width != height:
+            raise BadConfig(
+                f"pictures of {width} x {height} pixels; here they are seen turned by a quarter and must be square: "
+                f"say width={height}, or height={width}"
+            )
+
+    def pixels(self, width: int, height: int) -> NDArray[np.float64]:
+        """Takes homogeneous pixel coordinates (x right, y down) of the picture to those of what is seen, shape (3, 3).
+
+        Args:
+            width: of the picture before it is turned [pixels].
+            height: of the same [pixels].
+        """
+        size = np.array([width, height])
+        down, found = np.diag([1.0, -1.0]), np.eye(3)
+        found[:2, :2] = down @ self._right_and_up @ down
+        found[:2, 2] = (size[::-1] if self.turns % 2 else size) / 2 - found[:2, :2] @ size / 2
+        return found
+
+    def seen_at(self, point: Vec3) -> Vec3:
+        """Where a thing seems to stand to somebody who takes the picture for upright [m], shape (3,).
+
+        Told for cameras before the table and above it, without regard to perspective: turned about `FACED`, at its
+        own height.
+        """
+        return self._moved(point, self._right_and_up)
+
+    def stands_at(self, seen: Vec3) -> Vec3:
+        """Where a thing stands that is seen there [m], shape (3,): the inverse of `seen_at`."""
+        return self._moved(seen, self._right_and_up.T)
+
+    @staticmethod
+    def _moved(point: Vec3, by: NDArray[np.float64]) -> Vec3:
+        moved = RIGHT_AND_UP.T @ by @ RIGHT_AND_UP @ (point[:2] - FACED)
+        return np.array([*(FACED + moved), point[2]])
+
+    @property
+    def _right_and_up(self) -> NDArray[np.float64]:
+        """What becomes of the picture's right and up, shape (2, 2)."""
+        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+        return np.linalg.matrix_power(quarter, self.turns % 4) @ np.diag([-1.0 if self.mirrored else 1.0, 1.0])
+
+
+UPRIGHT = Orientation()
