@@ -111,23 +111,23 @@ def climb(
         The rungs in the order of `RUNGS`, and how often the oracle solves the split.
     """
 
-    def play(work: Callable[..., dict[str, Any]], where: Path, which: str, count: int, what: str) -> list[dict]:
+    def play(work: Callable[..., dict], where: Path, which: str, count: int, what: str, library: bool) -> list[dict]:
         shifts = {name: str(dist) for name, dist in task.shifts(which).items()}
         identity = {"task": task.name, "split": which, "shifts": shifts, "seed": seed, "library": LIBRARY}
         identity["source"] = source_sha256(task.family)
         with Log(where, identity) as log:
             todo = sorted(set(range(count)) - {r["index"] for r in log.records})
-            if todo:
+            if todo and library:
                 _library(task, seed)  # before the workers: they are copies of this process
             for record in each(partial(work, task, which, seed), todo, workers, LIMITS, _lost):
                 log.add(record)
                 progress(what, len(log.records), count)
             return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])
 
-    own = play(_own, controls / "own.jsonl", ID, n, "memories in training")
-    any_id = play(_any, controls / "any.jsonl", ID, any_n, "any memory in training")
-    twins = play(_twin, folder / "twins.jsonl", split, n, "memories in twins")
-    any_ood = play(_any, folder / "any.jsonl", split, any_n, "any memory in twins")
+    own = play(_own, controls / "own.jsonl", ID, n, "memories in training", False)
+    any_id = play(_any, controls / "any.jsonl", ID, any_n, "any memory in training", True)
+    twins = play(_twin, folder / "twins.jsonl", split, n, "memories in twins", not _moves(task, split))
+    any_ood = play(_any, folder / "any.jsonl", split, any_n, "any memory in twins", True)
     return _rungs(own, any_id, twins, any_ood), _oracle(twins)
 
 
@@ -175,7 +175,7 @@ def _own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
 def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     """A twin's own memory, or the nearest one, in both arms. No `here` where nothing can be said."""
     trained, memory = recall(task, seed, index)
-    moved = any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
+    moved = _moves(task, split)
     record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}
     if memory is None:
         return record
@@ -188,6 +188,11 @@ def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     if (control := moved_within(task, task.shifts(split), seed, index, trained) if moved else trained) is not None:
         record["control"] = _outcomes(task, memory, control)
     return record
+
+
+def _moves(task: Task, split: str) -> bool:
+    """Whether what a split moves varies within training too: then a twin's own memory has a control there."""
+    return any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
 
 
 def _any(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
