@@ -132,7 +132,7 @@ def poses_of(scenario: Scenario, orientation: Callable[[], Orientation]) -> dict
         return {**poses, f"seen_{body}_pos": seen} if turns_pictures(type(scenario)) else poses
 
     scene = scenario.build()
-    return {name: stream for body in scene.bodies if body.joints for name, stream in of(body.name).items()}
+    return {name: stream for body in scene.bodies if body.joints or body.mocap for name, stream in of(body.name).items()}
 
 
 POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
