@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +24,10 @@ from .samplers.task import Task, load
 from .validate.settings import CertifySettings
 
 T = TypeVar("T")
+
+PACKAGES = "scengen.tasks"
+"""Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder
+in it that holds `task/<task>.yaml`."""
 
 
 @cache
@@ -74,11 +80,46 @@ def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
     return tuple(o for o in overrides if o.startswith("hydra.searchpath="))
 
 
+@cache
+def packages() -> tuple[str, ...]:
+    """Folders of configuration of installed packages that offer tasks (`PACKAGES`), as Hydra writes them.
+
+    Raises:
+        BadConfig: a package offers a folder that is not there.
+    """
+    return tuple(sorted(f"file://{_offered(point)}" for point in entry_points(group=PACKAGES)))
+
+
+def _offered(point: EntryPoint) -> str:
+    """The folder that an entry point names."""
+    try:
+        found = find_spec(point.value)
+    except (ImportError, ValueError):
+        found = None
+    folders = (found and found.submodule_search_locations) or ()
+    for folder in folders:
+        if Path(folder, "task").is_dir():
+            return folder
+    whose = point.dist.name if point.dist else point.name
+    raise BadConfig(f"the package {whose} offers tasks in {point.value}/task, which is not there; mend or remove it")
+
+
+def _with_packages(overrides: Sequence[str]) -> list[str]:
+    """Overrides in which Hydra also searches installed packages, behind the folders that they name themselves."""
+    named, others = search_path(overrides), [o for o in overrides if not o.startswith("hydra.searchpath=")]
+    if not packages():
+        return [*named, *others]
+    given = [override.value() for text in named if (override := _parsed(text))]
+    folders = [folder for each in given for folder in (each if isinstance(each, list) else [each])]
+    return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
+
+
 def tasks(search: Sequence[str] = ()) -> list[str]:
-    """Names of all task files, those of other packages included (`search_path`)."""
+    """Names of all task files, those of other packages included (`packages`, `search_path`)."""
     with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
         loader = GlobalHydra.instance().config_loader()
-        return sorted(loader.get_group_options("task", config_name="command/tasks", overrides=list(search)))
+        overrides = _with_packages(search)
+        return sorted(set(loader.get_group_options("task", config_name="command/tasks", overrides=overrides)))
 
 
 def task(name: str, search: Sequence[str] = ()) -> Task:
@@ -154,7 +195,7 @@ def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict
             asked = [_listed(o) for o in overrides]
             for override in asked:
                 _check_override(verb, override)
-            node = compose(f"command/{verb}", overrides=asked, return_hydra_config=True)
+            node = compose(f"command/{verb}", overrides=_with_packages(asked), return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
             del node["hydra"]
@@ -273,9 +314,9 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
     return BadConfig(f"{_first_lines(text)}; see scengen {verb} --help")
 
 
-def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | None:
+def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
     """Name the key at which the path of an override leaves the configuration."""
-    groups = [o for o in overrides if re.match(r"(task|certify)=", o)]
+    groups = _with_packages([o for o in overrides if re.match(r"(task|certify|hydra\.searchpath)=", o)])
     try:
         node: Any = compose(f"command/{verb}", overrides=groups)
     except HydraException:
@@ -286,7 +327,10 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             return None
         if part not in node:
             known = {*map(str, node), *([] if seen else _groups(verb))}
-            return UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
+            unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
+            if seen[:2] == ["task", "id"]:  # what a task file does not list stays at its nominal value: it can be added
+                return BadConfig(f"{unknown}; +{path}=... adds one")
+            return unknown
         seen.append(part)
         node = node[part]
     return None

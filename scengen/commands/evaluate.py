@@ -2,7 +2,7 @@
 
 from rich.table import Table
 
-from ..config import read
+from ..config import read, search_path
 from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
 from ..runs.progress import ProgressBar
 from . import FAILED, OK, Arguments, err, out, say, warn, write, write_json
@@ -11,7 +11,7 @@ from . import FAILED, OK, Arguments, err, out, say, warn, write, write_json
 def command(arguments: Arguments) -> int:
     settings = read("evaluate", arguments, Settings)
     with ProgressBar(err, f"evaluate {settings.policy}", 1) as progress_bar:
-        found = evaluate(settings, progress_bar.of)
+        found = evaluate(settings, progress_bar.of, search_path(arguments))
     lines = table(found.episodes)
     shown = Table("", "split", "ID", "OOD", "difference", title=f"{settings.policy}: success [%]", title_justify="left")
     for line in lines:

@@ -62,6 +62,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         camera: str = "agentview",
         action_filter: str | None = None,
         settle: bool = False,
+        search: Sequence[str] = (),
     ):
         """Open the pools.
 
@@ -77,6 +78,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             camera: what `render` shows: one of the paper's cameras (`cameras_of`) or any camera of the model.
             action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
             settle: whether a reached goal has to last as in the certificate.
+            search: `hydra.searchpath=[file:///path/to/conf]` for a task of a package that is not installed.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
@@ -86,7 +88,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
         check_filter(action_filter)
         self.action_filter, self.settle = action_filter, settle
-        self.task: Task = config.task(task)
+        self.task: Task = config.task(task, search)
         if observations is None:
             observations = proprioception(self.task.embodiment)
         poses = poses_of(self.task.family(), lambda: self.scenario.orientation)

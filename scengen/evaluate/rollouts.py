@@ -97,7 +97,7 @@ class Evaluation:
     """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
-def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evaluation:
+def evaluate(settings: Settings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> Evaluation:
     """Run every rollout that is still to do and return all episodes.
 
     Episodes are bound to the pools, the settings and the policy (see `policies.identity`): those of a policy that has
@@ -105,6 +105,7 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evalua
 
     Args:
         progress: told how many rollouts are done and how many there are.
+        search: overrides that add folders of other packages, see `config.search_path`.
 
     Raises:
         ScengenError: a pool, a policy or a setting is not as it must be.
@@ -121,10 +122,10 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None]) -> Evalua
         if not about:
             raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
-    path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings)
+    path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings, search)
     depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
     if settings.workers > 1:
-        player = PolicyPlayer(settings)  # each worker makes its own policy
+        player = PolicyPlayer(settings, search)  # each worker makes its own policy
     if settings.fresh:
         _move_aside(path)
     remedy = "say fresh=true to begin anew (they are moved aside), or choose another to="
@@ -277,8 +278,8 @@ def _move_aside(path: Path) -> None:
 class PolicyPlayer:
     """Plays rollouts: one environment and one policy at a time, kept as long as the task stays the same."""
 
-    def __init__(self, settings: Settings):
-        self.settings = settings
+    def __init__(self, settings: Settings, search: Sequence[str] = ()):
+        self.settings, self.search = settings, search
         self._running: tuple[PoolEnv, Policy] | None = None
 
     def __call__(self, which: RolloutId) -> dict[str, Any]:
@@ -333,6 +334,7 @@ class PolicyPlayer:
                 height=settings.height,
                 action_filter=settings.action_filter,
                 settle=True,
+                search=self.search,
             )
             memory = list(_training(folders)) if settings.policy == REPLAY else []
             self._running = env, made(settings.policy, find(settings.policy, memory), env)

@@ -8,7 +8,8 @@ from foreign.push_block import PushBlock
 
 from scengen import cli, config, conformance
 from scengen.conformance import Nonconformity
-from scengen.errors import BadConfig
+from scengen.envs.gym import PoolEnv
+from scengen.errors import BadConfig, UnknownName
 from scengen.samplers.dists import Fixed
 from scengen.scenario import Shortcut
 
@@ -56,3 +57,40 @@ def test_an_instruction_that_names_its_axis_is_caught():
     task = replace(config.task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
         conformance._told_well(task)
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """The package `foreign`, as if it were installed and offered its tasks."""
+    about = tmp_path / "foreign-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: foreign\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.conf\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    config.packages.cache_clear()
+    yield about
+    monkeypatch.undo()
+    config.packages.cache_clear()
+
+
+def test_an_installed_package_offers_its_tasks_to_every_command(installed, tmp_path, capsys):
+    assert {"push_block", "domino_single"} < set(config.tasks()) == set(config.tasks(SEARCH))
+    assert config.task("push_block").family is PushBlock
+    assert cli.run(("tasks", "task=push_bloc")) == 2 and "did you mean 'push_block'" in capsys.readouterr().err
+    (installed / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.config\n")
+    config.packages.cache_clear()
+    assert cli.run(("tasks",)) == 2
+    assert "package foreign offers tasks in foreign.config/task, which is not there" in capsys.readouterr().err
+
+
+def test_policies_play_foreign_tasks(tmp_path):
+    pool = tmp_path / "pool"
+    quickly = ("certify.robust.runs=1", "certify.robust.bound=0.04")
+    assert cli.run(("generate", "task=push_block", "n=1", f"pool={pool}", *SEARCH, *quickly)) == 0
+    env = PoolEnv("push_block", pool, search=SEARCH)
+    _, info = env.reset(seed=0)
+    assert info["split"] == "id"
+    with pytest.raises(UnknownName, match="no task named 'push_block'"):
+        PoolEnv("push_block", pool)
+    argv = ("evaluate", "policy=oracle", f"pool={pool}", "seeds=1", "rollouts=1", f"to={tmp_path / 'table'}")
+    assert cli.run((*argv, *SEARCH)) == 0 and "100.0" in (tmp_path / "table" / "table.md").read_text()
