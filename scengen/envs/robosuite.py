@@ -85,6 +85,8 @@ class RobosuiteEnv(ManipulationEnv):
         control_freq: int = 100,
         horizon: int | None = None,
         action_filter: str | None = None,
+        reward_scale: float = 1.0,
+        reward_shaping: bool = False,
         **arguments: Any,
     ):
         """Choose scenarios and build the first.
@@ -101,6 +103,8 @@ class RobosuiteEnv(ManipulationEnv):
             horizon: actions in an episode; default: the task's time limit.
             action_filter: None, the paper's interface for policies; or "teleop" for the filter that the actions of
                 people and oracles pass, which is defined for 100 Hz.
+            reward_scale: reward of a reached goal.
+            reward_shaping: False; there is no reward on the way, which would tell how the puzzle is solved.
             arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
 
         Raises:
@@ -110,7 +114,9 @@ class RobosuiteEnv(ManipulationEnv):
         check_filter(action_filter)
         if action_filter and control_freq != round(1 / Loop.PERIOD):
             raise BadConfig(f"action_filter = {action_filter}; it is defined for control_freq=100, not {control_freq}")
-        self.action_filter = action_filter
+        if reward_shaping:
+            raise BadConfig("reward_shaping = True; the only reward is that of the goal: say reward_shaping=False")
+        self.action_filter, self.reward_scale = action_filter, reward_scale
         self.task = config.task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
         grippers = [GRIPPERS[hand] for hand in hands(self.task.embodiment)]
@@ -128,8 +134,8 @@ class RobosuiteEnv(ManipulationEnv):
     # --- what robosuite asks for ----------------------------------------------------------
 
     def reward(self, action: NDArray[np.float64] | None = None) -> float:
-        """1 once the goal has been reached, else 0."""
-        return float(self._check_success())
+        """`reward_scale` once the goal has been reached, else 0."""
+        return self.reward_scale * float(self._check_success())
 
     def reset(self) -> Observations:
         """robosuite's reset, and the scene's events of the first control period."""

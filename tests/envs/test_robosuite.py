@@ -32,6 +32,7 @@ from scengen.validate.identity import versions
 # isort: split
 import robosuite
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+from robosuite.wrappers import DataCollectionWrapper, GymWrapper, VisualizationWrapper
 
 BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
 LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}
@@ -382,3 +383,39 @@ def test_the_command_explains_bad_input(given, capsys):
     pool = [] if given.startswith("pool") else [f"pool={REFERENCE}"]
     assert scengen(["robosuite", *pool, given]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+# --- robosuite's wrappers -------------------------------------------------------------------
+
+
+def test_robosuites_own_wrappers_take_the_environment(row, tmp_path):
+    env = robosuite.make("DominoSingle", robots="Panda", pool=REFERENCE, scenario=row.id, reward_scale=2.0, **BLIND)
+    flat = GymWrapper(env)
+    observation, _ = flat.reset(seed=0)
+    assert flat.reward_range == (0, 2.0) and observation.shape == flat.observation_space.shape
+    assert flat.action_space.shape == (7,)
+    reward = 0.0
+    for action in Pool.open(REFERENCE).row(row.id).witness:
+        _, reward, terminated, truncated, info = flat.step(action)
+        assert not (terminated or truncated)
+        if info["success"]:
+            break
+    assert reward == 2.0
+    env.close()
+
+
+def test_what_is_recorded_in_robosuites_way_holds_scene_and_states(row, tmp_path):
+    env = VisualizationWrapper(robosuite.make("DominoSingle", robots="Panda", pool=REFERENCE, scenario=row.id, **BLIND))
+    recorded = DataCollectionWrapper(env, str(tmp_path), collect_freq=1, flush_freq=10)
+    recorded.reset()
+    for action in row.witness[:10]:
+        recorded.step(action)
+    recorded.close()
+    (folder,) = tmp_path.iterdir()
+    kept = [np.load(path)["states"] for path in folder.glob("state_*.npz")]
+    assert sum(map(len, kept)) >= 10 and mujoco.MjModel.from_xml_path(str(folder / "model.xml")).nq
+
+
+def test_there_is_no_reward_on_the_way(row):
+    with pytest.raises(BadConfig, match="reward_shaping=False"):
+        robosuite.make("DominoSingle", pool=REFERENCE, scenario=row.id, reward_shaping=True, **BLIND)
