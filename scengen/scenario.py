@@ -107,6 +107,8 @@ class Scenario(abc.ABC):
     """How long the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()
     """Bodies that are meant to move without anybody acting; they are exempt from the rest check."""
+    DISTURBED: ClassVar[tuple[str, ...]] = ()
+    """Hinges whose start is disturbed in jittered runs, as the places of free bodies are."""
     NO_ABLATIONS: ClassVar[str] = ""
     """Why a family has no ablations: its certificates say so, and that this was not checked."""
     SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
@@ -135,7 +137,7 @@ class Scenario(abc.ABC):
         """Events of the scene itself, called before every control period. Draws nothing: all values are parameters.
 
         What they must know of the episode so far is in `world.memory`, which nothing else may write: a family has no
-        state. Nor may anything else call `arm.jam` or `world.move`.
+        state. Nor may anything else call `arm.jam`, `world.move`, `world.launch` or `world.spin`.
         """
 
     def pending(self, world: World) -> bool:

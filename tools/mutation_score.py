@@ -184,7 +184,7 @@ def flagged(task: str) -> dict[str, Any]:
         needed = causal(arena)
         for k in range(VARIED // len(subjects)):
             jitter = Jitter(f"varied/{subject.scenario.id}/{k}", 0.003, 2.0, 0.08, 0.15, 0.04, k % 2)
-            world = jitter.disturbed(arena.world)
+            world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
             if rollout.solved:
                 runs += 1

@@ -143,7 +143,7 @@ def causal(arena: Arena) -> frozenset[Pair]:
             limits.noise,
             k % 2 * limits.latency,
         )
-        world = jitter.disturbed(arena.world)
+        world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
         try:
             rollout = run(arena.scenario, world, arena.scenario.oracle, arena.horizon, SETTLE, jitter)
         except NoOracle:

@@ -18,6 +18,7 @@ from ..control.teleop import Filter
 from ..errors import NoEvent, UnknownName, Unstable
 from ..geometry import Mat3, Vec3
 from ..robots import panda, suction
+from ..robots.jaw import OVERLAP
 from ..robots.panda import MOST_ARMS, Names
 from . import scene_text
 from .memory import Memory
@@ -114,6 +115,12 @@ class Arm:
     def finger_pos(self) -> NDArray[np.float64]:
         """Positions of the two finger joints [m]; empty without a jaw."""
         return self.data.qpos[self._fingers]
+
+    @property
+    def gap(self) -> float:
+        """Distance of the two pads of a jaw [m]: nothing but air where they touch nothing."""
+        one, other = self.finger_pos
+        return float(one - other) - OVERLAP
 
     @property
     def suction(self) -> bool:
@@ -268,6 +275,37 @@ class World:
         self.data.mocap_pos[mocap[self.body(body)]] = pos
         self.data.mocap_quat[mocap[self.body(body)]] = turn
 
+    def passes(self, moment: float) -> bool:
+        """Whether the control period that begins now is the one in which `moment` [s] is due, to the nearest period."""
+        return abs(self.time - moment) < Loop.PERIOD / 2
+
+    def launch(self, body: str, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Give a free body a velocity, as by a blow.
+
+        Args:
+            linear: of its origin [m/s], world axes, shape (3,).
+            angular: of the body [rad/s], world axes, shape (3,).
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+            UnknownName: there is no such free body.
+        """
+        self.check_event(f"launching {body}")
+        if body not in self.free_bodies:
+            raise UnknownName("free body", body, self.free_bodies)
+        dof = int(self.model.body_dofadr[self.body(body)])
+        self.data.qvel[dof : dof + 3] = linear
+        self.data.qvel[dof + 3 : dof + 6] = self.rot(body).T @ np.asarray(angular, float)
+
+    def spin(self, joint: str, rate: float) -> None:
+        """Give a hinge a rate [rad/s].
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+        """
+        self.check_event(f"spinning {joint}")
+        self.data.qvel[self.model.joint(joint).dofadr[0]] = rate
+
     # --- questions ------------------------------------------------------------------------
 
     @property
@@ -307,6 +345,11 @@ class World:
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, self.body(body), velocity, 0)
         return velocity
+
+    def hinge(self, joint: str) -> tuple[float, float]:
+        """Angle [rad] and rate [rad/s] of a hinge."""
+        found = self.model.joint(joint)
+        return float(self.data.qpos[found.qposadr[0]]), float(self.data.qvel[found.dofadr[0]])
 
     def touching(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step of the last control period.

@@ -33,6 +33,9 @@ ALIGNED = 0.05
 WRIST_SPARE = math.radians(10.0)
 """How far joint 7 stays away from its limits when a hand may be turned either way [rad]."""
 
+STRAIGHT = math.radians(10.0)
+"""How far to the right a hand may look and still close as it does after a reset [rad]."""
+
 Condition = Callable[[], bool]
 
 
@@ -60,6 +63,18 @@ def facing_down(yaw: float = 0.0) -> Mat3:
     """Orientation of a hand that points down; at `yaw` = 0 [rad], as after a reset, the fingers close along y."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([[-s, c, 0.0], [c, s, 0.0], [0.0, 0.0, -1.0]])
+
+
+def facing(azimuth: float, tilt: float) -> Mat3:
+    """Orientation of a hand that looks along `azimuth`, `tilt` below the level [rad], and whose fingers close level.
+
+    Of the two rolls it is the one with which a hand gets there from above the table: with the other one, joint 6 or 7
+    ends on the way.
+    """
+    out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    closing = np.array([-out[1], out[0], 0.0]) * (1.0 if azimuth > -STRAIGHT else -1.0)
+    along = math.cos(tilt) * out - math.sin(tilt) * UP
+    return np.stack([closing, np.cross(along, closing), along], axis=1)
 
 
 def hand_yaw(arm: Arm) -> float:

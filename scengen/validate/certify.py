@@ -227,7 +227,7 @@ class Trial:
             )
             episode = run(
                 self.scenario,
-                jitter.disturbed(self.world),
+                jitter.disturbed(self.world, self.scenario.DISTURBED),
                 self.scenario.oracle,
                 self.horizon,
                 self.settings.settle,

@@ -2,6 +2,7 @@
 
 import copy
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -54,7 +55,7 @@ class Jitter:
     position: float
     """Largest displacement of a free body in x and in y [m]."""
     turn: float
-    """Largest turn of a free body about the vertical [deg]."""
+    """Largest turn of a free body about the vertical, and of what hangs on a disturbed hinge about that [deg]."""
     mass: float
     """Largest relative change of a free body's mass."""
     friction: float
@@ -64,13 +65,15 @@ class Jitter:
     latency: int
     """Control periods by which actions arrive late."""
 
-    def disturbed(self, world: World) -> World:
-        """A world like `world`, with its bodies moved, heavier or lighter, and more or less slippery."""
+    def disturbed(self, world: World, hinges: Sequence[str] = ()) -> World:
+        """A world like `world`, with its bodies moved, heavier or lighter, and more or less slippery.
+
+        Args:
+            hinges: that start turned, with what hangs on them heavier or lighter too: `Scenario.DISTURBED`.
+        """
         model = copy.copy(world.model)
         for name in world.free_bodies:
-            body = model.body(name)
-            joint = int(model.body_jntadr[body.id])
-            start = model.qpos0[model.jnt_qposadr[joint] :][:7]
+            start = model.qpos0[model.jnt_qposadr[model.body_jntadr[world.body(name)]] :][:7]
             start[:2] += (
                 spread(self.position, self.key, name, "x"),
                 spread(self.position, self.key, name, "y"),
@@ -81,9 +84,13 @@ class Jitter:
             )
             mujoco.mju_mulQuat(turned, turn, start[3:7])
             start[3:7] = turned
+        for hinge in hinges:
+            _turn_start(model, hinge, np.radians(spread(self.turn, self.key, hinge, "turn")))
+        hung = [model.body(int(model.joint(hinge).bodyid[0])).name for hinge in hinges]
+        for name in (*world.free_bodies, *hung):
             heavier = 1.0 + spread(self.mass, self.key, name, "mass")
             rougher = 1.0 + spread(self.friction, self.key, name, "friction")
-            for part in _subtree(model, body.id):
+            for part in _subtree(model, world.body(name)):
                 model.body_mass[part] *= heavier
                 model.body_inertia[part] *= heavier
                 model.geom_friction[model.geom_bodyid == part, 0] *= rougher
@@ -243,6 +250,24 @@ def _live(
             if step() != "success":
                 return ended(*episode.settled(), world.time)
     return ended(*episode.settled(), reached)
+
+
+def _turn_start(model: mujoco.MjModel, hinge: str, angle: float) -> None:
+    """Let what hangs on a hinge start turned by `angle` [rad], and the hinge read so.
+
+    A joint turns its body by its reading less `qpos0`: to change the start, the body's own place must be changed too.
+    """
+    joint = model.joint(hinge)
+    if model.jnt_type[joint.id] != mujoco.mjtJoint.mjJNT_HINGE:
+        raise ValueError(f"{hinge} is no hinge; only the start of a hinge can be turned")
+    body, turn, turned, before, after = int(joint.bodyid[0]), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(3)
+    mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
+    mujoco.mju_mulQuat(turned, model.body_quat[body], turn)
+    mujoco.mju_rotVecQuat(before, joint.pos, model.body_quat[body])
+    mujoco.mju_rotVecQuat(after, joint.pos, turned)
+    model.body_pos[body] += before - after
+    model.body_quat[body] = turned
+    model.qpos0[joint.qposadr[0]] += angle
 
 
 def _subtree(model: mujoco.MjModel, root: int) -> list[int]:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scengen.errors import UnknownName, Unstable
+from scengen.errors import NoEvent, UnknownName, Unstable
 from scengen.geometry import between
 from scengen.sim import scene_text
 from scengen.sim.world import IDLE, ROBOT, World
@@ -90,3 +90,30 @@ def test_an_unstable_simulation_is_an_error_and_names_the_warning(world):
     world.data.qvel[:] = 1e12
     with pytest.raises(Unstable, match="mjWARN"):
         play(world, WAVE)
+
+
+# --- events -----------------------------------------------------------------------------------
+
+
+def test_a_launched_body_flies_and_turns_as_it_was_told(world):
+    """Thrown up at 2 m/s it is v t - g t^2 / 2 higher after 0.1 s; a spin is given in world axes, however it lies."""
+    start = world.com("slab")
+    with world.events():
+        world.launch("slab", [0.3, 0.0, 2.0], [0.0, 0.0, 5.0])
+    for _ in range(10):
+        world.step(IDLE)
+    assert world.com("slab") - start == pytest.approx([0.03, 0.0, 0.2 - 9.81 * 0.005], abs=0.002)
+    assert world.velocity("slab")[:3] == pytest.approx([0.0, 0.0, 5.0], abs=0.01)
+    with pytest.raises(NoEvent):
+        world.launch("slab", [0.0, 0.0, 0.0])
+    with world.events(), pytest.raises(UnknownName, match="free body named 'table'"):
+        world.launch("table", [0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.3, 0.304, 1.0])
+def test_a_moment_is_due_in_one_control_period(world, moment):
+    due = []
+    for k in range(150):
+        due += [k] if world.passes(moment) else []
+        world.step(IDLE)
+    assert due == [round(moment / 0.01)]

@@ -12,6 +12,7 @@ from scengen.geometry import UP
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, World
 from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
+from scengen.tasks.pendulum_grasp import BOB, HINGE
 from scengen.validate.certify import certify, lower_bound
 from scengen.validate.rollout import Jitter, replay, run
 from scengen.validate.settings import CertifySettings, Robust
@@ -205,6 +206,20 @@ def test_jitter_moves_what_it_should_by_what_its_key_says():
     assert 0.95 <= moved.model.body_mass[slab] / world.model.body_mass[slab] <= 1.05
     assert moved.model.body_mass[slab] != world.model.body_mass[slab]
     assert np.array_equal(moved.model.body_mass[: world.body("tile_0")], world.model.body_mass[: world.body("tile_0")])
+
+
+def test_jitter_turns_a_hinge_that_is_named_about_its_axle():
+    """The bob of a pendulum stays at its distance from the axle, and the joint reads where it hangs."""
+    scenario = config.task("pendulum_grasp").draw("id", 0, 0).scenario
+    world = World.load(scene_text.emit(scenario.build())[0])
+    turned = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world, scenario.DISTURBED)
+    (before, _), (angle, rate) = world.hinge(HINGE), turned.hinge(HINGE)
+    assert 0 < abs(angle - before) <= math.radians(1.0) and rate == 0
+    assert turned.com(BOB) == pytest.approx(scenario.place(angle), abs=1e-6)
+    assert world.com(BOB) == pytest.approx(scenario.place(before), abs=1e-6)
+    assert turned.model.body_mass[world.body(BOB)] != world.model.body_mass[world.body(BOB)]
+    with pytest.raises(ValueError, match="no hinge"):
+        Jitter("k", 0, 1.0, 0, 0, 0, 0).disturbed(world, ["gripper0_right_finger_joint1"])
 
 
 # --- rollouts -----------------------------------------------------------------------------------

@@ -1,0 +1,147 @@
+"""Pendulum: a ball on a thin stiff rod that swings below a gantry in one plane, without any loss.
+
+    =====o=====     beam, along y
+         |  \\
+         |   \\  rod
+      angle   O  bob, at +x where the angle is positive
+
+A rod of no mass and a ball of radius r at the distance L from the axle swing as a simple pendulum of the length
+
+    l = L + 2/5 r^2 / L
+
+does. Its motion is known in closed form for any amplitude A: with w = sqrt(g / l), k = sin(A / 2) and u = w t,
+
+    sin(angle / 2) = k cd(u, k^2),    period = 4 K(k^2) / w,    rate^2 = 2 w^2 (cos angle - cos A),
+
+counted from the turning point at +A, with Jacobi's elliptic functions and K the complete elliptic integral of the first
+kind. (Landau and Lifshitz, Mechanics, section 11; the familiar 1 + A^2 / 16 + 11 A^4 / 3072 is the series of K.)
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+from scipy.special import ellipj, ellipk, ellipkinc
+
+from ..geometry import quat
+from ..params import param
+from .ball import STEEL
+from .prop import Prop, Rgba, show, shown, solid
+
+GRAVITY = 9.81
+"""[m/s^2]: MuJoCo's default."""
+ROD = 0.002
+"""Radius of the rod [m]."""
+BEAM = 0.008
+"""Half the thickness of beam and posts [m]."""
+FOOT = 0.024
+"""Half the length of a post's foot, along x, and its width [m]."""
+FREE = 0.02
+"""How far below the axle the rod begins to collide [m]: nearer it would touch the beam that it hangs on."""
+GREY, DARK = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pendulum(Prop):
+    """It swings along x, unless it is turned; the origin is on the ground below the axle, that of the swinging body
+    `bob` in the centre of the ball.
+
+    The paper gives no sizes ("a sphere swings on an undamped pendulum at moderate amplitude", App. B, T11).
+    """
+
+    length: float = param(0.40, "m", 0.2, 0.7)
+    """From the axle to the bob's centre."""
+    radius: float = param(0.022, "m", 0.010, 0.032)
+    """Of the bob."""
+    density: float = param(STEEL, "kg/m^3", 200.0, 12000.0)
+    friction: float = param(0.8, "1", 0.05, 1.5)
+    height: float = param(0.69, "m", 0.3, 1.0)
+    """Of the axle above the ground."""
+    span: float = param(0.19, "m", 0.1, 0.4)
+    """From the axle's middle to each post."""
+    angle: float = 0.0
+    """Where it starts [rad], positive where the bob is at +x; no parameter: the family decides."""
+    turn: float = 0.0
+    """By how much the plane of the swing is turned about the vertical, away from x [rad]; the gantry is not."""
+    rgba: Rgba = (0.80, 0.16, 0.12, 1.0)
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        for y in (-self.span, self.span):
+            solid(body, "", [BEAM, BEAM, self.height / 2], [0, y, self.height / 2], condim=3, rgba=GREY)
+            solid(body, "", [FOOT, FOOT / 2, 0.003], [0, y, 0.003], condim=3, rgba=GREY)
+        solid(body, "beam", [BEAM, self.span, BEAM], [0, 0, self.height], condim=3, rgba=GREY)
+        along, at = self.length * math.sin(self.angle), self.height - self.length * math.cos(self.angle)
+        frame = body.add_frame(quat=quat("z", self.turn))
+        bob = body.add_body(name="bob", pos=[along, 0, at], quat=quat("y", -self.angle))
+        bob.set_frame(frame)
+        self._hang(bob)
+
+    def _hang(self, bob: mujoco.MjsBody) -> None:
+        """Fill the swinging body. Its joint reads 0 where it hangs straight down."""
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
+        bob.add_joint(name="hinge", type=hinge, axis=[0, -1, 0], pos=[0, 0, self.length], ref=self.angle)
+        sphere, capsule = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE
+        solid(bob, "ball", [self.radius], type=sphere, mass=self.mass, friction=self.friction, rgba=self.rgba)
+        half = (self.length - FREE - self.radius) / 2
+        middle = [0, 0, self.radius + half]
+        solid(bob, "rod", [ROD, half, 0], middle, type=capsule, mass=0.0, condim=3, rgba=DARK)
+        shown(bob, "", DARK, type=capsule, size=[ROD, FREE / 2, 0], pos=[0, 0, self.length - FREE / 2])
+        for geom in bob.geoms:  # the drag of an ellipsoid, with all coefficients zero: air does not brake it
+            geom.fluid_ellipsoid, geom.fluid_coefs = 1, [0.0] * 5
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of its outline on the ground [m]."""
+        return 2 * FOOT, 2 * self.span + FOOT
+
+    # --- mechanics ------------------------------------------------------------------------
+
+    @property
+    def mass(self) -> float:
+        """Of the bob [kg]; the rod has none."""
+        return self.density * 4.0 / 3.0 * math.pi * self.radius**3
+
+    @property
+    def inertia(self) -> float:
+        """About the axle [kg m^2]."""
+        return self.mass * (self.length**2 + 0.4 * self.radius**2)
+
+    @property
+    def pace(self) -> float:
+        """Angular frequency of small swings [rad/s]."""
+        return math.sqrt(GRAVITY * self.mass * self.length / self.inertia)
+
+    def period(self, amplitude: float) -> float:
+        """Of a swing to `amplitude` [rad] on both sides [s]."""
+        return float(4.0 * ellipk(math.sin(amplitude / 2) ** 2) / self.pace)
+
+    def rate(self, amplitude: float, angle: float) -> float:
+        """How fast it passes `angle` [rad] if it swings to `amplitude` [rad], in [rad/s]; 0 beyond that."""
+        return self.pace * math.sqrt(2.0 * max(0.0, math.cos(angle) - math.cos(amplitude)))
+
+    def swing(self, amplitude: float, phase: float) -> tuple[float, float]:
+        """Angle [rad] and rate [rad/s] of a swing to `amplitude` [rad].
+
+        Args:
+            phase: time since the turning point on the positive side, as a share of the period.
+        """
+        k = math.sin(amplitude / 2)
+        sn, cn, dn, _ = ellipj(4.0 * ellipk(k * k) * (phase % 1.0), k * k)
+        angle = 2.0 * math.asin(k * cn / dn)
+        return angle, -math.copysign(self.rate(amplitude, angle), sn)
+
+    def amplitude(self, angle: float, rate: float) -> float:
+        """How far it swings [rad], by energy, if it passes `angle` [rad] at `rate` [rad/s]; pi if over the top."""
+        return math.acos(max(-1.0, math.cos(angle) - (rate / self.pace) ** 2 / 2))
+
+    def until_turning(self, angle: float, rate: float, side: int) -> float:
+        """Time until the next turning point on one side, -1 or 1, from `angle` [rad] and `rate` [rad/s], in [s]."""
+        k = math.sin(self.amplitude(angle, rate) / 2)
+        quarter = ellipk(k * k)
+        passed = ellipkinc(math.asin(min(1.0, max(-1.0, side * math.sin(angle / 2) / k))), k * k)
+        left = quarter - passed if side * rate >= 0.0 else 3 * quarter + passed
+        return float(left / self.pace)
+
+
+if __name__ == "__main__":
+    show(Pendulum())

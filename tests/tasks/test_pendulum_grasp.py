@@ -1,0 +1,131 @@
+"""The bob can be taken at its turning point, for as long as the law says, and at no other place or time."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from controls import (
+    ablated,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    not_certified,
+    play,
+    play_shortcut,
+    replayed,
+    solution,
+    unguarded,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.pendulum import Pendulum
+from scengen.sim.world import IDLE
+from scengen.tasks.pendulum_grasp import APEX, BOB, HINGE, PendulumGrasp
+
+TASK = config.task("pendulum_grasp")
+GRASP = TASK.draw("id", 0, 0).scenario
+
+
+def closing(scenario, late):
+    """What comes of fingers that touch `late` [s] after the turning point."""
+    return play(TASK, scenario, lambda world: scenario.close_before(world, scenario.closing - late))
+
+
+# --- the law of the task ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("phase", [-150.0, 0.0, 60.0, 180.0])
+def test_it_swings_from_any_moment_on_to_its_amplitude(phase):
+    """The event of the start gives it the rate that belongs to its angle; nobody is near."""
+    scenario = replace(GRASP, phase=phase)
+    world, angles = load(TASK, scenario), []
+    for _ in range(150):
+        with world.events():
+            scenario.events(world)
+        world.step(IDLE)
+        angles.append(world.hinge(HINGE)[0])
+    expected = [
+        scenario.pendulum.swing(scenario.reach, phase / 360.0 + (k + 1) / 100 / scenario.period)[0] for k in range(150)
+    ]
+    assert np.abs(np.array(angles) - expected).max() < math.radians(0.4)
+    assert max(angles) == pytest.approx(scenario.reach, rel=0.006) == -min(angles)  # half a step of Euler: 0.005
+    assert world.com(BOB) == pytest.approx(scenario.place(angles[-1]), abs=1e-4)
+
+
+@pytest.mark.parametrize(("length", "period"), [(0.30, 1.119), (0.40, 1.292), (0.55, 1.515)])
+def test_the_bob_waits_for_a_sixteenth_of_the_period(length, period):
+    """Near the turning point it moves as a cosine: arccos 0.98 / pi of the period."""
+    scenario = PendulumGrasp(pendulum=Pendulum(length=length))
+    assert scenario.period == pytest.approx(period, abs=0.001)
+    assert scenario.window / scenario.period == pytest.approx(math.acos(APEX) / math.pi, rel=0.01)
+
+
+@pytest.mark.parametrize(("share", "taken"), [(-1.6, False), (-0.5, True), (0.0, True), (0.5, True), (1.6, False)])
+def test_fingers_must_arrive_while_it_waits(share, taken):
+    """By halves of the window before (-) and after (+) the turning point."""
+    assert closing(GRASP, share * GRASP.window / 2).solved == taken
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_what_statics_says_of_a_moment_is_what_happens(right):
+    answer = GRASP.answer()
+    margin = 0.03  # as long as a period of control and the two fingers, which do not touch at once
+    sure = [m for m in answer.candidates if answer.right(m - margin) == answer.right(m) == answer.right(m + margin)]
+    moment = next(m for m in sure if answer.right(m) == right)
+    assert play(TASK, GRASP, lambda world: answer.act(world, moment)).solved == right
+
+
+# --- what must not work -------------------------------------------------------------------
+
+
+def test_a_bob_that_is_stopped_and_lifted_by_hand_is_lost_by_a_rule_alone():
+    assert "away from its turning point" in play_shortcut(TASK, GRASP, "stop_it_and_lift_it").reason
+    assert play_shortcut(TASK, unguarded(PendulumGrasp)(), "stop_it_and_lift_it").solved
+
+
+def test_a_jaw_that_closes_on_nothing_has_had_its_try():
+    assert closing(GRASP, -GRASP.period / 2).reason == "the jaw closed on nothing"
+
+
+def test_where_it_hangs_still_the_witness_closes_on_nothing():
+    ((ended, _),) = ablated(TASK, GRASP).values()
+    assert ended.reason == "the jaw closed on nothing"
+
+
+@pytest.mark.parametrize("axis", ["plane_45", "long_rod", "small_bob"])
+def test_a_memorised_grasp_is_lost_out_of_distribution(axis):
+    assert not replayed(TASK, GRASP, TASK.draw(axis, 0, 0).scenario).solved
+
+
+def test_the_same_swing_half_a_period_later_is_another_problem():
+    assert solution(TASK, GRASP).solved
+    assert not replayed(TASK, GRASP, replace(GRASP, phase=math.remainder(GRASP.phase + 180.0, 360.0))).solved
+
+
+# --- scenes that must not be certified ---------------------------------------------------
+
+
+def test_without_rules_it_is_not_certified():
+    not_certified(TASK, unguarded(PendulumGrasp)(), "shortcuts", "reaches the goal")
+
+
+def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
+    each_refuted_for_its_own_reason(
+        [
+            PendulumGrasp(pendulum=Pendulum(length=0.65)),
+            PendulumGrasp(pivot_y=0.25),
+            PendulumGrasp(pendulum=Pendulum(radius=0.024)),
+            PendulumGrasp(plane=60.0),
+            PendulumGrasp(amplitude=18.0),
+            PendulumGrasp(pivot_x=0.37, pivot_y=0.19, amplitude=21.0, pendulum=Pendulum(length=0.2, height=1.0)),
+        ]
+    )
+
+
+@given(scenario=anywhere(PendulumGrasp))
+@settings(max_examples=30, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
