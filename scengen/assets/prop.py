@@ -169,6 +169,19 @@ def place(scene: mujoco.MjSpec, asset: Prop, name: str, pos: ArrayLike, yaw: flo
         body.add_freejoint(name=f"{name}_free")
 
 
+def servo(scene: mujoco.MjSpec, joint: str, stiffness: float) -> None:
+    """Give a joint of the scene a servo that events drive (`World.drive`): a spring whose rest position they set.
+
+    Its damping belongs to the joint, which MuJoCo treats implicitly; that of an actuator is explicit, and unstable
+    where damping * time step exceeds the inertia.
+
+    Args:
+        stiffness: of the spring [N m/rad, or N/m].
+    """
+    drive = scene.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    drive.set_to_position(kp=stiffness)
+
+
 def show(asset: Prop) -> None:
     """Open MuJoCo's viewer on one asset standing on the table."""
     import mujoco.viewer

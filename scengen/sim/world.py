@@ -243,8 +243,12 @@ class World:
 
     @contextmanager
     def events(self) -> Iterator[None]:
-        """The moment before a control period in which a scenario's events happen; an `Episode` opens it."""
+        """The moment before a control period in which a scenario's events happen; an `Episode` opens it.
+
+        Forces of the period that has passed (`force`) end with it.
+        """
         self._happening = True
+        self.data.xfrc_applied[:] = 0.0
         try:
             yield
         finally:
@@ -296,6 +300,33 @@ class World:
         dof = int(self.model.body_dofadr[self.body(body)])
         self.data.qvel[dof : dof + 3] = linear
         self.data.qvel[dof + 3 : dof + 6] = self.rot(body).T @ np.asarray(angular, float)
+
+    def force(self, body: str, force: ArrayLike) -> None:
+        """Push a body at its centre of mass, for the coming control period and no longer: an impulse of force * 10 ms.
+
+        Args:
+            force: in world axes [N], shape (3,).
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+        """
+        self.check_event(f"pushing {body}")
+        self.data.xfrc_applied[self.body(body), :3] = force
+
+    def drive(self, joint: str, goal: float) -> None:
+        """Let a joint with a servo (`prop.servo`) go to `goal` [rad or m], from the coming control period on.
+
+        The goal belongs to the state; it is 0 at the start.
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+            UnknownName: the joint has no servo.
+        """
+        self.check_event(f"driving {joint}")
+        servos = {self.model.actuator(i).name: i for i in range(self.model.nu)}
+        if joint not in servos:
+            raise UnknownName("servo", joint, servos)
+        self.data.ctrl[servos[joint]] = goal
 
     def spin(self, joint: str, rate: float) -> None:
         """Give a hinge a rate [rad/s].

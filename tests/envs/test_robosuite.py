@@ -13,6 +13,7 @@ from helpers import REFERENCE, pictures_are_possible
 from pools import certificate_of
 
 from scengen import config
+from scengen.assets.prop import servo
 from scengen.certificate import Certificate
 from scengen.cli import run as scengen
 from scengen.control.teleop import LARGEST_CHANGE
@@ -266,6 +267,25 @@ def test_events_and_verdict_keep_their_clock_under_any_control_frequency(row, mo
     slow.step(IDLE), slow.step(IDLE)
     np.testing.assert_allclose(looks, 0.01 * np.arange(1, 11), atol=1e-9)
     assert slow.horizon == 20 * row.horizon
+
+
+def test_a_servo_of_the_scene_goes_where_events_drive_it_here_and_there(row):
+    scene = mujoco.MjSpec.from_string(row.scene_xml)
+    lid = scene.worldbody.add_body(name="lid", pos=[-0.2, -0.25, 1.0])
+    lid.add_joint(name="lid/hinge", axis=[0, 1, 0], damping=20.0, armature=0.05)
+    lid.add_geom(size=[0.1, 0.1, 0.005], type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.1, 0, 0], mass=0.5)
+    servo(scene, "lid/hinge", 200.0)
+    text = scene_text.emit(scene)[0]
+    env = made(replace(row, scene_xml=text), hard_reset=False)
+    env.reset()
+    here = World.load(text)
+    for world, step in ((env.world, lambda: env.step(IDLE)), (here, lambda: here.apply(IDLE.astype(np.float32)))):
+        with world.events():
+            world.drive("lid/hinge", 0.5)
+        for _ in range(20):
+            step()
+    np.testing.assert_allclose(env.world.hinge("lid/hinge"), here.hinge("lid/hinge"), atol=1e-12)
+    assert 0.1 < here.hinge("lid/hinge")[0] < 0.6
 
 
 # --- robosuite's habits -------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 
 from scengen.assets.box import Cube
 from scengen.assets.patch import TURNED_OVER, Patch
-from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.assets.prop import BOX, TABLE_TOP, place, servo, table
 from scengen.certificate import Check
 from scengen.control.loop import Loop
 from scengen.episode import Episode
@@ -26,6 +26,7 @@ from scengen.validate.rollout import AT_REST, replay, run
 from scengen.validate.settings import QUICK
 
 JAMMED_FOR = 0.3
+LID_MASS, LID_STIFFNESS, LID_DAMPING = 0.5, 200.0, 20.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,18 +42,21 @@ class Surprise(Scenario):
         place(scene, Cube(), "cube", [0.1, 0.0, TABLE_TOP])
         place(scene, Patch(), "patch", [0.0, 0.2, TABLE_TOP], free=False)
         scene.body("patch").mocap = True
+        lid = scene.worldbody.add_body(name="lid", pos=[-0.2, -0.25, TABLE_TOP + 0.2])
+        lid.add_joint(name="lid/hinge", axis=[0, 1, 0], damping=LID_DAMPING, armature=0.05)
+        lid.add_geom(size=[0.1, 0.1, 0.005], type=BOX, pos=[0.1, 0, 0], mass=LID_MASS)
+        servo(scene, "lid/hinge", LID_STIFFNESS)
         return scene
 
     def success(self, world: World) -> bool:
         return world.memory["happened"] > 0 and world.com("cube")[2] > 1.0
 
     def events(self, world: World) -> None:
-        world.data.xfrc_applied[:] = 0.0
         if not world.memory["happened"] and world.time > self.when - 1e-9:
             world.memory["happened"] = 1.0
             world.memory["jammed_until"] = world.time + JAMMED_FOR
             world.move("patch", [0.0, -0.2, TABLE_TOP], TURNED_OVER)
-            world.data.xfrc_applied[world.body("cube"), 0] = self.knock
+            world.force("cube", [self.knock, 0.0, 0.0])
         world.arm.jam(world.time < world.memory["jammed_until"] - 1e-9)
 
     def pending(self, world: World) -> bool:
@@ -104,8 +108,11 @@ def test_what_was_never_remembered_has_no_name(world):
         lambda world: world.memory.__setitem__("happened", 1.0),
         lambda world: world.arm.jam(True),
         lambda world: world.move("patch", [0, 0, 1]),
+        lambda world: world.force("cube", [1, 0, 0]),
+        lambda world: world.launch("cube", [1, 0, 0]),
+        lambda world: world.drive("lid/hinge", 1.0),
     ],
-    ids=["memory", "jam", "move"],
+    ids=["memory", "jam", "move", "force", "launch", "drive"],
 )
 def test_only_events_change_the_course_of_things(world, change):
     before = world.state()
@@ -246,7 +253,8 @@ class Early(Surprise):
 
     def events(self, world: World) -> None:
         super().events(world)
-        world.data.xfrc_applied[world.body("cube"), 0] = self.knock * (world.time < 0.1)
+        if world.time < 0.1:
+            world.force("cube", [self.knock, 0.0, 0.0])
 
 
 def test_what_moves_before_the_first_event_is():
@@ -265,3 +273,37 @@ def test_of_a_family_that_does_not_say_the_whole_time_is_watched():
     scenario = Secretive(knock=50.0)
     assert "cube drifts" in rest(scenario).reason
     assert run(scenario, load(scenario), lambda w: hold(w.arm, 0.1), 4.0, until_settled=True).seconds == 4.0
+
+
+# --- forces and servos --------------------------------------------------------------------
+
+
+def test_a_force_is_an_impulse_of_one_period(world):
+    """m v = (F - m g) t, off the table."""
+    mass, force, dof = Cube().mass, 5.0, world.model.body("cube").dofadr[0]
+    with world.events():
+        world.force("cube", [0.0, 0.0, force])
+    world.apply(world.filter(world.idle))
+    assert world.data.qvel[dof + 2] == pytest.approx((force / mass - 9.81) * Loop.PERIOD, rel=0.01)
+    with world.events():
+        pass
+    world.apply(world.filter(world.idle))
+    assert world.data.qvel[dof + 2] == pytest.approx((force / mass - 2 * 9.81) * Loop.PERIOD, rel=0.01)
+
+
+@pytest.mark.parametrize("goal", [-0.6, 0.9])
+def test_a_servo_goes_where_it_is_driven_and_sags_by_the_torque_that_it_holds(goal):
+    """A spring of stiffness k under a load: k (goal - angle) = m g l cos(angle), about y, which turns down."""
+    world = load(Surprise())
+    with world.events():
+        world.drive("lid/hinge", goal)
+    for _ in range(150):
+        world.apply(world.filter(world.idle))
+    angle, rate = world.hinge("lid/hinge")
+    assert abs(rate) < 1e-3
+    assert LID_STIFFNESS * (angle - goal) == pytest.approx(LID_MASS * 9.81 * 0.1 * np.cos(angle), rel=0.01)
+
+
+def test_only_joints_with_a_servo_are_driven(world):
+    with world.events(), pytest.raises(UnknownName, match="did you mean 'lid/hinge'"):
+        world.drive("lid/hing", 1.0)
