@@ -46,29 +46,8 @@ def xyzw(rot: Mat3) -> NDArray[np.float64]:
     return np.array([quat[1], quat[2], quat[3], quat[0]])
 
 
-def wrench(arm: Arm) -> NDArray[np.float64]:
-    """Force [N] and torque [N m] that the hand exerts on the wrist, axes of the wrist's sensor frame, shape (6,).
-
-    The same numbers as robosuite's force and torque sensors; computed on demand, since sensors in the model would
-    cost time in every step.
-    """
-    world = arm.world
-    mujoco.mj_rnePostConstraint(world.model, world.data)
-    site = world.model.site(Names(arm.number).wrist_site).id
-    body = int(world.model.site_bodyid[site])
-    local = np.empty(6)
-    root = int(world.model.body_rootid[body])
-    moment, force = world.data.cfrc_int[body, :3], world.data.cfrc_int[body, 3:]
-    lever = world.data.site_xpos[site] - world.data.subtree_com[root]
-    frame = world.data.site_xmat[site].reshape(3, 3)
-    local[:3] = frame.T @ force
-    local[3:] = frame.T @ (moment - np.cross(lever, force))
-    return local
-
-
 def _world_force(arm: Arm) -> NDArray[np.float64]:
-    frame = arm.data.site(Names(arm.number).wrist_site).xmat.reshape(3, 3)
-    return frame @ wrench(arm)[:3]
+    return arm.wrist_rot @ arm.wrench()[:3]
 
 
 def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
@@ -103,7 +82,7 @@ def _of_arm(number: int, hand: str) -> dict[str, Stream]:
         f"{robot}joint_pos": stream((JOINTS,), 7.0, lambda arm: arm.joint_pos),
         f"{robot}joint_vel": stream((JOINTS,), 100.0, lambda arm: arm.joint_vel),
         f"{robot}gripper_qpos": stream((2,), 0.1, lambda arm: arm.finger_pos),
-        f"{further}force_torque": stream((6,), 1e4, wrench),
+        f"{further}force_torque": stream((6,), 1e4, lambda arm: arm.wrench()),
         f"{further}force_torque_world": stream((3,), 1e4, _world_force),
         **{f"{robot}{name}": stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},
     }

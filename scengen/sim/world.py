@@ -85,6 +85,7 @@ class Arm:
         self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
         self._fingers = panda.fingers(model, names)
         self._site = model.site(names.grip_site).id
+        self._wrist = model.site(names.wrist_site).id
 
     @property
     def label(self) -> str:
@@ -147,6 +148,46 @@ class Arm:
         """
         self.world.check_event("jamming a gripper")
         self.world.loop.jam(self.number, on)
+
+    def wrench(self) -> NDArray[np.float64]:
+        """Force [N] and torque [N m] between hand and wrist, axes of the wrist's sensor frame, shape (6,).
+
+        The same numbers as robosuite's force and torque sensors; computed on demand, since sensors in the model would
+        cost time in every step. A hand at rest reads what supports it: a force that points up.
+        """
+        model, data = self.world.model, self.data
+        mujoco.mj_rnePostConstraint(model, data)
+        body = int(model.site_bodyid[self._wrist])
+        moment, force = data.cfrc_int[body, :3], data.cfrc_int[body, 3:]
+        lever = data.site_xpos[self._wrist] - data.subtree_com[model.body_rootid[body]]
+        frame = self.wrist_rot
+        return np.concatenate([frame.T @ force, frame.T @ (moment - np.cross(lever, force))])
+
+    def load(self) -> NDArray[np.float64]:
+        """Force [N] and torque about the grip site [N m] that support what the hand holds, world axes, shape (6,).
+
+        By Newton's law this is what the wrist reads, less what gravity and its own motion take of the hand itself.
+        """
+        model, data = self.world.model, self.data
+        mujoco.mj_rnePostConstraint(model, data)
+        first = int(model.site_bodyid[self._wrist])
+        moment, force = -data.cfrc_ext[self._hand_parts].sum(axis=0).reshape(2, 3)
+        lever = self.hand - data.subtree_com[model.body_rootid[first]]
+        return np.concatenate([force, moment - np.cross(lever, force)])
+
+    @functools.cached_property
+    def _hand_parts(self) -> list[int]:
+        """Indices of the bodies beyond the wrist."""
+        model, parts = self.world.model, [int(self.world.model.site_bodyid[self._wrist])]
+        for body in range(parts[0] + 1, model.nbody):
+            if int(model.body_parentid[body]) in parts:
+                parts.append(body)
+        return parts
+
+    @property
+    def wrist_rot(self) -> Mat3:
+        """Orientation of the wrist's force and torque sensor."""
+        return self.data.site_xmat[self._wrist].reshape(3, 3).copy()
 
     @functools.cached_property
     def wrist_range(self) -> tuple[float, float]:

@@ -1,10 +1,12 @@
 """Moves of a two-finger jaw: pick up, put down, poke. See `motion`."""
 
+from collections.abc import Generator
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..geometry import UP, Mat3, Vec3
-from ..scenario import Plan
+from ..scenario import Action, Plan
 from ..sim.world import Arm
 from .motion import (
     CLOSED,
@@ -21,6 +23,9 @@ from .motion import (
     retreat,
     until,
 )
+
+Wrench = NDArray[np.float64]
+"""Force [N] and torque [N m], shape (6,)."""
 
 SQUEEZE = 0.3
 """How long the fingers need to close and to build up force [s]: enough, by `robots.jaw.time_to_grip` from the widest
@@ -104,6 +109,24 @@ def carry(
     world, target = arm.world, np.asarray(pos, float)
     turn = np.eye(3) if rot is None else rot @ world.rot(body).T
     yield from until(go_to(arm, target + turn @ (arm.hand - world.com(body)), turn @ arm.hand_rot, pace), ends)
+
+
+def weigh(arm: Arm, seconds: float = 0.3, settle: float = 0.1) -> Generator[Action, None, Wrench]:
+    """Hold still and feel the weight of what is in the hand.
+
+    Args:
+        seconds: over which the readings are averaged [s].
+        settle: how long before that the hand is held still [s].
+
+    Returns:
+        `Arm.load`, averaged: force [N] and torque about the grip site [N m] that support it, world axes, shape (6,).
+    """
+    yield from hold(arm, settle)
+    readings: list[Wrench] = []
+    for action in hold(arm, seconds):
+        yield action
+        readings.append(arm.load())
+    return np.mean(readings, axis=0)
 
 
 def poke(

@@ -1,0 +1,37 @@
+"""A narrow ridge with a level top on a plate: what lies across it stays if its centre of mass is over the top."""
+
+from dataclasses import dataclass
+
+import mujoco
+
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+
+PLATE = 0.010
+"""Thickness of the plate [m]."""
+MARGIN = 0.010
+"""How far the plate reaches beyond the ends of the ridge [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ridge(Prop):
+    """Runs along x; the origin is the middle of its foot. The ridge is a body of its own, so that goals can name it."""
+
+    width: float = param(0.012, "m", 0.003, 0.04)
+    """Of the level top, along y."""
+    length: float = param(0.10, "m", 0.04, 0.20)
+    height: float = param(0.06, "m", 0.02, 0.15)
+    """Of the top above the foot."""
+    plate: float = param(0.10, "m", 0.04, 0.20)
+    """Width of the plate, along y."""
+    rgba: Rgba = (0.45, 0.47, 0.50, 1.0)
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        foot, wall = [self.length / 2 + MARGIN, self.plate / 2, PLATE / 2], (self.height - PLATE) / 2
+        solid(body, "plate", foot, [0, 0, PLATE / 2], rgba=self.rgba)
+        ridge = body.add_body(name="ridge")
+        solid(ridge, "wall", [self.length / 2, self.width / 2, wall], [0, 0, PLATE + wall], rgba=self.rgba)
+
+
+if __name__ == "__main__":
+    show(Ridge())
