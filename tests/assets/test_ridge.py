@@ -11,9 +11,9 @@ from scengen.assets.rod import Rod
 
 
 def tilt_after(ridge, rod, off, spin=0.0, turned=0.0, timestep=0.002):
-    """Tilt of a rod after 2 s whose centre of mass starts `off` the middle of the ridge [m], with a spin about its edge [rad/s].
+    """Tilt after 2 s of a rod whose centre of mass starts `off` the middle of the ridge [m].
 
-    `turned` is the angle between the ridge and the square to the rod [rad].
+    `spin` is about the ridge's edge [rad/s], `turned` the angle between the ridge and the square to the rod [rad].
     """
     scene = table()
     scene.option.timestep = timestep

@@ -1,4 +1,4 @@
-"""A rod stays on the ridge where its centre of mass is over it; nobody can see where that is, and the wrist feels it."""
+"""A rod stays on the ridge if its centre of mass is over it; nobody can see where that is, and the wrist feels it."""
 
 import math
 from dataclasses import dataclass, replace
