@@ -1,0 +1,285 @@
+"""T27 slip-recovery: carry a thing to a place with a gripper that opens unasked on the way.
+
+      start            slip               goal        seen from the side
+       __       __ __ __ _                 __
+      |  |  -> |  |     |  | v            |  |
+    --+--+--------------+--+-----[========+--+====]--
+
+Bottleneck: the plan that was good is void. The slip must be noticed, the thing found where it fell, taken again and
+carried on; whoever goes on, or only grips harder, arrives with an empty hand.
+
+Decisions, where the paper (App. B, T27) says "once during transport, the gripper unexpectedly opens for a brief window"
+and "sliding the object is not allowed":
+
+* Transport means carried at least `LIFTED` above where it stood. A thing 1 cm above the table stays between the fingers
+  when they open, and is held again when they close. From `LIFTED` it is lost: a jaw that points down holds a thing at
+  most 31 mm under its highest point, where the palm begins, and its tips end 9 mm below: once it has fallen by the sum
+  its top is under the tips. The slip comes some way from where the thing came to be so high, as the crow flies, and
+  without it no goal counts: nothing is gained by creeping along lower, or by letting the slip happen on the spot.
+* During the window the gripper is open whatever is commanded, and then obeys again. The window lasts longer than that
+  fall: shorter ones are refuted.
+* Placed means: lifted again after the last slip, and let go in the region, at rest. What falls into it is not placed.
+* Slid is what has gone `SLID` over the table pushed by the robot, all stretches added up: touched while it lay, and as
+  long as it lies after that. Where it goes after a fall does not count.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..assets.patch import Patch
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.ycb import Ycb
+from ..control.loop import Loop
+from ..errors import GaveUp
+from ..geometry import UP, Vec3
+from ..params import param
+from ..predicates import fallen, rests_on, still
+from ..robots.jaw import PALM_ABOVE, TIP
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.memory import remember
+from ..sim.world import ROBOT, World
+from ..skills.grip import WIDEST, best_grip, extent
+from ..skills.jaw import carry, grasp, pick, poke, put, release
+from ..skills.motion import COARSE, OPEN, Pace, go_to, retreat
+
+LIFTED, LOWERED = 0.05, 0.042
+"""How far a thing must be lifted to count as carried, and how low it may sink then [m]: both more than `PALM_ABOVE` and
+`TIP` together."""
+SLID = 0.04
+"""How far in all the robot may push the thing over the table [m]; a grasp and a landing move it by less."""
+RAISED = 0.07
+"""How high the oracle carries the thing [m]; from 12 cm things fall on the face that they stood on."""
+CALM, RESTED = 0.02, 0.2
+"""Speed below which a thing counts as at rest [m/s], and for how long it must be so before it is taken again [s]."""
+ABOVE = 0.10
+"""Height from which the oracle comes down on the thing [m]."""
+BRISK = Pace(0.2, 0.01)
+"""How fast the oracle carries."""
+LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / 9.81)
+"""From the beginning of a slip until the thing is below the finger tips [s]: 20 ms to let go, then free fall."""
+OVERRUN = 0.03
+"""How far a thing flies on that is lost on the way, taken together with how far it had come when it was raised [m]."""
+MEMORY = ("slips", "jam_ends", "stood", "high", "high_x", "high_y", "recovered", "pushed", "slid", "x", "y")
+"""How often and until when the jaw has slipped; how high the thing's centre of mass was when it last touched the table
+[m]; whether it is carried so high that it may slip, and since where [m]; whether it has been so since the last slip;
+whether it lies where the robot pushed it, and how far in all [m]; where it was a period ago [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slip:
+    """When the gripper opens, and for how long."""
+
+    after: float = param(0.10, "m", 0.03, 0.5, hidden=True)
+    """How far the thing has come, seen from above, from where it was raised by `LIFTED`."""
+    seconds: float = param(0.30, "s", 0.05, 3.0, hidden=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlipRecovery(Scenario):
+    """A thing on the table, a green square at some distance, and one slip or several on the way."""
+
+    HOLD = 0.5
+    NO_ABLATIONS = "the scene holds nothing that helps; without the slip less would be left to do"
+
+    x: float = param(0.0, "m", -0.4, 0.4)
+    y: float = param(0.17, "m", -0.4, 0.4)
+    yaw: float = param(0.0, "deg", -90.0, 90.0, period=360.0)
+    goal_x: float = param(0.0, "m", -0.4, 0.4)
+    goal_y: float = param(-0.20, "m", -0.4, 0.4)
+    slips: int = param(1, "slips", 0, 3, hidden=True)
+    slip_0: Slip = Slip()
+    slip_1: Slip = Slip()
+    slip_2: Slip = Slip()
+    thing: Ycb = Ycb(item=8)
+    patch: Patch = Patch()
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        scene = table()
+        remember(scene, *MEMORY)
+        place(scene, self.thing, "thing", [self.x, self.y, TABLE_TOP], math.radians(self.yaw))
+        place(scene, self.patch, "patch", self.goal, free=False)
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        if not world.memory["recovered"] or world.memory["slips"] < self.slips:
+            return False
+        away = np.abs(world.com("thing") - self.goal)[:2].max()
+        return bool(away <= self.patch.size / 2) and rests_on(world, "thing", "table") and still(world, "thing", CALM)
+
+    def failure(self, world: World) -> str | None:
+        if world.memory["slid"] > SLID:
+            return "the robot slid the thing over the table"
+        return "the thing fell off the table" if fallen(world, "thing") else None
+
+    def events(self, world: World) -> None:
+        """Watch where the thing is carried and pushed, and open the jaw when it is time."""
+        memory, at = world.memory, world.com("thing")
+        touched, lies = world.touching(ROBOT, "thing"), world.touching("thing", "table")
+        memory["pushed"] = float(lies and (touched or memory["pushed"] > 0))
+        if memory["pushed"]:
+            memory["slid"] += math.hypot(at[0] - memory["x"], at[1] - memory["y"])
+        memory["x"], memory["y"] = at[:2]
+        if lies:
+            memory["stood"] = at[2]
+        raised = at[2] - memory["stood"] >= (LOWERED if memory["high"] else LIFTED)
+        carried = raised and touched and not lies and not self.pending(world)
+        if carried and not memory["high"]:
+            memory["high_x"], memory["high_y"], memory["recovered"] = at[0], at[1], 1.0
+        memory["high"] = float(carried)
+        slips, come = int(memory["slips"]), math.hypot(at[0] - memory["high_x"], at[1] - memory["high_y"])
+        if carried and slips < self.slips and come >= self.planned[slips].after:
+            memory["slips"], memory["jam_ends"] = slips + 1, world.time + self.planned[slips].seconds
+            memory["high"] = memory["recovered"] = 0.0
+        world.arm.jam(self.pending(world))
+
+    def pending(self, world: World) -> bool:
+        """As long as the gripper is forced open."""
+        return world.time < world.memory["jam_ends"] - 1e-9
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Pick up, carry; as soon as the hand is empty find the thing and begin again; put down."""
+        while True:
+            yield from self.take(world)
+            yield from self.bring(world)
+            if world.touching(ROBOT, "thing"):
+                break
+            yield from release(world.arm)
+            yield from self.settle(world)
+        yield from self.set_down(world)
+
+    def take(self, world: World, lift: float = RAISED) -> Plan:
+        """Take hold of the thing wherever and however it lies, and lift it [m]."""
+        grip = best_grip(world.arm, "thing")
+        if grip is None:
+            raise GaveUp("the thing lies so that no jaw can take it")
+        above = grip.at + ABOVE * UP
+        yield from go_to(world.arm, above, pace=COARSE, grip=OPEN)  # there it is seen which way the wrist can turn
+        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=lift)
+
+    def settle(self, world: World) -> Plan:
+        """Wait until the thing has been at rest for a while: a can that rocks is slow at the end of every swing."""
+        quiet = 0.0
+        while quiet < RESTED:
+            yield world.idle
+            quiet = quiet + Loop.PERIOD if still(world, "thing", CALM) else 0.0
+
+    def bring(self, world: World, height: float = RAISED) -> Plan:
+        """Carry it over the goal, as long as it is in the hand."""
+        level = np.array([*self.goal[:2], world.memory["stood"] + height])
+        yield from carry(world.arm, "thing", level, pace=BRISK, ends=lambda: not world.touching(ROBOT, "thing"))
+
+    def set_down(self, world: World) -> Plan:
+        """Lower what is in the hand at the goal until it stands, let go, go up."""
+        stands = np.array([*self.goal[:2], world.memory["stood"]])
+        yield from put(world.arm, "thing", stands, "table", hover=0.03)
+        yield from retreat(world.arm, 0.06)
+
+    # --- shortcuts ------------------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "carry_on": Shortcut(self._carry_on),
+            "grip_harder": Shortcut(self._grip_harder),
+            "carry_it_low": Shortcut(self._carry_low),
+            "drag_it": Shortcut(self._drag),
+            "push_the_rest": Shortcut(self._push_rest),
+        }
+
+    def _over(self, world: World, height: float, pace: Pace = BRISK) -> Plan:
+        """Take the hand over the goal, whatever is in it: at what height above the table [m]."""
+        yield from go_to(world.arm, np.array([*self.goal[:2], TABLE_TOP + height]), pace=pace)
+
+    def _carry_on(self, world: World) -> Plan:
+        """As if nothing had happened: over the goal, down, open."""
+        yield from self.take(world)
+        held_at = world.arm.hand[2] - TABLE_TOP
+        yield from self._over(world, held_at)
+        yield from self._over(world, held_at - RAISED)
+        yield from release(world.arm)
+        yield from retreat(world.arm)
+
+    def _grip_harder(self, world: World) -> Plan:
+        """As soon as it slips stop and squeeze for as long as slips last, then go on with what is in the hand."""
+        yield from self.take(world)
+        held_at = world.arm.hand[2] - TABLE_TOP
+        yield from self.bring(world)
+        yield from grasp(world.arm, 0.6)
+        yield from self._over(world, held_at)
+        yield from self._over(world, held_at - RAISED)
+        yield from release(world.arm)
+        yield from retreat(world.arm)
+
+    def _carry_low(self, world: World) -> Plan:
+        """1 cm above the table, where a thing that slips stays between the fingers."""
+        yield from self.take(world, lift=0.0)
+        yield from self.bring(world, 0.01)
+        yield from self.set_down(world)
+
+    def _drag(self, world: World) -> Plan:
+        """Take hold of it and draw it over the table, which no slip can prevent."""
+        yield from self.take(world, lift=0.0)
+        yield from self.bring(world, 0.0)
+        yield from release(world.arm)
+        yield from retreat(world.arm)
+
+    def _push_rest(self, world: World) -> Plan:
+        """Once it has fallen push it home with closed fingers."""
+        yield from self.take(world)
+        yield from self.bring(world)
+        yield from self.settle(world)
+        at, way = world.com("thing"), (self.goal - world.com("thing")) * [1.0, 1.0, 0.0]
+        along = way / np.linalg.norm(way)
+        low, high = extent(world, "thing", -along)
+        behind = np.array([at[0], at[1], min(at[2], TABLE_TOP + 0.03)]) - ((high - low) / 2 + 0.03) * along
+        yield from poke(world.arm, behind, 0.1 * along, lambda: float((self.goal - world.com("thing")) @ along) <= 0.0)
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        width = self.thing.row.width
+        yield require(width is not None and width <= WIDEST, "no jaw takes the thing", width=width or math.inf)
+        for slip in self.planned:
+            yield require(slip.seconds > LOST, "the thing stays in the hand", seconds=slip.seconds, lost=LOST)
+        come, way = sum(slip.after for slip in self.planned), math.dist(self.start, self.goal)
+        least = come + self.patch.size / 2 + OVERRUN * len(self.planned)
+        yield require(way >= least, "the goal is reached before the last slip", way=way, least=least)
+        spots = np.array([self.start, self.goal])
+        yield on_table("the way", spots, margin=self.patch.size / 2)
+        yield within_reach("the way", *(spots + 0.2 * UP))
+
+    def features(self) -> Mapping[str, float]:
+        """How far the thing has come when it falls for the last time, as a share of the way."""
+        come, way = sum(slip.after for slip in self.planned), math.dist(self.start, self.goal)
+        return {
+            "slips": float(self.slips),
+            "share_of_the_way_at_the_last_slip": come / way,
+            "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
+            "way": way,
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def start(self) -> Vec3:
+        """Where the thing stands [m]."""
+        return np.array([self.x, self.y, TABLE_TOP])
+
+    @property
+    def goal(self) -> Vec3:
+        """Middle of the region [m]."""
+        return np.array([self.goal_x, self.goal_y, TABLE_TOP])
+
+    @property
+    def planned(self) -> tuple[Slip, ...]:
+        """The slips that happen, in their order."""
+        return (self.slip_0, self.slip_1, self.slip_2)[: self.slips]
