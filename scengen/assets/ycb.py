@@ -7,7 +7,7 @@ a table meets. `mesh_of` finds the scan of an object in a folder of them, for `s
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -309,14 +309,24 @@ class Ycb(Prop):
     """One of `ITEMS`, which stands or lies where its docstring says."""
 
     item: int = param(0, "index", 0, len(ITEMS) - 1)
+    low: int = param(0, "1", 0, 1)
+    """1: a carton lies on its narrow side, where that is lower than it stands; all else stands as it does."""
 
     @property
     def row(self) -> Item:
         """What is known about the object."""
         return ITEMS[self.item]
 
+    @property
+    def prop(self) -> Prop:
+        """The solid, as it stands or lies."""
+        prop = self.row.prop
+        if self.low and isinstance(prop, Carton) and prop.height > prop.width:
+            return replace(prop, width=prop.height, height=prop.width)
+        return prop
+
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        self.row.prop.fill(body, spec)
+        self.prop.fill(body, spec)
 
 
 PLACES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")

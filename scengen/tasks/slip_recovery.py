@@ -14,8 +14,10 @@ and "sliding the object is not allowed":
 * Transport means carried at least `LIFTED` above where it stood. A thing 1 cm above the table stays between the fingers
   when they open, and is held again when they close. From `LIFTED` it is lost: a jaw that points down holds a thing at
   most 31 mm under its highest point, where the palm begins, and its tips end 9 mm below: once it has fallen by the sum
-  its top is under the tips. The slip comes some way from where the thing came to be so high, as the crow flies, and
-  without it no goal counts: nothing is gained by creeping along lower, or by letting the slip happen on the spot.
+  its top is under the tips. The slip comes a distance from where the thing came to be so high, seen from above, and
+  without it no goal counts: nothing is gained by creeping along lower, or by letting the slip happen on the spot. That
+  distance is hidden and of wide range, and the thing stands with its narrow side along the way: a hand that goes down
+  blindly where things fall on average comes down beside it or on top of it, and there is no time to do so twice.
 * During the window the gripper is open whatever is commanded, and then obeys again. The window lasts longer than that
   fall: shorter ones are refuted.
 * Placed means: lifted again after the last slip, and let go in the region, at rest. What falls into it is not placed.
@@ -38,8 +40,8 @@ from ..errors import GaveUp
 from ..geometry import UP, Vec3
 from ..params import param
 from ..predicates import fallen, rests_on, still
-from ..robots.jaw import PALM_ABOVE, TIP
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..robots.jaw import OPENED, PALM_ABOVE, TIP
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.grip import WIDEST, best_grip, extent
@@ -61,8 +63,10 @@ BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
 LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / 9.81)
 """From the beginning of a slip until the thing is below the finger tips [s]: 20 ms to let go, then free fall."""
-OVERRUN = 0.03
-"""How far a thing flies on that is lost on the way, taken together with how far it had come when it was raised [m]."""
+FLOWN = 0.018
+"""How far a thing flies that is lost at the oracle's pace [m]: 16 to 22 mm measured."""
+OVERRUN, SHORTEST = 0.03, 0.015
+"""How far a thing flies on that is lost on the way, and how far it must come before a slip and be away after it [m]."""
 MEMORY = ("slips", "jam_ends", "stood", "high", "high_x", "high_y", "recovered", "pushed", "slid", "x", "y")
 """How often and until when the jaw has slipped; how high the thing's centre of mass was when it last touched the table
 [m]; whether it is carried so high that it may slip, and since where [m]; whether it has been so since the last slip;
@@ -73,8 +77,8 @@ whether it lies where the robot pushed it, and how far in all [m]; where it was 
 class Slip:
     """When the gripper opens, and for how long."""
 
-    after: float = param(0.10, "m", 0.03, 0.5, hidden=True)
-    """How far the thing has come, seen from above, from where it was raised by `LIFTED`."""
+    share: float = param(0.4, "1", 0.05, 0.95, hidden=True)
+    """Of the way that is left, start to the rim of the square, at which it comes."""
     seconds: float = param(0.30, "s", 0.05, 3.0, hidden=True)
 
 
@@ -87,14 +91,15 @@ class SlipRecovery(Scenario):
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.17, "m", -0.4, 0.4)
-    yaw: float = param(0.0, "deg", -90.0, 90.0, period=360.0)
+    yaw: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
+    """Of the thing; at 90 the narrow side of every box and tin lies along y."""
     goal_x: float = param(0.0, "m", -0.4, 0.4)
     goal_y: float = param(-0.20, "m", -0.4, 0.4)
     slips: int = param(1, "slips", 0, 3, hidden=True)
     slip_0: Slip = Slip()
     slip_1: Slip = Slip()
     slip_2: Slip = Slip()
-    thing: Ycb = Ycb(item=8)
+    thing: Ycb = Ycb(item=8, low=1)
     patch: Patch = Patch()
 
     # --- scene ----------------------------------------------------------------------------
@@ -135,7 +140,7 @@ class SlipRecovery(Scenario):
             memory["high_x"], memory["high_y"], memory["recovered"] = at[0], at[1], 1.0
         memory["high"] = float(carried)
         slips, come = int(memory["slips"]), math.hypot(at[0] - memory["high_x"], at[1] - memory["high_y"])
-        if carried and slips < self.slips and come >= self.planned[slips].after:
+        if carried and slips < self.slips and come >= self.distance(slips):
             memory["slips"], memory["jam_ends"] = slips + 1, world.time + self.planned[slips].seconds
             memory["high"] = memory["recovered"] = 0.0
         world.arm.jam(self.pending(world))
@@ -243,6 +248,33 @@ class SlipRecovery(Scenario):
         behind = np.array([at[0], at[1], min(at[2], TABLE_TOP + 0.03)]) - ((high - low) / 2 + 0.03) * along
         yield from poke(world.arm, behind, 0.1 * along, lambda: float((self.goal - world.com("thing")) @ along) <= 0.0)
 
+    def answer(self) -> Answer:
+        """Where the thing lies after its first slip: how far from the start on the straight way to the goal [m].
+
+        Whoever guesses right needs not look whether it has slipped, nor when. Time allows for one guess.
+        """
+        width = self.thing.row.width or OPENED
+
+        def right(away: float) -> bool:
+            lies = self.distance(0) + FLOWN if self.slips else math.inf
+            return self.slips == 1 and abs(away - lies) <= (OPENED - width) / 2
+
+        return Answer(tuple(round(0.01 * k, 2) for k in range(2, 46)), self._guess, right, tries=1)
+
+    def _guess(self, world: World, away: float) -> Plan:
+        """Carry the thing past the guess, open, come down at the guess, and carry on from there, all blindly."""
+        yield from self.take(world)
+        along = (self.goal - self.start) / math.dist(self.goal, self.start)
+        high, begin = RAISED * UP, world.arm.hand
+        low = begin - (world.com("thing")[2] - world.memory["stood"]) * UP
+        yield from go_to(world.arm, begin + (away + OVERRUN) * along, pace=BRISK)
+        yield from release(world.arm)
+        for there, closed in ((away, True), (math.dist(self.goal, self.start), False)):
+            yield from go_to(world.arm, low + high + there * along, pace=BRISK)
+            yield from go_to(world.arm, low + there * along)
+            yield from (grasp if closed else release)(world.arm)
+            yield from go_to(world.arm, low + high + there * along)
+
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
@@ -250,19 +282,20 @@ class SlipRecovery(Scenario):
         yield require(width is not None and width <= WIDEST, "no jaw takes the thing", width=width or math.inf)
         for slip in self.planned:
             yield require(slip.seconds > LOST, "the thing stays in the hand", seconds=slip.seconds, lost=LOST)
-        come, way = sum(slip.after for slip in self.planned), math.dist(self.start, self.goal)
-        least = come + self.patch.size / 2 + OVERRUN * len(self.planned)
-        yield require(way >= least, "the goal is reached before the last slip", way=way, least=least)
+        left, span = self.left(len(self.planned)), SHORTEST
+        yield require(left >= span, "no way is left after the last slip", left=left, least=span)
+        shortest = min((self.distance(i) for i in range(self.slips)), default=math.inf)
+        yield require(shortest >= span, "a slip comes before the thing is on its way", distance=shortest, least=span)
         spots = np.array([self.start, self.goal])
         yield on_table("the way", spots, margin=self.patch.size / 2)
         yield within_reach("the way", *(spots + 0.2 * UP))
 
     def features(self) -> Mapping[str, float]:
         """How far the thing has come when it falls for the last time, as a share of the way."""
-        come, way = sum(slip.after for slip in self.planned), math.dist(self.start, self.goal)
+        way = self.left(0)
         return {
             "slips": float(self.slips),
-            "share_of_the_way_at_the_last_slip": come / way,
+            "share_of_the_way_at_the_last_slip": 1.0 - self.left(self.slips) / way,
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,
         }
@@ -283,3 +316,14 @@ class SlipRecovery(Scenario):
     def planned(self) -> tuple[Slip, ...]:
         """The slips that happen, in their order."""
         return (self.slip_0, self.slip_1, self.slip_2)[: self.slips]
+
+    def left(self, slips: int) -> float:
+        """Way from where the thing falls for the last of the first `slips` times to the rim of the square [m]."""
+        way = math.dist(self.start, self.goal) - self.patch.size / 2
+        for slip in self.planned[:slips]:
+            way -= slip.share * (way - OVERRUN) + OVERRUN
+        return way
+
+    def distance(self, slip: int) -> float:
+        """How far from where it has been raised the thing slips, the first time and later ones [m]."""
+        return self.planned[slip].share * (self.left(slip) - OVERRUN)

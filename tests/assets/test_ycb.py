@@ -70,6 +70,17 @@ def test_boxes_and_cans_also_lie_still_on_their_sides_and_stand_on_their_heads(i
         assert drift < 2e-4 and turn < math.radians(0.25)
 
 
+@pytest.mark.parametrize("index", [i for i, item in enumerate(ITEMS) if isinstance(item.prop, Carton | Tin)])
+def test_laid_low_it_is_the_same_thing_no_higher_and_as_narrow(index):
+    upright, low = Ycb(item=index), Ycb(item=index, low=1)
+    (x, y, z), (a, b, c) = (np.ptp(np.reshape(united(ycb).bounding_box(), (2, 3)), axis=0) for ycb in (upright, low))
+    assert (a, *sorted((b, c))) == pytest.approx((x, *sorted((y, z))), abs=2e-4) and c <= min(y, z) + 2e-4
+    inertias = [np.sort(ycb.spec().compile().body("body").inertia) for ycb in (upright, low)]
+    np.testing.assert_allclose(*inertias)
+    drift, turn = settled(low)
+    assert drift < 1e-5 and turn < 1e-4
+
+
 @ALL
 def test_it_weighs_what_the_list_says_and_is_as_large_as_the_thing(index):
     model = Ycb(item=index).spec().compile()
