@@ -44,7 +44,7 @@ from ..robots.jaw import OPENED, PALM_ABOVE, TIP
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
-from ..skills.grip import WIDEST, best_grip, extent
+from ..skills.grip import best_grip, extent
 from ..skills.jaw import carry, grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, Pace, go_to, retreat
 
@@ -245,7 +245,8 @@ class SlipRecovery(Scenario):
         at, way = world.com("thing"), (self.goal - world.com("thing")) * [1.0, 1.0, 0.0]
         along = way / np.linalg.norm(way)
         low, high = extent(world, "thing", -along)
-        behind = np.array([at[0], at[1], min(at[2], TABLE_TOP + 0.03)]) - ((high - low) / 2 + 0.03) * along
+        top = extent(world, "thing", UP)[1] - 0.02  # the palm stays above it
+        behind = np.array([at[0], at[1], top]) - ((high - low) / 2 + 0.03) * along
         yield from poke(world.arm, behind, 0.1 * along, lambda: float((self.goal - world.com("thing")) @ along) <= 0.0)
 
     def answer(self) -> Answer:
@@ -278,8 +279,8 @@ class SlipRecovery(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        width = self.thing.row.width
-        yield require(width is not None and width <= WIDEST, "no jaw takes the thing", width=width or math.inf)
+        row = self.thing.row
+        yield require(row.width is not None, "no jaw takes the thing", number=row.number)
         for slip in self.planned:
             yield require(slip.seconds > LOST, "the thing stays in the hand", seconds=slip.seconds, lost=LOST)
         left, span = self.left(len(self.planned)), SHORTEST
