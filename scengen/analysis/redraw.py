@@ -79,5 +79,14 @@ def redrawn(
 
 
 def scenarios_of(task: Task, pool: Pool) -> dict[str, Scenario]:
-    """The scenarios of a pool by id."""
-    return {id_: task.scenario(params) for id_, params in pool.columns("id", "params")}
+    """The scenarios of a pool by id.
+
+    Raises:
+        PoolError: a scenario stands in it twice.
+    """
+    found: dict[str, Scenario] = {}
+    for id_, params in pool.columns("id", "params"):
+        if id_ in found:
+            raise PoolError(f"{pool.folder} holds scenario {id_} twice; see scengen verify")
+        found[id_] = task.scenario(params)
+    return found

@@ -126,6 +126,16 @@ def test_the_command_tells_about_a_pool_and_refuses_a_chosen_one(made, tmp_path,
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'one'}")) == 2
 
 
+def test_a_scenario_that_stands_twice_is_not_chosen_twice(made, tmp_path, capsys):
+    other = shutil.copytree(made, tmp_path / "other")
+    first = next(Pool.open(other).rows())
+    rewritten(other, lambda row: replace(first, index=row.index))
+    for command in (("subset", "n=1", f"to={tmp_path / 'few'}"), ("compare",)):
+        assert cli.run((*command, f"pool={other}")) == 2
+        assert f"holds scenario {first.id} twice" in capsys.readouterr().err
+    assert not (tmp_path / "few").exists()
+
+
 def test_leaked_scenarios_make_the_comparison_fail(made, tmp_path, capsys):
     assert cli.run(("compare", f"pool={made}", f"json={tmp_path / 'c.json'}")) == 0
     assert cli.run(("compare", f"pool={made},{made}", "permutations=9")) == 1
