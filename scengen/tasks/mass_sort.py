@@ -75,7 +75,7 @@ class MassSort(Scenario):
     """Paper, App. B: 50, 100 and 200 g."""
     order: int = param(3, "", 0, 5, hidden=True)
     """Which of `ORDERS` they lie in."""
-    edge: float = param(0.045, "m", 0.02, 0.065)
+    edge: float = param(0.045, "m", 0.02, 0.07)
     friction: float = param(0.6, "1", 0.2, 1.5)
     mirrored: int = param(0, "", 0, 1)
     """1: the zone of the lightest cube is on the right."""
@@ -102,15 +102,20 @@ class MassSort(Scenario):
     def success(self, world: World) -> bool:
         return all(
             self.within(world, cube, rank) and rests_on(world, cube, "table") and still(world, cube, STANDS)
-            for cube, rank in zip(self.cubes, self.ranks, strict=True)
+            for cube, rank in self.belongs(world).items()
         )
 
     def failure(self, world: World) -> str | None:
-        for cube, rank in zip(self.cubes, self.ranks, strict=True):
+        for cube, rank in self.belongs(world).items():
             let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
             if let_go and any(self.within(world, cube, other) for other in range(COUNT) if other != rank):
                 return "a cube was put into a wrong zone"
         return "a cube fell off the table" if fallen(world, *self.cubes) else None
+
+    def belongs(self, world: World) -> dict[str, int]:
+        """The rank of every cube, by what it weighs."""
+        weights = {cube: float(world.model.body_mass[world.body(cube)]) for cube in self.cubes}
+        return {cube: rank for rank, cube in enumerate(sorted(weights, key=weights.__getitem__))}
 
     def within(self, world: World, cube: str, rank: int) -> bool:
         """Whether a cube's middle is over the zone of a rank."""
