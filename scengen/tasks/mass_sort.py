@@ -45,8 +45,8 @@ STANDS = 0.01
 """Speed below which a cube stands [m/s]."""
 AIR = 0.010
 """Room that the fingers have beside what else stands there [m]."""
-LIFT, HOVER = 0.06, 0.06
-"""How far a cube is lifted to be weighed, and how high over its zone it is brought [m]."""
+LIFT, OVER, CLEAR = 0.03, 0.03, 0.015
+"""How far a cube is lifted to be weighed; how far the hand rises over a cube, and a held cube over others [m]."""
 COMMON = (0.075, 0.150)
 """Between which a cube of training is the middle one [kg]."""
 
@@ -127,34 +127,34 @@ class MassSort(Scenario):
     def oracle(self, world: World) -> Plan:
         """Lift every cube and feel it, set it back; the last one, and then the others, into their zones."""
         felt: list[float] = []
-        for cube in self.cubes:
-            yield from self.take(world, cube)
+        *others, last = self.cubes
+        for cube in others:
+            yield from self.take(world, cube, LIFT)
             felt.append(float((yield from weigh(world.arm))[2]))
-            if cube != self.cubes[-1]:
-                yield from push(world.arm, -0.1 * UP, lambda cube=cube: world.touching(cube, "table"))
-                yield from self.leave(world)
+            yield from push(world.arm, -0.1 * UP, lambda cube=cube: world.touching(cube, "table"))
+            yield from release(world.arm)
+            yield from retreat(world.arm, self.edge + OVER)
+        yield from self.take(world, last, self.edge + CLEAR)
+        felt.append(float((yield from weigh(world.arm))[2]))
         ranks = [sorted(felt).index(weight) for weight in felt]
-        yield from self.place_held(world, self.cubes[-1], ranks[-1])
-        yield from self.deliver(world, dict(zip(self.cubes[:-1], ranks[:-1], strict=True)))
+        yield from self.place_held(world, last, ranks[-1])
+        yield from self.deliver(world, dict(zip(others, ranks, strict=False)))
 
-    def take(self, world: World, cube: str) -> Plan:
+    def take(self, world: World, cube: str, lift: float) -> Plan:
         """Lift a cube, held by its middle."""
-        yield from pick(world.arm, world.com(cube), closing=world.rot(cube)[:, 1], lift=LIFT, pace=STEADY)
-
-    def leave(self, world: World) -> Plan:
-        """Let go and rise."""
-        yield from release(world.arm)
-        yield from retreat(world.arm, self.edge + 0.03)
+        above, closing = self.edge + OVER, world.rot(cube)[:, 1]
+        yield from pick(world.arm, world.com(cube), closing, above=above, lift=lift, pace=STEADY)
 
     def place_held(self, world: World, cube: str, rank: int) -> Plan:
         """Put the held cube into the zone of a rank."""
-        yield from put(world.arm, cube, self.zone_at(rank) + self.edge / 2 * UP, on="table", hover=HOVER)
-        yield from retreat(world.arm, self.edge + 0.03)
+        middle = self.zone_at(rank) + self.edge / 2 * UP
+        yield from put(world.arm, cube, middle, on="table", hover=self.edge + CLEAR)
+        yield from retreat(world.arm, self.edge + OVER)
 
     def deliver(self, world: World, ranks: Mapping[str, int]) -> Plan:
         """Take cubes to the zones of these ranks, one after the other."""
         for cube, rank in ranks.items():
-            yield from self.take(world, cube)
+            yield from self.take(world, cube, self.edge + CLEAR)
             yield from self.place_held(world, cube, rank)
 
     # --- shortcuts and ablations ------------------------------------------------------------
@@ -200,7 +200,7 @@ class MassSort(Scenario):
         yield require(clear >= self.hand_beside, "the hand has no room between the cubes", room=clear)
         away = min(gap(cube, square) for cube in self.outlines for square in squares)
         yield require(away >= AIR, "a cube lies in a zone, or too near to one", away=away)
-        high = (LIFT + self.edge) * UP
+        high = (2 * self.edge + CLEAR) * UP
         yield within_reach("a cube", *(np.array([spot.x, spot.y, TABLE_TOP]) + high for spot in self.spots))
         yield within_reach("a zone", *(self.zone_at(rank) + high for rank in range(COUNT)))
 
