@@ -54,8 +54,9 @@ half a diagonal of the cube is 42 mm, so whoever goes there does not even touch 
 GRIP, LOWEST = 0.65, TIP + 0.004
 """Where the cube is held: share of its edge, and least height over the table [m]. Above its middle it hangs straight:
 below it the edges of the pads would be all that keeps it from turning."""
-ROOM = 0.005
-"""Air that a jaw needs in all to come down around the cube [m]; moves are exact to 3 mm."""
+ROOM = 0.009
+"""Air that a jaw needs in all to come down around the cube [m]: moves are exact to 3 mm and 3 deg, which takes 3 mm on
+either side, and 3 mm of the width of the cube."""
 STEERED = 2.0
 """How long the hand is steered by the picture [s]: at 0.15 m/s long enough to arrive, if the picture were upright."""
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
