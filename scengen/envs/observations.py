@@ -110,7 +110,8 @@ def poses_of(scenario: Scenario, orientation: Callable[[], Orientation]) -> dict
         seen = Stream((3,), 3.0, lambda world: orientation().seen_at(world.pos(body)))
         return {**poses, f"seen_{body}_pos": seen} if turns_pictures(type(scenario)) else poses
 
-    movable = [body.name for body in scenario.build().bodies if body.joints or body.mocap]
+    scene = scenario.build()  # held by name: the bodies of a scene that nobody holds have lost their joints
+    movable = [body.name for body in scene.bodies if body.joints or body.mocap]
     return {name: stream for body in movable for name, stream in of(body).items()}
 
 
