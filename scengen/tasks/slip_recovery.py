@@ -46,7 +46,7 @@ from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.grip import best_grip, extent
 from ..skills.jaw import carry, grasp, pick, poke, put, release
-from ..skills.motion import COARSE, OPEN, Pace, go_to, retreat
+from ..skills.motion import OPEN, Pace, go_to, retreat
 
 LIFTED, LOWERED = 0.05, 0.042
 """How far a thing must be lifted to count as carried, and how low it may sink then [m]: both more than `PALM_ABOVE` and
@@ -168,7 +168,7 @@ class SlipRecovery(Scenario):
         if grip is None:
             raise GaveUp("the thing lies so that no jaw can take it")
         above = grip.at + ABOVE * UP
-        yield from go_to(world.arm, above, pace=COARSE, grip=OPEN)  # there it is seen which way the wrist can turn
+        yield from go_to(world.arm, above, grip=OPEN)  # there it is seen which way the wrist can turn
         yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=lift)
 
     def settle(self, world: World) -> Plan:

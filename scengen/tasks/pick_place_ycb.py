@@ -1,0 +1,257 @@
+"""T29 pick-place-ycb: put a thing on a green square that jumps away when it comes near.
+
+      thing                        seen from above; the square lies at 0 when the thing is lifted, jumps to 1
+       ()  - - ->  [0]             when it is nearly there, then to 2, and there it is locked
+                    .
+                    . - - - [1]
+           [2] - - - - - -'
+
+Bottleneck: the goal is where it is now, not where it was. Whoever goes through with the plan made at the start puts
+the thing down on bare table; how often the square jumps, and where to, is not known beforehand.
+
+Decisions, where the paper (App. B, T29) says "when the lifted object approaches the patch, the patch teleports to a new
+location; after 1-3 relocations, the patch locks in place":
+
+* The square jumps when a thing that has been lifted once is within a distance of its middle, at whatever height: who
+  puts it down early and shoves it home gains nothing. The square never jumps to a place as near to the thing again.
+* It jumps a given way, to a place on the field in front of the robot, where all places can be reached.
+* Locked means that it lies with its dark side up; only then does it count. Nothing else shows it.
+* Cartons lie on their narrow side, as a jaw must take them; the master chef can of the paper's list is too wide for it.
+"""
+
+import functools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..assets.patch import TURNED_OVER, Patch
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.ycb import Ycb
+from ..errors import GaveUp
+from ..geometry import UP, Vec3, heading
+from ..params import param
+from ..predicates import fallen, held, rests_on, still
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.memory import remember
+from ..sim.world import World
+from ..skills.grip import best_grip, extent
+from ..skills.jaw import carry, pick, poke, put
+from ..skills.motion import OPEN, Condition, Pace, go_to, retreat
+
+LIFTED = 0.03
+"""How far the thing's centre of mass must have been above where it stood [m]."""
+RAISED = 0.07
+"""How high the oracle carries it [m]; a thing lost there falls on the face that it stood on."""
+CALM = 0.02
+"""Speed below which a thing counts as at rest [m/s]."""
+ABOVE = 0.10
+"""Height from which the oracle comes down on the thing [m]."""
+BRISK = Pace(0.2, 0.01)
+"""How fast the oracle carries."""
+FIELD = np.array([[-0.22, 0.05], [-0.32, 0.32]])
+"""Where the middle of the square can be, in x and y [m]: 0.34 to 0.70 from the robot's first axis, where a hand that
+points down comes without leaning or folding up."""
+APART = 0.03
+"""By how much farther than `near` the thing is from the square after any jump [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jump:
+    """Where the square goes."""
+
+    way: float = param(0.24, "m", 0.05, 0.60, hidden=True)
+    """How far."""
+    share: float = param(0.5, "1", 0.0, 0.999, hidden=True)
+    """Which way: of all whole degrees that end on the field, counted from x to the left, how many are skipped."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PickPlaceYcb(Scenario):
+    """A thing on the table, and a green square that has still to jump a few times."""
+
+    HOLD = 0.5
+    NO_ABLATIONS = "the scene holds nothing that helps; a square that stays would leave less to do"
+
+    x: float = param(-0.05, "m", -0.4, 0.4)
+    y: float = param(0.15, "m", -0.4, 0.4)
+    yaw: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
+    """Of the thing; at 90 the narrow side of every box and tin lies along y."""
+    goal_x: float = param(-0.05, "m", -0.4, 0.4)
+    goal_y: float = param(-0.15, "m", -0.4, 0.4)
+    near: float = param(0.075, "m", 0.01, 0.25, hidden=True)
+    """Distance of the thing from the middle of the square at which that jumps, seen from above."""
+    jumps: int = param(2, "jumps", 0, 5, hidden=True)
+    jump_0: Jump = Jump()
+    jump_1: Jump = Jump()
+    jump_2: Jump = Jump()
+    jump_3: Jump = Jump()
+    jump_4: Jump = Jump()
+    thing: Ycb = Ycb(item=2, low=1)
+    patch: Patch = Patch(size=0.12)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        scene = table()
+        remember(scene, "jumps", "stood", "lifted")
+        place(scene, self.thing, "thing", self.start, math.radians(self.yaw))
+        place(scene, self.patch, "patch", self.spots[0], free=False)
+        scene.body("patch").mocap = True
+        if not self.jumps:
+            scene.body("patch").quat = TURNED_OVER
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        if not world.memory["lifted"] or world.memory["jumps"] < self.jumps:
+            return False
+        away = np.abs(world.com("thing") - world.pos("patch"))[:2].max()
+        return bool(away <= self.patch.size / 2) and rests_on(world, "thing", "table") and still(world, "thing", CALM)
+
+    def failure(self, world: World) -> str | None:
+        return "the thing fell off the table" if fallen(world, "thing") else None
+
+    def events(self, world: World) -> None:
+        """Notice that the thing is lifted, and let the square jump away from it."""
+        memory, at = world.memory, world.com("thing")
+        if world.touching("thing", "table"):
+            memory["stood"] = at[2]
+        elif at[2] - memory["stood"] >= LIFTED and held(world, "thing"):
+            memory["lifted"] = 1.0
+        jumps = int(memory["jumps"])
+        if memory["lifted"] and jumps < self.jumps and math.dist(at[:2], self.spots[jumps][:2]) <= self.near:
+            memory["jumps"] = jumps + 1
+            world.move("patch", self.spots[jumps + 1], TURNED_OVER if jumps + 1 == self.jumps else (1, 0, 0, 0))
+
+    def pending(self, world: World) -> bool:
+        """Never: the square moves only where the thing is brought near."""
+        return False
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Pick up, follow the square until it is locked, put down on it."""
+        yield from self.take(world)
+        while world.memory["jumps"] < self.jumps:
+            was = world.pos("patch")
+            yield from self.bring(world, was, ends=lambda was=was: math.dist(world.pos("patch"), was) > 0.0)
+        yield from self.set_down(world, world.pos("patch"))
+
+    def take(self, world: World) -> Plan:
+        """Take hold of the thing and lift it."""
+        grip = best_grip(world.arm, "thing")
+        if grip is None:
+            raise GaveUp("the thing lies so that no jaw can take it")
+        above = grip.at + ABOVE * UP
+        yield from go_to(world.arm, above, grip=OPEN)  # there it is seen which way the wrist can turn
+        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=RAISED)
+
+    def bring(self, world: World, spot: Vec3, ends: Condition = lambda: False) -> Plan:
+        """Carry the thing over a place on the table [m]."""
+        level = np.array([spot[0], spot[1], world.memory["stood"] + RAISED])
+        yield from carry(world.arm, "thing", level, pace=BRISK, ends=ends)
+
+    def set_down(self, world: World, spot: Vec3) -> Plan:
+        """Put the thing down at a place on the table [m], let go, go up."""
+        yield from self.bring(world, spot)
+        yield from put(world.arm, "thing", [spot[0], spot[1], world.memory["stood"]], "table", hover=0.03)
+        yield from retreat(world.arm, 0.06)
+
+    # --- shortcuts ------------------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        """Where the square jumps once only, its second place is right."""
+        found = {
+            "put_it_where_the_square_was": Shortcut(self._first_plan, to_rest=True),
+            "push_it_there": Shortcut(self._push),
+            "push_it_there_and_lift_it": Shortcut(self._push_and_lift),
+            "put_it_down_short": Shortcut(self._short, to_rest=True),
+        }
+        one = {"follow_the_square_once": Shortcut(self._follow_once, to_rest=True)}
+        return found | one if self.jumps > 1 else found
+
+    def _first_plan(self, world: World) -> Plan:
+        """Carry it to where the square was at the start."""
+        yield from self.take(world)
+        yield from self.set_down(world, self.spots[0])
+
+    def _follow_once(self, world: World) -> Plan:
+        """Go on to where the square has jumped to, and no farther."""
+        yield from self.take(world)
+        yield from self.bring(world, self.spots[0])
+        yield from self.set_down(world, self.spots[1])
+
+    def _push(self, world: World) -> Plan:
+        """Push it over the table to the square, which does not move for what has never been lifted."""
+        at, way = world.com("thing"), (self.spots[0] - world.com("thing")) * [1.0, 1.0, 0.0]
+        along = way / np.linalg.norm(way)
+        (low, high), top = extent(world, "thing", along), extent(world, "thing", UP)[1]
+        behind = np.array([at[0], at[1], top - 0.02]) - ((high - low) / 2 + 0.03) * along  # the palm stays above it
+        there = float(self.spots[0] @ along)
+        yield from poke(world.arm, behind, 0.12 * along, lambda: float(world.com("thing") @ along) >= there)
+
+    def _push_and_lift(self, world: World) -> Plan:
+        """Push it there, then make up for the lift."""
+        yield from self._push(world)
+        yield from self.take(world)
+        yield from self.set_down(world, self.spots[0])
+
+    def _short(self, world: World) -> Plan:
+        """Put it down as near to the square as that allows, and wait for it to stay."""
+        yield from self.take(world)
+        back = self.start - self.spots[0]
+        yield from self.set_down(world, self.spots[0] + (self.near + 0.02) * back / np.linalg.norm(back))
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        row, spots = self.thing.row, self.spots
+        yield require(row.width is not None, "no jaw takes the thing", number=row.number)
+        missing = self.jumps + 1 - len(spots)
+        yield require(missing == 0, "the square has nowhere to jump to", jumps=self.jumps, missing=missing)
+        inside = (FIELD[:, 0] <= spots[0][:2]) & (spots[0][:2] <= FIELD[:, 1])
+        yield require(bool(inside.all()), "the square lies beyond the field", x=self.goal_x, y=self.goal_y)
+        least = 2 * self.near + APART
+        shortest = min((jump.way for jump in self.planned), default=least)
+        yield require(shortest >= least, "the square jumps into the thing", way=shortest, least=least)
+        away = math.dist(self.start, spots[0])
+        yield require(away >= least, "the thing is near the square from the start", distance=away, least=least)
+        yield on_table("the thing", self.start, margin=0.1)
+        yield within_reach("the thing", self.start + 0.2 * UP)
+
+    def features(self) -> Mapping[str, float]:
+        """How often and how far the square jumps, and at what distance [m], as a share of its size too."""
+        return {
+            "jumps": float(self.jumps),
+            "longest_jump": max((jump.way for jump in self.planned), default=0.0),
+            "near_over_size": self.near / self.patch.size,
+            "size": self.patch.size,
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def start(self) -> Vec3:
+        """Where the thing stands [m]."""
+        return np.array([self.x, self.y, TABLE_TOP])
+
+    @property
+    def planned(self) -> tuple[Jump, ...]:
+        """The jumps that happen, in their order."""
+        return (self.jump_0, self.jump_1, self.jump_2, self.jump_3, self.jump_4)[: self.jumps]
+
+    @functools.cached_property
+    def spots(self) -> list[Vec3]:
+        """Where the square lies at the start and after each jump [m], as far as there are places for it."""
+        found = [np.array([self.goal_x, self.goal_y, TABLE_TOP])]
+        for jump in self.planned:
+            ends = found[-1] + jump.way * np.array([heading(float(angle)) for angle in range(360)])
+            free = ends[((FIELD[:, 0] <= ends[:, :2]) & (ends[:, :2] <= FIELD[:, 1])).all(axis=1)]
+            if not len(free):
+                break
+            found.append(free[int(jump.share * len(free))])
+        return found
