@@ -37,8 +37,8 @@ from ..predicates import fallen, held, rests_on, still
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.grip import best_grip, extent
-from ..skills.jaw import carry, pick, poke, put
+from ..skills.grip import best_grip
+from ..skills.jaw import carry, pick, put, release
 from ..skills.motion import OPEN, Condition, Pace, go_to, retreat
 
 LIFTED = 0.03
@@ -141,18 +141,18 @@ class PickPlaceYcb(Scenario):
             yield from self.bring(world, was, ends=lambda was=was: math.dist(world.pos("patch"), was) > 0.0)
         yield from self.set_down(world, world.pos("patch"))
 
-    def take(self, world: World) -> Plan:
-        """Take hold of the thing and lift it."""
+    def take(self, world: World, lift: float = RAISED) -> Plan:
+        """Take hold of the thing and lift it [m]."""
         grip = best_grip(world.arm, "thing")
         if grip is None:
             raise GaveUp("the thing lies so that no jaw can take it")
         above = grip.at + ABOVE * UP
         yield from go_to(world.arm, above, grip=OPEN)  # there it is seen which way the wrist can turn
-        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=RAISED)
+        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=lift)
 
-    def bring(self, world: World, spot: Vec3, ends: Condition = lambda: False) -> Plan:
-        """Carry the thing over a place on the table [m]."""
-        level = np.array([spot[0], spot[1], world.memory["stood"] + RAISED])
+    def bring(self, world: World, spot: Vec3, height: float = RAISED, ends: Condition = lambda: False) -> Plan:
+        """Carry the thing over a place on the table, at a height above where it stood [m]."""
+        level = np.array([spot[0], spot[1], world.memory["stood"] + height])
         yield from carry(world.arm, "thing", level, pace=BRISK, ends=ends)
 
     def set_down(self, world: World, spot: Vec3) -> Plan:
@@ -167,8 +167,8 @@ class PickPlaceYcb(Scenario):
         """Where the square jumps once only, its second place is right."""
         found = {
             "put_it_where_the_square_was": Shortcut(self._first_plan, to_rest=True),
-            "push_it_there": Shortcut(self._push),
-            "push_it_there_and_lift_it": Shortcut(self._push_and_lift),
+            "drag_it_there": Shortcut(self._drag, to_rest=True),
+            "drag_it_there_and_lift_it": Shortcut(self._drag_and_lift, to_rest=True),
             "put_it_down_short": Shortcut(self._short, to_rest=True),
         }
         one = {"follow_the_square_once": Shortcut(self._follow_once, to_rest=True)}
@@ -185,18 +185,16 @@ class PickPlaceYcb(Scenario):
         yield from self.bring(world, self.spots[0])
         yield from self.set_down(world, self.spots[1])
 
-    def _push(self, world: World) -> Plan:
-        """Push it over the table to the square, which does not move for what has never been lifted."""
-        at, way = world.com("thing"), (self.spots[0] - world.com("thing")) * [1.0, 1.0, 0.0]
-        along = way / np.linalg.norm(way)
-        (low, high), top = extent(world, "thing", along), extent(world, "thing", UP)[1]
-        behind = np.array([at[0], at[1], top - 0.02]) - ((high - low) / 2 + 0.03) * along  # the palm stays above it
-        there = float(self.spots[0] @ along)
-        yield from poke(world.arm, behind, 0.12 * along, lambda: float(world.com("thing") @ along) >= there)
+    def _drag(self, world: World) -> Plan:
+        """Draw it over the table to the square, which does not move for what has never been lifted."""
+        yield from self.take(world, lift=0.0)
+        yield from self.bring(world, self.spots[0], height=0.0)
+        yield from release(world.arm)
+        yield from retreat(world.arm, 0.06)
 
-    def _push_and_lift(self, world: World) -> Plan:
-        """Push it there, then make up for the lift."""
-        yield from self._push(world)
+    def _drag_and_lift(self, world: World) -> Plan:
+        """Draw it there, then make up for the lift."""
+        yield from self._drag(world)
         yield from self.take(world)
         yield from self.set_down(world, self.spots[0])
 
@@ -220,7 +218,7 @@ class PickPlaceYcb(Scenario):
         yield require(shortest >= least, "the square jumps into the thing", way=shortest, least=least)
         away = math.dist(self.start, spots[0])
         yield require(away >= least, "the thing is near the square from the start", distance=away, least=least)
-        yield on_table("the thing", self.start, margin=0.1)
+        yield on_table("the thing", self.start, margin=0.08)
         yield within_reach("the thing", self.start + 0.2 * UP)
 
     def features(self) -> Mapping[str, float]:
