@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 from forgery import ELSEWHERE, SHARD, Case, Draft, listed, write_manifest, write_table
+from make_base import TRAINING
 
 PLAIN = (
     "single_quick", "single_full", "single_axis", "single_severity", "single_composed", "single_composed_of_three",
-    "single_sobol", "single_hypercube", "single_grid", "single_workers", "select_id", "select_composed", "galileo_id",
-    "galileo_severity", "cage_id", "cage_severity", "seesaw_id", "seesaw_axis", "tool_id", "tool_composed",
-    "packing_id", "packing_axis", "shelf_id", "single_kept",
+    "single_sobol", "single_hypercube", "single_grid", "single_workers", *TRAINING, "select_composed",
+    "galileo_severity", "cage_severity", "seesaw_axis", "tool_composed", "packing_axis", "single_kept",
 )  # fmt: skip
 """Bases that are accepted as they are."""
 

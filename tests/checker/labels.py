@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from forgery import ELSEWHERE, Case, Draft, Row
+from make_base import TRAINING
 
 Change = Callable[[Draft], None]
 
@@ -234,7 +235,7 @@ QUICK = {
     "first_left_out", "final_state", "versions_of_a_row",
 }  # fmt: skip
 
-OTHERS = ("select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id", "shelf_id")
+OTHERS = tuple(TRAINING)
 EVERY: dict[str, tuple[str, Change]] = {
     "seed_everywhere": (r"parameters|redraw|drawn|id ", _both(_rows(seed=1), _config(seed=1))),
     "horizon": (r"horizon", _row(horizon=100.0)),

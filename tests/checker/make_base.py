@@ -27,6 +27,24 @@ EDGE = (
 """An axis on which the oracle of `domino_single` fails now and then."""
 HEAVY = "+task.axes.heavy={why: tiles weigh more than in training, replace: {tile: {mass: [uniform, 0.065, 0.075]}}}"
 
+TRAINING = {
+    "select_id": "domino_select",
+    "galileo_id": "galileo_ramp_drop",
+    "cage_id": "ball_cage_escape",
+    "seesaw_id": "seesaw_balance",
+    "tool_id": "tool_retrieve",
+    "packing_id": "packing",
+    "shelf_id": "plate_shelf_hetbi",
+    "mirror_id": "mirror_pick_place",
+    "pendulum_id": "pendulum_grasp",
+    "slip_id": "slip_recovery",
+    "rack_id": "sheltered_grasp",
+    "sort_id": "mass_sort",
+    "balance_id": "balance_medium",
+    "balance_hard_id": "balance_hard",
+}
+"""A pool of the training split of every task but the first, by its name."""
+
 POOLS: dict[str, tuple[str, ...]] = {
     # at the known settings
     "single_quick": ("task=domino_single", "n=2"),
@@ -49,27 +67,18 @@ POOLS: dict[str, tuple[str, ...]] = {
     "single_workers": ("task=domino_single", "n=2", "seed=9", "workers=2", *QUICKLY),
     "single_kept": ("task=domino_single", "split=edge", "n=1", "keep=unknown,refuted", "certify=full", EDGE),
     # the other tasks
-    "select_id": ("task=domino_select", "n=1", *QUICKLY),
+    **{name: (f"task={task}", "n=1", *QUICKLY) for name, task in TRAINING.items()},
     "select_composed": ("task=domino_select", "split=diagonal+narrow_lanes@2", "n=1", *QUICKLY),
-    "galileo_id": ("task=galileo_ramp_drop", "n=1", *QUICKLY),
     "galileo_severity": ("task=galileo_ramp_drop", "split=high_patch@2", "n=1", *QUICKLY),
-    "cage_id": ("task=ball_cage_escape", "n=1", *QUICKLY),
     "cage_severity": ("task=ball_cage_escape", "split=low_stool@1", "n=1", *QUICKLY),
-    "seesaw_id": ("task=seesaw_balance", "n=1", *QUICKLY),
     "seesaw_axis": ("task=seesaw_balance", "split=heavy_target", "n=1", *QUICKLY),
-    "tool_id": ("task=tool_retrieve", "n=1", *QUICKLY),
     "tool_composed": ("task=tool_retrieve", "split=long_handle@1+turned_hook@1", "n=1", *QUICKLY),
-    "packing_id": ("task=packing", "n=1", *QUICKLY),
     "packing_axis": ("task=packing", "split=thin_heavy", "n=1", *QUICKLY),
-    "shelf_id": ("task=plate_shelf_hetbi", "n=1", *QUICKLY),
 }
 """Arguments of `scengen generate`, by the name of the pool."""
 
 
-KEPT = (
-    "single_quick", "single_severity", "select_id", "galileo_id", "cage_id", "seesaw_id", "tool_id", "packing_id",
-    "shelf_id",
-)  # fmt: skip
+KEPT = ("single_quick", "single_severity", *TRAINING)
 """Those in the repository."""
 
 
