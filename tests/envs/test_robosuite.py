@@ -24,6 +24,7 @@ from scengen.envs.robosuite_models import SceneModel
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import NO_WITNESS, Pool
+from scengen.robots import panda
 from scengen.runs.generate import row_of
 from scengen.sim import scene_text
 from scengen.sim.world import World
@@ -198,6 +199,33 @@ def test_suction_pulls_only_what_closes_the_cup(sucking):
     assert world.arm.sealed and world.data.ctrl[cup] == 1.0 and world.touching("gripper0_right_suction_pad", "piece_0")
     sucking.step(np.array([0, 0, 0, 0, 0, 0, -1.0]))
     assert not world.arm.sealed and world.data.ctrl[cup] == 0.0
+
+
+def test_a_gripper_slips_in_robosuite_as_long_as_its_scenario_says():
+    """Told to close, its fingers are sent to their open ends as long as the slip lasts. Events come before a period."""
+    env = made(drawn("slip_recovery"), ignore_done=True)
+    env.reset()
+    motors = [env.world.model.actuator(name).id for name in panda.Names().finger_motors]
+    with env.world.events():
+        env.world.memory["jam_ends"] = 0.05
+    opened = []
+    for _ in range(8):
+        env.step(np.array([0, 0, 0, 0, 0, 0, 1.0]))
+        opened.append(env.world.data.ctrl[motors].tolist() == [0.04, -0.04])
+    assert env.world.arm.grip == 1.0 and opened == [False, *[True] * 4, *[False] * 3]
+
+
+def test_what_events_move_and_remember_is_seen_in_robosuite_and_gone_after_a_reset():
+    env = made(drawn("pick_place_ycb"), ignore_done=True)
+    start = env.reset()["patch_pos"]
+    assert env.world.memory.names == World.load(env.row.scene_xml).memory.names
+    with env.world.events():
+        env.world.memory["jumps"] = 1.0
+        env.world.move("patch", [0.1, 0.2, 0.8], [0, 1, 0, 0])
+    seen = env.step(IDLE)[0]
+    assert seen["patch_pos"] == pytest.approx([0.1, 0.2, 0.8]) and seen["patch_quat"] == pytest.approx([1, 0, 0, 0])
+    assert env.world.memory["jumps"] == 1.0
+    assert env.reset()["patch_pos"] == pytest.approx(start) and env.world.memory["jumps"] == 0.0
 
 
 # --- verdict and clock --------------------------------------------------------------------
