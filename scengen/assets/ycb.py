@@ -325,6 +325,11 @@ class Ycb(Prop):
             return replace(prop, width=prop.height, height=prop.width)
         return prop
 
+    @property
+    def mass(self) -> float:
+        """[kg]"""
+        return float(self.spec().compile().body_mass.sum())
+
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         self.prop.fill(body, spec)
 

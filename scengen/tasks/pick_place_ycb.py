@@ -90,7 +90,7 @@ class PickPlaceYcb(Scenario):
     jump_3: Jump = Jump()
     jump_4: Jump = Jump()
     thing: Ycb = Ycb(item=2, low=1)
-    patch: Patch = Patch(size=0.12)
+    patch: Patch = Patch(size=0.10)
 
     # --- scene ----------------------------------------------------------------------------
 
@@ -222,12 +222,13 @@ class PickPlaceYcb(Scenario):
         yield within_reach("the thing", self.start + 0.2 * UP)
 
     def features(self) -> Mapping[str, float]:
-        """How often and how far the square jumps, and at what distance [m], as a share of its size too."""
+        """How often and how far the square jumps [m], at what distance (in sizes of the square), and the mass [kg]."""
         return {
             "jumps": float(self.jumps),
             "longest_jump": max((jump.way for jump in self.planned), default=0.0),
             "near_over_size": self.near / self.patch.size,
             "size": self.patch.size,
+            "mass": self.thing.mass,
         }
 
     # --- geometry -------------------------------------------------------------------------

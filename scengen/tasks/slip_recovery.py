@@ -37,7 +37,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Vec3
+from ..geometry import UP, Vec3, heading
 from ..params import param
 from ..predicates import fallen, rests_on, still
 from ..robots.jaw import OPENED, PALM_ABOVE, TIP
@@ -292,13 +292,15 @@ class SlipRecovery(Scenario):
         yield within_reach("the way", *(spots + 0.2 * UP))
 
     def features(self) -> Mapping[str, float]:
-        """How far the thing has come when it falls for the last time, as a share of the way."""
-        way = self.left(0)
+        """When it slips, for how long [s], how far it is [m], the mass [kg], and how the narrow side lies (cosine)."""
+        way, side = self.left(0), heading(self.yaw) @ (self.goal - self.start)
         return {
             "slips": float(self.slips),
             "share_of_the_way_at_the_last_slip": 1.0 - self.left(self.slips) / way,
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,
+            "mass": self.thing.mass,
+            "narrow_side_along_the_way": abs(float(side)) / math.dist(self.start, self.goal),
         }
 
     # --- geometry -------------------------------------------------------------------------
