@@ -79,7 +79,7 @@ class Slip:
 
     share: float = param(0.4, "1", 0.05, 0.95, hidden=True)
     """Of the way that is left, start to the rim of the square, at which it comes."""
-    seconds: float = param(0.30, "s", 0.05, 3.0, hidden=True)
+    seconds: float = param(0.30, "s", 0.05, 4.0, hidden=True)
 
 
 @dataclass(frozen=True, kw_only=True)
