@@ -35,6 +35,7 @@ SHORTEST = 1e-6
 class Hook(Prop):
     """What all hooks share: bars of one cross section that lie on z = 0. Subclasses are dataclasses."""
 
+    length: float
     width: float
     height: float
     mass: float
@@ -45,6 +46,26 @@ class Hook(Prop):
     @abc.abstractmethod
     def bars(self) -> list[Bar]:
         """Its straight stretches, in the plane."""
+
+    @property
+    @abc.abstractmethod
+    def inside(self) -> float:
+        """x of the face that pulls, or of the innermost of it [m]."""
+
+    @property
+    @abc.abstractmethod
+    def aside(self) -> float:
+        """How far it stands out beside the handle's face, on the side that its tip points to [m]."""
+
+    @property
+    def depth(self) -> float:
+        """How far the handle must be pushed on until the tip has passed what was behind its face [m]."""
+        return 0.0
+
+    @property
+    def side(self) -> float:
+        """Which way it points along y: 1 or -1."""
+        return 1.0
 
     @property
     @abc.abstractmethod
@@ -99,8 +120,11 @@ class LHook(Hook):
 
     @property
     def inside(self) -> float:
-        """x of the face of the tip that pulls [m]."""
         return self.length / 2 - self.width
+
+    @property
+    def aside(self) -> float:
+        return self.tip
 
     @property
     def engaging(self) -> float:
@@ -122,11 +146,11 @@ class JHook(Hook):
 
     length: float = param(0.30, "m", 0.15, 0.50)
     """Of the straight handle, up to where the bend begins."""
-    radius: float = param(0.045, "m", 0.02, 0.08)
+    radius: float = param(0.045, "m", 0.02, 0.10)
     """Of the middle line of the bend."""
     barb: float = param(0.0, "m", 0.0, 0.08)
     """How far the end runs back, parallel to the handle."""
-    width: float = param(0.016, "m", 0.010, 0.030)
+    width: float = param(0.016, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.12, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
@@ -137,6 +161,18 @@ class JHook(Hook):
     def side(self) -> float:
         """Which way the bend goes along y: 1 or -1."""
         return -1.0 if self.mirrored else 1.0
+
+    @property
+    def inside(self) -> float:
+        return self.length / 2 + self.radius - self.width / 2
+
+    @property
+    def aside(self) -> float:
+        return 2 * self.radius
+
+    @property
+    def depth(self) -> float:
+        return self.radius + self.barb
 
     @property
     def engaging(self) -> float:
@@ -185,6 +221,14 @@ class THook(Hook):
     mass: float = param(0.14, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.35, 0.65, 1.0)
+
+    @property
+    def inside(self) -> float:
+        return self.length / 2 - self.width
+
+    @property
+    def aside(self) -> float:
+        return self.tip
 
     @property
     def engaging(self) -> float:

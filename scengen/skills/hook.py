@@ -1,4 +1,4 @@
-"""Moves of a hand that draws things in with an L hook: take it, pass it by, pull, put it down. See `motion`.
+"""Moves of a hand that draws things in with a hook: take it, pass it by, pull, put it down. See `motion`.
 
 They are told in polar coordinates about the robot's first axis, where all bearings look the same to the arm.
 """
@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..assets.hook import LHook
+from ..assets.hook import Hook
 from ..assets.prop import TABLE_TOP
 from ..geometry import about_y, about_z, polar
 from ..robots.jaw import TIP
@@ -34,7 +34,7 @@ SQUARING = 0.015
 20 deg until its side lies against the handle."""
 
 
-def shortest_stretch(hook: LHook, behind: float) -> float:
+def shortest_stretch(hook: Hook, behind: float) -> float:
     """Distance from where the handle is best held to the face that pulls [m].
 
     As short as it may be: the farther out the hook is held, the less its weight turns it in the jaw.
@@ -51,7 +51,7 @@ def nearest_pull(stretch: float) -> float:
     return NEAREST_HAND + stretch
 
 
-def take_handle(arm: Arm, hook: LHook, body: str, stretch: float) -> Plan:
+def take_handle(arm: Arm, hook: Hook, body: str, stretch: float) -> Plan:
     """Grasp the handle across and leave the hook where it lies.
 
     Args:
@@ -62,7 +62,7 @@ def take_handle(arm: Arm, hook: LHook, body: str, stretch: float) -> Plan:
     yield from pick(arm, at, closing=rot[:, 1], lift=0.0)
 
 
-def pull(arm: Arm, hook: LHook, body: str, cube: str, half: float, to: float, mirror: float = 1.0) -> Plan:
+def pull(arm: Arm, hook: Hook, body: str, cube: str, half: float, to: float, mirror: float = 1.0) -> Plan:
     """Pass the held hook by a cube on the side away from its tip, put the tip behind the cube, pull.
 
     Args:
@@ -74,13 +74,13 @@ def pull(arm: Arm, hook: LHook, body: str, cube: str, half: float, to: float, mi
     bearing, there = polar(arm.world.com(cube) - BASE)
     along = arm.world.rot(cube).T @ about_z(bearing)[:, 0]
     across = half * float(np.abs(along).sum())  # half the cube's width, seen along the bearing
-    before, behind, drawn = there - across - hook.width - WIDE, there + across + CLEAR, half + to
-    past, against = across + WIDE + hook.tip + hook.width / 2, half + hook.width / 2 - SQUARING
+    before, behind, drawn = there - across - hook.width - WIDE, there + across + CLEAR + hook.depth, half + to
+    past, against = across + WIDE + hook.aside + hook.width / 2, half + hook.width / 2 - SQUARING
     for inside, beside in ((before, past), (behind, past), (behind, against), (drawn, against)):
         yield from slide(arm, hook, body, bearing, inside, mirror * beside)
 
 
-def slide(arm: Arm, hook: LHook, body: str, bearing: float, inside: float, beside: float) -> Plan:
+def slide(arm: Arm, hook: Hook, body: str, bearing: float, inside: float, beside: float) -> Plan:
     """Move the held hook over the table until it lies along `bearing` [rad], seen from the robot's first axis.
 
     Args:
@@ -95,10 +95,10 @@ def slide(arm: Arm, hook: LHook, body: str, bearing: float, inside: float, besid
     yield from carry(arm, body, origin + rot @ com, rot, STEADY)
 
 
-def put_down(arm: Arm, hook: LHook, body: str) -> Plan:
+def put_down(arm: Arm, hook: Hook, body: str) -> Plan:
     """Take the tip, then the handle off what has been drawn in, let go, go up."""
     along, left = arm.world.rot(body)[:, 0], arm.world.rot(body)[:, 1]
-    yield from go_to(arm, arm.hand + 0.03 * along)
+    yield from go_to(arm, arm.hand + (0.03 + hook.depth) * along)
     yield from go_to(arm, arm.hand - 0.05 * hook.side * left)
     yield from release(arm)
     yield from retreat(arm)

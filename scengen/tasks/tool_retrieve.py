@@ -28,7 +28,7 @@ import mujoco
 import numpy as np
 
 from ..assets.box import Cube
-from ..assets.hook import LHook
+from ..assets.hook import Hook, JHook, LHook, THook
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar
 from ..params import param
@@ -44,6 +44,10 @@ from ..skills.motion import COARSE, OPEN, facing_down, go_to, push, retreat
 
 LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
+L, J, T = range(3)
+"""Kinds of hooks (paper, App. C: "J-shape and T-shape"; its T23 has an L)."""
+WIDER = 0.022
+"""By how much the opening of a J is wider than the tip of an L is long [m]: a cube lies in it, not at it."""
 ARM = 0.72
 """Farthest distance of a top-down grasp at table height from the robot's first axis that plans use [m]; inverse
 kinematics allows 0.76."""
@@ -70,6 +74,8 @@ class ToolRetrieve(Scenario):
     hook_yaw: float = param(0.0, "deg", -90.0, 90.0, period=360.0)
     """0: the handle points away from the robot, its end towards it."""
     cube: Cube = Cube()
+    kind: int = param(L, "0 = L, 1 = J, 2 = T", L, T)
+    """What the hook is bent into. All have handle, cross section, mass and friction of `hook`."""
     hook: LHook = LHook()
 
     # --- scene ----------------------------------------------------------------------------
@@ -77,7 +83,7 @@ class ToolRetrieve(Scenario):
     def build(self) -> mujoco.MjSpec:
         scene = table()
         place(scene, self.cube, "cube", self.spot, math.radians(self.cube_yaw))
-        place(scene, self.hook, "hook", [self.hook_x, self.hook_y, TABLE_TOP], math.radians(self.hook_yaw))
+        place(scene, self.tool, "hook", [self.hook_x, self.hook_y, TABLE_TOP], math.radians(self.hook_yaw))
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -95,17 +101,17 @@ class ToolRetrieve(Scenario):
         """Fetch the hook, draw the cube in, put the hook down beside it, take the cube."""
         yield from self.take_hook(world)
         yield from self.draw_in(world)
-        yield from put_down(world.arm, self.hook, "hook")
+        yield from put_down(world.arm, self.tool, "hook")
         yield from self.lift_cube(world)
 
     def take_hook(self, world: World) -> Plan:
         """Grasp the handle."""
-        yield from take_handle(world.arm, self.hook, "hook", self.stretch)
+        yield from take_handle(world.arm, self.tool, "hook", self.stretch)
 
     def draw_in(self, world: World, mirror: float = 1.0) -> Plan:
         """Put the tip behind the cube and pull; with `mirror` = -1 the tip ends up behind nothing."""
         to = max(DRAWN_TO, nearest_pull(self.stretch) - self.half)
-        yield from pull(world.arm, self.hook, "hook", "cube", self.half, to, mirror)
+        yield from pull(world.arm, self.tool, "hook", "cube", self.half, to, mirror)
 
     def lift_cube(self, world: World) -> Plan:
         """Grasp the cube across the faces that need the least turn of the hand."""
@@ -116,9 +122,10 @@ class ToolRetrieve(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
+        """A T has no side to be turned away."""
         return {
             "reach_for_the_cube": Shortcut(self._reach),
-            "pull_with_the_tip_turned_away": Shortcut(self._pull_past),
+            **({"pull_with_the_tip_turned_away": Shortcut(self._pull_past)} if self.kind != T else {}),
             "pick_the_cube_with_the_hook": Shortcut(self._pick_with_hook),
             "grasp_the_cube_with_the_hook_in_the_jaw": Shortcut(self._grasp_with_hook),
         }
@@ -137,7 +144,7 @@ class ToolRetrieve(Scenario):
         """Draw with the handle on the wrong side of the cube, then reach for where the cube still is."""
         yield from self.take_hook(world)
         yield from self.draw_in(world, mirror=-1.0)
-        yield from put_down(world.arm, self.hook, "hook")
+        yield from put_down(world.arm, self.tool, "hook")
         yield from self._reach(world)
 
     def _pick_with_hook(self, world: World) -> Plan:
@@ -163,14 +170,15 @@ class ToolRetrieve(Scenario):
         """Without the hook nothing reaches the cube; without its tip nothing pulls it."""
         bare, straight = self.build(), self.build()
         bare.delete(bare.body("hook"))
-        straight.delete(straight.geom("hook/bar_1"))
+        for i in range(1, len(self.tool.bars)):
+            straight.delete(straight.geom(f"hook/bar_{i}"))
         return {"no_hook": bare, "no_tip": straight}
 
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
         turn, at = about_z(math.radians(self.hook_yaw)), np.array([self.hook_x, self.hook_y, TABLE_TOP])
-        yield on_table("the hook", self.hook.corners @ turn.T + at)
+        yield on_table("the hook", self.tool.corners @ turn.T + at)
         yield on_table("the cube", corners(self.spot, math.radians(self.cube_yaw), self.cube.size))
         gap, hand_at = self.out_of_touch, self._behind - self.stretch
         yield require(gap > 0, "the arm may touch the cube without the hook", gap=gap, reach=ik.TOUCH)
@@ -178,7 +186,7 @@ class ToolRetrieve(Scenario):
         both, tip = self.cube.edge + self.hook.width, self.hook.tip
         yield require(both > OPENING, "the jaw can hold hook and cube together", both=both, jaw=OPENING)
         yield require(tip >= self.half, "the tip ends before the cube's middle", tip=tip, half=self.half)
-        _, away = polar(at + turn @ [self.hook.inside - self.stretch, 0.0, 0.0] - BASE)
+        _, away = polar(at + turn @ [self.tool.inside - self.stretch, 0.0, 0.0] - BASE)
         yield require(away <= ARM, "the handle is out of reach", distance=away, arm=ARM)
 
     def features(self) -> Mapping[str, float]:
@@ -186,7 +194,7 @@ class ToolRetrieve(Scenario):
         return {
             "out_of_touch": self.out_of_touch,
             "shortfall_over_handle": self.out_of_touch / self.hook.length,
-            "tip_over_edge": self.hook.tip / self.cube.edge,
+            "tip_over_edge": self.tool.engaging / self.cube.edge,
         }
 
     # --- geometry -------------------------------------------------------------------------
@@ -196,6 +204,18 @@ class ToolRetrieve(Scenario):
         """Where the centre of the cube's foot stands [m]."""
         away = self.distance * heading(self.bearing)
         return np.array([BASE[0] + away[0], BASE[1] + away[1], TABLE_TOP])
+
+    @property
+    def tool(self) -> Hook:
+        """The hook, bent into its kind at the end of the handle."""
+        hook = self.hook
+        body = {"width": hook.width, "height": hook.height, "mass": hook.mass, "friction": hook.friction}
+        if self.kind == J:
+            radius = (hook.tip + WIDER + hook.width) / 2
+            return JHook(length=hook.length - hook.width, radius=radius, mirrored=hook.mirrored, **body)
+        if self.kind == T:
+            return THook(length=hook.length, tip=hook.tip, **body)
+        return hook
 
     @property
     def half(self) -> float:
@@ -211,9 +231,9 @@ class ToolRetrieve(Scenario):
     @property
     def stretch(self) -> float:
         """Distance from where the handle is held to the face that pulls [m]."""
-        return shortest_stretch(self.hook, self._behind)
+        return shortest_stretch(self.tool, self._behind)
 
     @property
     def _behind(self) -> float:
         """How far out the face that pulls is when it has passed the cube, whichever way the cube is turned [m]."""
-        return self.distance + self.half * math.sqrt(2) + CLEAR
+        return self.distance + self.half * math.sqrt(2) + CLEAR + self.tool.depth

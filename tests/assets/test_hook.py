@@ -190,3 +190,11 @@ def test_a_tip_that_reaches_past_the_middle_of_a_cube_draws_it_straight(friction
     assert come == pytest.approx(0.148, abs=0.004) and turn < 2.0
     come, turn = pulled(0.4 * edge, friction, mirrored)
     assert turn > 10.0
+
+
+@pytest.mark.parametrize("hook", [LHook(), LHook(mirrored=1), ROUND_J, BARBED_J, THook()])
+def test_what_plans_ask_of_a_hook_is_what_its_outline_shows(hook):
+    """How far it stands out beside the handle, and where its innermost face is; polygons overshoot circles by 0.5 %."""
+    corners = hook.corners * [1.0, hook.side, 1.0]
+    assert corners[:, 1].max() - hook.width / 2 == pytest.approx(hook.aside, rel=0.02)
+    assert corners[:, 0].max() - hook.width == pytest.approx(hook.inside, rel=0.02)

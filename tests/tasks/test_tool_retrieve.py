@@ -82,6 +82,14 @@ def test_whoever_keeps_the_hook_has_the_cube_within_reach_and_cannot_take_it(nam
     assert away(w.com("cube")) < ARM and w.com("cube")[2] < TABLE_TOP + NOMINAL.half + LIFTED
 
 
+@pytest.mark.parametrize("split", ["bent_hook", "double_hook"])
+def test_every_kind_of_hook_draws_the_cube_in_and_none_does_without_what_pulls(split):
+    scenario = TASK.draw(split, 0, 0).scenario
+    assert play(TASK, scenario, scenario.oracle).solved
+    straight, _ = ablated(TASK, scenario)["no_tip"]
+    assert not straight.solved
+
+
 @pytest.mark.parametrize("split", ["mirrored_hook", "long_handle", "far_corner", "turned_hook"])
 def test_a_memorised_motion_serves_no_other_hook_and_no_other_place(split):
     trained, moved = (TASK.draw(name, 0, 1).scenario for name in ("id", split))
