@@ -48,6 +48,11 @@ def inside(world: World, body: str, container: str, low: Vec3, high: Vec3) -> bo
     return bool(np.all(place >= low) and np.all(place <= high))
 
 
+def over(world: World, body: str, spot: Vec3, half: float) -> bool:
+    """Whether a body's centre of mass is over a square along x and y, given by its middle and half a side [m]."""
+    return bool(np.abs(world.com(body) - spot)[:2].max() <= half)
+
+
 def touched_only(world: World, *allowed: str) -> str | None:
     """The first free body that the robot has touched since the start although it is not allowed, or None."""
     return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)

@@ -1,4 +1,4 @@
-"""Where a jaw that points down can take hold of a thing, however it lies: widths from the shapes that collide."""
+"""Take hold of a thing with a jaw that points down, however it lies: widths come from the shapes that collide."""
 
 import math
 from dataclasses import dataclass
@@ -7,10 +7,13 @@ import mujoco
 import numpy as np
 
 from ..assets.prop import TABLE_TOP
+from ..errors import GaveUp
 from ..geometry import UP, Vec3
 from ..robots.jaw import PALM_ABOVE, TIP
+from ..scenario import Plan
 from ..sim.world import Arm, World
-from .motion import hand_yaw
+from .jaw import pick
+from .motion import OPEN, go_to, hand_yaw
 
 WIDEST = 0.072
 """Widest thing that is taken hold of [m]: of the 77 mm to which the fingers open, what a hand and a thing that are each
@@ -31,6 +34,19 @@ class Grip:
     """Level direction along which the fingers close."""
     width: float
     """Of the thing along that [m]."""
+
+
+def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
+    """Take hold of a thing wherever and however it lies, and lift it. See `jaw.pick`.
+
+    Raises:
+        GaveUp: it is too wide in every direction, or a move took too long.
+    """
+    grip = best_grip(arm, body)
+    if grip is None:
+        raise GaveUp(f"{body} lies so that no jaw can take it")
+    yield from go_to(arm, grip.at + above * UP, grip=OPEN)  # there it is seen which way the wrist can turn
+    yield from pick(arm, grip.at, grip.closing, above=above, lift=lift)
 
 
 def best_grip(arm: Arm, body: str) -> Grip | None:

@@ -30,16 +30,15 @@ import numpy as np
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
-from ..errors import GaveUp
 from ..geometry import UP, Vec3, heading
 from ..params import param
-from ..predicates import fallen, held, rests_on, still
+from ..predicates import fallen, held, over, rests_on, still
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.grip import best_grip
-from ..skills.jaw import carry, pick, put, release
-from ..skills.motion import OPEN, Condition, Pace, go_to, retreat
+from ..skills.grip import take
+from ..skills.jaw import carry, put, release
+from ..skills.motion import Condition, Pace, retreat
 
 LIFTED = 0.03
 """How far the thing's centre of mass must have been above where it stood [m]."""
@@ -47,8 +46,6 @@ RAISED = 0.07
 """How high the oracle carries it [m]; a thing lost there falls on the face that it stood on."""
 CALM = 0.02
 """Speed below which a thing counts as at rest [m/s]."""
-ABOVE = 0.10
-"""Height from which the oracle comes down on the thing [m]."""
 BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
 FIELD = np.array([[-0.22, 0.05], [-0.32, 0.32]])
@@ -109,8 +106,8 @@ class PickPlaceYcb(Scenario):
     def success(self, world: World) -> bool:
         if not world.memory["lifted"] or world.memory["jumps"] < self.jumps:
             return False
-        away = np.abs(world.com("thing") - world.pos("patch"))[:2].max()
-        return bool(away <= self.patch.size / 2) and rests_on(world, "thing", "table") and still(world, "thing", CALM)
+        placed = over(world, "thing", world.pos("patch"), self.patch.size / 2) and rests_on(world, "thing", "table")
+        return placed and still(world, "thing", CALM)
 
     def failure(self, world: World) -> str | None:
         return "the thing fell off the table" if fallen(world, "thing") else None
@@ -135,20 +132,11 @@ class PickPlaceYcb(Scenario):
 
     def oracle(self, world: World) -> Plan:
         """Pick up, follow the square until it is locked, put down on it."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         while world.memory["jumps"] < self.jumps:
             was = world.pos("patch")
             yield from self.bring(world, was, ends=lambda was=was: math.dist(world.pos("patch"), was) > 0.0)
         yield from self.set_down(world, world.pos("patch"))
-
-    def take(self, world: World, lift: float = RAISED) -> Plan:
-        """Take hold of the thing and lift it [m]."""
-        grip = best_grip(world.arm, "thing")
-        if grip is None:
-            raise GaveUp("the thing lies so that no jaw can take it")
-        above = grip.at + ABOVE * UP
-        yield from go_to(world.arm, above, grip=OPEN)  # there it is seen which way the wrist can turn
-        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=lift)
 
     def bring(self, world: World, spot: Vec3, height: float = RAISED, ends: Condition = lambda: False) -> Plan:
         """Carry the thing over a place on the table, at a height above where it stood [m]."""
@@ -176,18 +164,18 @@ class PickPlaceYcb(Scenario):
 
     def _first_plan(self, world: World) -> Plan:
         """Carry it to where the square was at the start."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         yield from self.set_down(world, self.spots[0])
 
     def _follow_once(self, world: World) -> Plan:
         """Go on to where the square has jumped to, and no farther."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         yield from self.bring(world, self.spots[0])
         yield from self.set_down(world, self.spots[1])
 
     def _drag(self, world: World) -> Plan:
         """Draw it over the table to the square, which does not move for what has never been lifted."""
-        yield from self.take(world, lift=0.0)
+        yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, self.spots[0], height=0.0)
         yield from release(world.arm)
         yield from retreat(world.arm, 0.06)
@@ -195,12 +183,12 @@ class PickPlaceYcb(Scenario):
     def _drag_and_lift(self, world: World) -> Plan:
         """Draw it there, then make up for the lift."""
         yield from self._drag(world)
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         yield from self.set_down(world, self.spots[0])
 
     def _short(self, world: World) -> Plan:
         """Put it down as near to the square as that allows, and wait for it to stay."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         back = self.start - self.spots[0]
         yield from self.set_down(world, self.spots[0] + (self.near + 0.02) * back / np.linalg.norm(back))
 

@@ -36,17 +36,16 @@ from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..control.loop import Loop
-from ..errors import GaveUp
 from ..geometry import UP, Vec3, heading
 from ..params import param
-from ..predicates import fallen, rests_on, still
+from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPENED, PALM_ABOVE, TIP
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
-from ..skills.grip import best_grip, extent
-from ..skills.jaw import carry, grasp, pick, poke, put, release
-from ..skills.motion import OPEN, Pace, go_to, retreat
+from ..skills.grip import extent, take
+from ..skills.jaw import carry, grasp, poke, put, release
+from ..skills.motion import Pace, go_to, retreat
 
 LIFTED, LOWERED = 0.05, 0.042
 """How far a thing must be lifted to count as carried, and how low it may sink then [m]: both more than `PALM_ABOVE` and
@@ -57,8 +56,6 @@ RAISED = 0.07
 """How high the oracle carries the thing [m]; from 12 cm things fall on the face that they stood on."""
 CALM, RESTED = 0.02, 0.2
 """Speed below which a thing counts as at rest [m/s], and for how long it must be so before it is taken again [s]."""
-ABOVE = 0.10
-"""Height from which the oracle comes down on the thing [m]."""
 BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
 LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / 9.81)
@@ -116,8 +113,8 @@ class SlipRecovery(Scenario):
     def success(self, world: World) -> bool:
         if not world.memory["recovered"] or world.memory["slips"] < self.slips:
             return False
-        away = np.abs(world.com("thing") - self.goal)[:2].max()
-        return bool(away <= self.patch.size / 2) and rests_on(world, "thing", "table") and still(world, "thing", CALM)
+        placed = over(world, "thing", self.goal, self.patch.size / 2) and rests_on(world, "thing", "table")
+        return placed and still(world, "thing", CALM)
 
     def failure(self, world: World) -> str | None:
         if world.memory["slid"] > SLID:
@@ -154,22 +151,13 @@ class SlipRecovery(Scenario):
     def oracle(self, world: World) -> Plan:
         """Pick up, carry; as soon as the hand is empty find the thing and begin again; put down."""
         while True:
-            yield from self.take(world)
+            yield from take(world.arm, "thing", lift=RAISED)
             yield from self.bring(world)
             if world.touching(ROBOT, "thing"):
                 break
             yield from release(world.arm)
             yield from self.settle(world)
         yield from self.set_down(world)
-
-    def take(self, world: World, lift: float = RAISED) -> Plan:
-        """Take hold of the thing wherever and however it lies, and lift it [m]."""
-        grip = best_grip(world.arm, "thing")
-        if grip is None:
-            raise GaveUp("the thing lies so that no jaw can take it")
-        above = grip.at + ABOVE * UP
-        yield from go_to(world.arm, above, grip=OPEN)  # there it is seen which way the wrist can turn
-        yield from pick(world.arm, grip.at, grip.closing, above=ABOVE, lift=lift)
 
     def settle(self, world: World) -> Plan:
         """Wait until the thing has been at rest for a while: a can that rocks is slow at the end of every swing."""
@@ -206,7 +194,7 @@ class SlipRecovery(Scenario):
 
     def _carry_on(self, world: World) -> Plan:
         """As if nothing had happened: over the goal, down, open."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         held_at = world.arm.hand[2] - TABLE_TOP
         yield from self._over(world, held_at)
         yield from self._over(world, held_at - RAISED)
@@ -215,7 +203,7 @@ class SlipRecovery(Scenario):
 
     def _grip_harder(self, world: World) -> Plan:
         """As soon as it slips stop and squeeze for as long as slips last, then go on with what is in the hand."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         held_at = world.arm.hand[2] - TABLE_TOP
         yield from self.bring(world)
         yield from grasp(world.arm, 0.6)
@@ -226,20 +214,20 @@ class SlipRecovery(Scenario):
 
     def _carry_low(self, world: World) -> Plan:
         """1 cm above the table, where a thing that slips stays between the fingers."""
-        yield from self.take(world, lift=0.0)
+        yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, 0.01)
         yield from self.set_down(world)
 
     def _drag(self, world: World) -> Plan:
         """Take hold of it and draw it over the table, which no slip can prevent."""
-        yield from self.take(world, lift=0.0)
+        yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, 0.0)
         yield from release(world.arm)
         yield from retreat(world.arm)
 
     def _push_rest(self, world: World) -> Plan:
         """Once it has fallen push it home with closed fingers."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         yield from self.bring(world)
         yield from self.settle(world)
         at, way = world.com("thing"), (self.goal - world.com("thing")) * [1.0, 1.0, 0.0]
@@ -264,7 +252,7 @@ class SlipRecovery(Scenario):
 
     def _guess(self, world: World, away: float) -> Plan:
         """Carry the thing past the guess, open, come down at the guess, and carry on from there, all blindly."""
-        yield from self.take(world)
+        yield from take(world.arm, "thing", lift=RAISED)
         along = (self.goal - self.start) / math.dist(self.goal, self.start)
         high, begin = RAISED * UP, world.arm.hand
         low = begin - (world.com("thing")[2] - world.memory["stood"]) * UP

@@ -8,11 +8,11 @@ import pytest
 
 from scengen.assets.prop import TABLE_TOP, place, solid, table
 from scengen.assets.ycb import Ycb
+from scengen.errors import GaveUp
 from scengen.geometry import UP, heading, quat
 from scengen.sim import scene_text
 from scengen.sim.world import World
-from scengen.skills.grip import WIDEST, best_grip, extent
-from scengen.skills.jaw import pick
+from scengen.skills.grip import WIDEST, best_grip, extent, take
 
 CAN, TIN, PLATE, FOAM = 3, 8, 12, 15
 """Indices among the objects of the YCB set."""
@@ -98,7 +98,12 @@ def test_of_two_equal_grips_it_is_the_one_that_turns_the_hand_less(yaw):
 @pytest.mark.parametrize("item", [CAN, TIN, FOAM])
 def test_what_has_a_grip_can_be_lifted(item):
     world = scene_with(item, 40.0)
-    grip = best_grip(world.arm, "thing")
-    for action in pick(world.arm, grip.at, grip.closing):
+    for action in take(world.arm, "thing"):
         world.step(action)
     assert world.com("thing")[2] > TABLE_TOP + 0.10
+
+
+def test_what_has_none_is_given_up():
+    world = scene_with(PLATE)
+    with pytest.raises(GaveUp, match="no jaw can take it"):
+        next(take(world.arm, "thing"))
