@@ -38,6 +38,7 @@ TRAINING = {
     "mirror_id": "mirror_pick_place",
     "pendulum_id": "pendulum_grasp",
     "slip_id": "slip_recovery",
+    "ycb_id": "pick_place_ycb",
     "rack_id": "sheltered_grasp",
     "sort_id": "mass_sort",
     "balance_id": "balance_medium",
