@@ -17,7 +17,7 @@ from pathlib import Path
 from . import config
 from .errors import ScengenError
 from .ood import features
-from .params import canonical, with_values
+from .params import canonical, values, with_values
 from .samplers.split import ID
 from .samplers.task import Task
 from .sim import scene_text
@@ -131,6 +131,8 @@ def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> 
             for name in names:
                 good = SNAKE_CASE.fullmatch(name) is not None
                 _ask(good, f"{where}: the {kind} {name!r} has no name in snake_case, such as push_the_slab")
+        both = sorted(scenario.features().keys() & values(scenario).keys())
+        _ask(not both, f"{where}: {', '.join(both)} name both parameters and features; a table of both needs two names")
         whole = scene_text.emit(scenario.build())[0]
         for name, scene in ablations.items():
             _ask(scene_text.emit(scene)[0] != whole, f"{where}: the ablation {name!r} takes nothing away")

@@ -212,7 +212,7 @@ class PickPlaceYcb(Scenario):
     def features(self) -> Mapping[str, float]:
         """How often and how far the square jumps [m], at what distance (in sizes of the square), and the mass [kg]."""
         return {
-            "jumps": float(self.jumps),
+            "number_of_jumps": float(self.jumps),
             "longest_jump": max((jump.way for jump in self.planned), default=0.0),
             "near_over_size": self.near / self.patch.size,
             "size": self.patch.size,

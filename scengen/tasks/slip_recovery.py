@@ -283,7 +283,7 @@ class SlipRecovery(Scenario):
         """When it slips, for how long [s], how far it is [m], the mass [kg], and how the narrow side lies (cosine)."""
         way, side = self.left(0), heading(self.yaw) @ (self.goal - self.start)
         return {
-            "slips": float(self.slips),
+            "number_of_slips": float(self.slips),
             "share_of_the_way_at_the_last_slip": 1.0 - self.left(self.slips) / way,
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,

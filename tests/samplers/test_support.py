@@ -164,12 +164,6 @@ def test_overlap_of_a_feature_is_counted():
     assert departure("ratio", [0.0, 1.0], [1.5, 2.0]).gap == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("name", config.tasks())
-def test_the_features_of_a_family_have_names_of_their_own(name):
-    scenario = config.task(name).draw(ID, 0, 0).scenario
-    assert not scenario.features().keys() & values(scenario).keys()
-
-
 # --- severities -----------------------------------------------------------------------------
 
 

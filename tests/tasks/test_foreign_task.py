@@ -53,6 +53,12 @@ def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
     assert "is refuted" in told and "the_oracle_itself" in told
 
 
+def test_a_feature_with_the_name_of_a_parameter_is_caught(monkeypatch):
+    monkeypatch.setattr(PushBlock, "features", lambda self: {"distance": self.distance})
+    told = broken(conformance._scenes_have_controls, config.task("push_block", SEARCH))
+    assert "distance name both parameters and features" in told
+
+
 def test_an_instruction_that_names_its_axis_is_caught():
     task = replace(config.task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
