@@ -33,6 +33,9 @@ ALIGNED = 0.05
 WRIST_SPARE = math.radians(10.0)
 """How far joint 7 stays away from its limits when a hand may be turned either way [rad]."""
 
+INTEGRAL, MOST, LAG, ASKEW = 4.0, 0.012, 0.03, 0.2
+"""How fast the error of a hand that stays somewhere adds up [1/s], to how much at most along each axis [m], and how far
+from there [m] or turned from its orientation [rad] a hand is on its way still, so that nothing adds up."""
 STRAIGHT = math.radians(10.0)
 """How far to the right a hand may look and still close as it does after a reset [rad]."""
 
@@ -129,6 +132,24 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
         velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)
         setpoint = setpoint + velocity * Loop.PERIOD
         yield steer(arm, setpoint, velocity, turn, grip)
+
+
+def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STEADY, grip: float | None = None) -> Plan:
+    """Take the hand to `pos` as `go_to` does, and keep it there until something happens, however far it has come.
+
+    Near the end what is left of the way adds up, against the friction of the joints: without that a hand far from where
+    it started stays a centimetre off.
+    """
+    goal, setpoint, more = np.asarray(pos, float), arm.hand, np.zeros(3)
+    while not until():
+        ahead = goal - setpoint
+        distance = math.sqrt(ahead @ ahead)
+        velocity = ahead * (min(pace.speed, 4.0 * distance) / max(distance, 1e-9))
+        setpoint = setpoint + velocity * Loop.PERIOD
+        left, turn = goal - arm.hand, between(arm.hand_rot, rot)
+        if max(math.sqrt(left @ left) / LAG, math.sqrt(turn @ turn) / ASKEW) < 1.0:
+            more = np.clip(more + INTEGRAL * Loop.PERIOD * left, -MOST, MOST)
+        yield steer(arm, setpoint + more, velocity, turn, grip)
 
 
 def push(arm: Arm, velocity: ArrayLike, until: Condition, grip: float | None = None, give_up: float = 3.0) -> Plan:

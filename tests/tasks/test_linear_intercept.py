@@ -1,0 +1,128 @@
+"""A rolling ball keeps its velocity, or loses it by the law; it is caught where it will be, and nowhere else."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from controls import (
+    ablated,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    play,
+    play_shortcut,
+    replayed,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scengen import config
+from scengen.assets.ball import Ball
+from scengen.sim.world import IDLE
+from scengen.tasks.linear_intercept import LinearIntercept, passes, rolled
+
+TASK = config.task("linear_intercept")
+CATCH = TASK.draw("id", 0, 0).scenario
+
+
+def path(scenario, seconds):
+    """Where the ball is in every period, and how fast [m, m/s], nobody acting."""
+    world, places, velocities = load(TASK, scenario), [], []
+    for _ in range(round(seconds * 100)):
+        with world.events():
+            scenario.events(world)
+        world.step(IDLE)
+        places.append(world.com("ball"))
+        velocities.append(world.velocity("ball"))
+    return np.array(places), np.array(velocities)
+
+
+# --- the laws of the task -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("heading", [0.0, 255.0])
+def test_it_lies_still_then_rolls_straight_on_at_constant_velocity(heading):
+    """Within 1 % of its speed, without slipping, from the period on in which it is launched."""
+    ball = replace(CATCH, heading=heading, x=-0.2, y=0.2, launch=0.5)
+    places, velocities = path(ball, 2.5)
+    assert np.abs(places[49] - ball.start).max() < 1e-4
+    expected = ball.start + np.outer(np.arange(1, 201) / 100, ball.speed * ball.u)
+    assert np.abs(places[50:] - expected).max() < 0.01 * ball.speed * 2.0 + 1e-3
+    assert velocities[-1, 3:5] == pytest.approx(ball.speed * ball.u[:2], rel=0.01, abs=1e-3)
+    spin = np.cross(velocities[-1, :3], [0.0, 0.0, ball.ball.radius])[:2]
+    assert spin == pytest.approx(velocities[-1, 3:5], rel=0.02, abs=1e-3)
+
+
+@pytest.mark.parametrize("rolling", [0.0015, 0.004])
+def test_felt_slows_it_by_five_sevenths_of_its_share_of_gravity(rolling):
+    """a = 5/7 c g: the resisting torque c m g r brakes 7/5 of the mass."""
+    ball = replace(CATCH, rolling=rolling, launch=0.5)
+    _, velocities = path(ball, 2.5)
+    speeds = np.linalg.norm(velocities[:, 3:5], axis=1)
+    assert speeds[70] - speeds[220] == pytest.approx(1.5 * 5 / 7 * rolling * 9.81, rel=0.05)
+    assert ball.slowing == pytest.approx(5 / 7 * rolling * 9.81)
+
+
+@given(speed=st.floats(0.05, 0.4), slowing=st.floats(0.0, 0.1), seconds=st.floats(0.01, 5.0))
+@settings(max_examples=50, deadline=None)
+def test_when_it_passes_a_place_is_the_inverse_of_where_it_is(speed, slowing, seconds):
+    if speed > 1.05 * slowing * seconds:
+        assert passes(rolled(speed, slowing, seconds), speed, slowing) == pytest.approx(seconds, rel=1e-6)
+    far = speed**2 / (2 * slowing) if slowing else math.inf
+    assert rolled(speed, slowing, 1e9 if slowing else 1.0) <= far * (1 + 1e-9)
+    if slowing:
+        assert passes(1.01 * far, speed, slowing) == math.inf
+
+
+@pytest.mark.parametrize(("late", "caught"), [(-0.30, False), (-0.03, True), (0.0, True), (0.03, True), (0.30, False)])
+def test_fingers_must_close_when_it_is_there(late, caught):
+    """By how much [s]; it takes the ball a tenth of a second to cross the pads."""
+    scenario = replace(CATCH, speed=0.15)
+    assert play(TASK, scenario, lambda world: scenario.take(world, scenario.closing - late)).solved == caught
+
+
+# --- what must not work -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["go_to_where_it_is", "allow_for_the_way_alone", "follow_it"])
+def test_where_it_is_now_is_too_late(name):
+    assert play_shortcut(TASK, CATCH, name).reason == "the ball rolled off the table"
+
+
+def test_a_slower_ball_could_be_followed():
+    """Why there is no slower one: a hand that goes after it lags by its speed over 9.2 / s, less than half a pad."""
+    slow = replace(CATCH, speed=0.08, x=0.1)
+    assert play_shortcut(TASK, slow, "follow_it").solved
+
+
+def test_without_its_way_the_witness_closes_on_nothing():
+    ((ended, world),) = ablated(TASK, CATCH).values()
+    assert not ended.solved and world.touched("ball", "bar") and not world.touched("robot", "ball")
+
+
+@pytest.mark.parametrize("axis", ["away", "fast", "other_edge"])
+def test_a_memorised_catch_is_lost_out_of_distribution(axis):
+    """One of five may come through the same place at the same time."""
+    twins = [TASK.draw(axis, 0, i).scenario for i in range(5)]
+    assert sum(replayed(TASK, CATCH, twin).solved for twin in twins) <= 1
+
+
+# --- scenes that must not be certified ---------------------------------------------------
+
+
+def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
+    each_refuted_for_its_own_reason(
+        [
+            LinearIntercept(heading=90.0),
+            LinearIntercept(rolling=0.004),
+            LinearIntercept(ball=Ball(radius=0.035, density=1200.0)),
+        ]
+    )
+
+
+@given(scenario=anywhere(LinearIntercept))
+@settings(max_examples=30, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
