@@ -37,6 +37,7 @@ TRAINING = {
     "shelf_id": "plate_shelf_hetbi",
     "mirror_id": "mirror_pick_place",
     "pendulum_id": "pendulum_grasp",
+    "ball_id": "linear_intercept",
     "slip_id": "slip_recovery",
     "ycb_id": "pick_place_ycb",
     "rack_id": "sheltered_grasp",
