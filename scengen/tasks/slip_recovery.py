@@ -21,6 +21,7 @@ and "sliding the object is not allowed":
 * During the window the gripper is open whatever is commanded, and then obeys again. The window lasts longer than that
   fall: shorter ones are refuted.
 * Placed means: lifted again after the last slip, and let go in the region, at rest. What falls into it is not placed.
+* The paper names no YCB object. These are proxies, solids of their size, mass and balance (`assets.ycb`), not scans.
 * Slid is what has gone `SLID` over the table pushed by the robot, all stretches added up: touched while it lay, and as
   long as it lies after that. Where it goes after a fall does not count.
 """
