@@ -121,10 +121,10 @@ def test_no_camera_that_stands_still_sees_a_training_cube(camera, storey):
 
 def test_on_the_opposite_side_one_camera_looks_into_the_rack():
     """Why the docstring says so; and the negative control of the test above."""
-    s = TASK.draw("opposite_side", 0, 0).scenario
+    s = ShelteredGrasp(side=-1, storey=1)
     w = load(TASK, s)
     mujoco.mj_camlight(w.model, w.data)
-    assert not hidden_from(w, "sideview", [w.pos("cube") + s.cube.edge * np.array([0.0, 0.0, 0.9])])
+    assert not hidden_from(w, "sideview", [w.pos("cube") + s.cube.edge / 2 * np.array([0.0, 0.9, 1.9])])
 
 
 # --- goal ---------------------------------------------------------------------------------
