@@ -22,9 +22,10 @@ Decisions, where the paper (App. B, M01) is silent, and its text contradicts its
   hand go the wrong way and to turn back: to notice that is what the task asks for, and so no way around it.
 * The cube stands at least 7 cm from the middle lines of the view, or else some orientation shows it where it is.
 
-Axes. The paper has none. Those of `view` ask the eye alone, and memory, which has none, cannot tell them from training;
-`far` and `big` ask only little more. The two that break a path that is kept relative to the cube are of size: nothing
-else about lifting one cube is hard.
+Axes. The paper has none. Those of `view` ask the eye alone, and memory, which has none, cannot tell them from training.
+Of the others only `small` breaks a path that is kept relative to the cube: nothing else about lifting one cube is hard.
+For the same reason plans that read poses instead of pictures, the adversary's random grasps among them, solve half of
+the scenes: what is asked here, nobody who reads poses is asked.
 """
 
 import math
