@@ -38,6 +38,7 @@ TRAINING = {
     "mirror_id": "mirror_pick_place",
     "pendulum_id": "pendulum_grasp",
     "ball_id": "linear_intercept",
+    "sorted_balls_id": "ramp_sort",
     "slip_id": "slip_recovery",
     "ycb_id": "pick_place_ycb",
     "rack_id": "sheltered_grasp",
