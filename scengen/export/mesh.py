@@ -16,7 +16,11 @@ OVERLAP = 1e-5
 
 
 def united(prop: Prop) -> Manifold:
-    """The solid that an asset is in the simulation, joints at their reference, in its own axes."""
+    """The solid that an asset is in the simulation, joints at their reference, in its own axes.
+
+    Raises:
+        BadConfig: it is only looked at, as a mark on the table is.
+    """
     model = prop.spec().compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -28,6 +32,10 @@ def united(prop: Prop) -> Manifold:
         middle, edges = (low + high) / 2, high - low
         grown = part.translate((-middle).tolist()).scale((1 + 2 * OVERLAP / edges).tolist())
         parts.append(grown.translate(middle.tolist()))
+    if not parts:
+        raise BadConfig(
+            f"{type(prop).__name__} is only looked at; nothing of it is solid, so that there is no mesh of it"
+        )
     return Manifold.batch_boolean(parts, OpType.Add)
 
 
@@ -35,7 +43,7 @@ def encode(prop: Prop, ending: str) -> bytes:
     """The union as a mesh file [m].
 
     Raises:
-        BadConfig: no such format, or trimesh is missing.
+        BadConfig: no such format, nothing solid, or trimesh is missing.
     """
     if ending not in FORMATS:
         raise BadConfig(f"no mesh format named {ending!r}; known: {', '.join(FORMATS)}")

@@ -15,16 +15,29 @@ from scengen.export.mesh import FORMATS, encode, united
 from scengen.intake import solid
 from scengen.params import parameters
 
+APART = ("seesaw", "pendulum")
+"""What consists of two parts that touch nowhere."""
+MARKS = ("patch", "zone")
+"""What is only looked at."""
 
-@pytest.mark.parametrize("name", [name for name in kits() if name != "seesaw"])
+
+@pytest.mark.parametrize("name", [name for name in kits() if name not in APART + MARKS])
 def test_every_asset_is_a_closed_mesh_that_can_be_taken_in_again(tmp_path, name):
     file, prop = tmp_path / f"{name}.stl", kit(name)
     file.write_bytes(encode(prop, ".stl"))
     assert solid.read(str(file)).manifold.volume() == pytest.approx(united(prop).volume(), rel=1e-4)
 
 
-def test_the_deck_of_a_seesaw_hangs_in_its_stand_and_touches_it_nowhere():
-    assert len(united(kit("seesaw")).decompose()) == 2
+@pytest.mark.parametrize("name", APART)
+def test_what_hangs_in_a_stand_touches_it_nowhere(name):
+    assert len(united(kit(name)).decompose()) == 2
+
+
+@pytest.mark.parametrize("name", MARKS)
+def test_there_is_no_mesh_of_a_mark_on_the_table(name, tmp_path, capsys):
+    assert cli.run(["asset", f"name={name}", f"to={tmp_path / 'mark.stl'}"]) == 2
+    told = capsys.readouterr().err
+    assert "nothing of it is solid" in told and told.count("\n") == 1 and not any(tmp_path.iterdir())
 
 
 def test_volumes_are_those_of_a_textbook():

@@ -1,4 +1,4 @@
-"""Every task keeps to the rules, on every split; the first training scenario of each is certified.
+"""Every task keeps to the rules, on every split; `make slow` also certifies the first training scenario of each.
 
 `make certify` certifies scenarios of all splits; the rules themselves are tested in `test_foreign_task.py`.
 """
@@ -8,7 +8,7 @@ import pytest
 from scengen import config, conformance
 
 CHECKS = [
-    pytest.param(check, id=f"{task}-{check}")
+    pytest.param(check, id=f"{task}-{check}", marks=[pytest.mark.slow] if "certified" in str(check) else [])
     for task in config.tasks()
     for check in conformance.checks(task, scenarios=1, certified=("id",))
 ]
