@@ -91,10 +91,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.task: Task = config.task(task, search)
         if observations is None:
             observations = proprioception(self.task.embodiment)
-        poses = poses_of(self.task.family(), lambda: self.scenario.orientation)
-        check_names(observations, self.task.embodiment, poses)
+        known, self.views = streams_of(self.task.embodiment), cameras_of(self.task.embodiment)
+        if not set(observations) <= {*known, *self.views}:  # poses cost a scene
+            poses = poses_of(self.task.family(), lambda: self.scenario.orientation)
+            check_names(observations, self.task.embodiment, poses)
+            known |= poses
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
-        known, self.views = {**streams_of(self.task.embodiment), **poses}, cameras_of(self.task.embodiment)
         self.streams = {name: known[name] for name in observations if name in known}
         self.cameras = [name for name in observations if name in self.views]
         self._rows = {row.id: row for folder in _folders(pool) for row in _scenarios(folder, task)}

@@ -15,7 +15,7 @@ import mujoco
 
 from scengen.certificate import Certificate
 from scengen.samplers.task import Task
-from scengen.scenario import Planner, Refutation, Scenario, Shortcut
+from scengen.scenario import Plan, Planner, Refutation, Scenario, Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import certify
@@ -105,6 +105,18 @@ def spared(family: type[Scenario]) -> type[Scenario]:
         return {}
 
     return type("Spared", (family,), {"ablations": ablations, "shortcuts": shortcuts})
+
+
+def mistaken(family: type[Scenario], shortcut: str) -> type[Scenario]:
+    """The family whose oracle takes one of its own shortcuts for the solution; nobody else takes any."""
+
+    def oracle(self: Scenario, world: World) -> Plan:
+        yield from family.shortcuts(self)[shortcut].plan(world)
+
+    def shortcuts(self: Scenario) -> Mapping[str, Shortcut]:
+        return {}
+
+    return type("Mistaken", (family,), {"oracle": oracle, "shortcuts": shortcuts})
 
 
 # --- negative controls ------------------------------------------------------------------------

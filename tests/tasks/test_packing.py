@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import pytest
-from controls import ablated, each_refuted_for_its_own_reason, load, not_certified, play_shortcut, spared
+from controls import ablated, each_refuted_for_its_own_reason, load, mistaken, not_certified, play_shortcut, spared
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -165,17 +165,6 @@ class Lenient(Packing):
         return sum(self.lies(world, i) for i in range(self.count)) >= 2
 
 
-@dataclass(frozen=True, kw_only=True)
-class Clumsy(Packing):
-    """The oracle turns nothing."""
-
-    def shortcuts(self):
-        return {}
-
-    def oracle(self, world):
-        yield from super().shortcuts()["as_they_lie"].plan(world)
-
-
 def test_invalid_scenarios_are_refuted_each_for_its_own_reason():
     nearly = {f"spot_{i}": replace(NOMINAL.spots[i], turn=20.0) for i in range(3)}
     each_refuted_for_its_own_reason(
@@ -204,7 +193,7 @@ def test_a_turn_is_what_it_takes_to_lie_as_in_the_slot():
     [
         (Packed(), "unsolved", "refuted"),
         (Lenient(), "shortcuts", "refuted"),
-        (Clumsy(), "solved", "unknown"),
+        (mistaken(Packing, "as_they_lie")(), "solved", "unknown"),
         (spared(Packing)(), "ablations", "refuted"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Packing) else str(value),

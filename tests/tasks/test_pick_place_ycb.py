@@ -10,6 +10,7 @@ from controls import (
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
+    mistaken,
     not_certified,
     play,
     play_shortcut,
@@ -196,23 +197,12 @@ class Forgiving(PickPlaceYcb):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stubborn(PickPlaceYcb):
-    """The oracle goes through with its first plan."""
-
-    def shortcuts(self):
-        return {}
-
-    def oracle(self, world):
-        yield from super().shortcuts()["put_it_where_the_square_was"].plan(world)
-
-
 @pytest.mark.parametrize(
     ("scenario", "check", "says"),
     [
         (unchecked(PickPlaceYcb)(thing=Ycb(item=0)), "shortcuts", "no jaw can take it"),
         (Forgiving(), "shortcuts", "reaches the goal"),
-        (Stubborn(), "solved", "the oracle failed"),
+        (mistaken(PickPlaceYcb, "put_it_where_the_square_was")(), "solved", "the oracle failed"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, PickPlaceYcb) else str(value),
 )

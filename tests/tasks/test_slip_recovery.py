@@ -9,6 +9,7 @@ from controls import (
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
+    mistaken,
     not_certified,
     play,
     play_shortcut,
@@ -208,23 +209,12 @@ class Forgiving(SlipRecovery):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stubborn(SlipRecovery):
-    """The oracle carries on."""
-
-    def shortcuts(self):
-        return {}
-
-    def oracle(self, world):
-        yield from super().shortcuts()["carry_on"].plan(world)
-
-
 @pytest.mark.parametrize(
     ("scenario", "check", "says"),
     [
         (unchecked(SlipRecovery)(thing=Ycb(item=0)), "solved", "no jaw can take it"),
         (Forgiving(), "shortcuts", "'carry_it_low' reaches the goal"),
-        (Stubborn(), "solved", "the oracle failed"),
+        (mistaken(SlipRecovery, "carry_on")(), "solved", "the oracle failed"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, SlipRecovery) else str(value),
 )

@@ -11,6 +11,7 @@ from controls import (
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
+    mistaken,
     not_certified,
     play,
     play_shortcut,
@@ -173,24 +174,13 @@ class Drawn(ToolRetrieve):
         return away(world.com("cube")) < ARM
 
 
-@dataclass(frozen=True, kw_only=True)
-class WrongSide(ToolRetrieve):
-    """The oracle takes every hook for its mirror image."""
-
-    def shortcuts(self):
-        return {}
-
-    def oracle(self, world):
-        yield from super().shortcuts()["pull_with_the_tip_turned_away"].plan(world)
-
-
 @pytest.mark.parametrize(
     ("scenario", "check", "says"),
     [
         (ToolRetrieve(hook_x=0.17, hook_y=-0.05), "overlap", "bodies overlap"),
         (unchecked(ToolRetrieve)(distance=0.97), "rest", "cube"),
         (Drawn(), "shortcuts", "reaches the goal"),
-        (WrongSide(), "solved", "the oracle failed"),
+        (mistaken(ToolRetrieve, "pull_with_the_tip_turned_away")(), "solved", "the oracle failed"),
         (spared(ToolRetrieve)(), "ablations", "the witness succeeds with 'less_light'"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, ToolRetrieve) else str(value),
