@@ -1,6 +1,5 @@
 """The costs that scengen promises, measured as ratios within one run: `scengen bench`."""
 
-import logging
 import statistics
 import tempfile
 import time
@@ -232,8 +231,6 @@ def _lift() -> Any:
     # isort: split
     import robosuite  # here, because it takes seconds and nothing else needs it
 
-    # after the import, which sets it; else robosuite tells of every environment that it makes
-    logging.getLogger("robosuite_logs").setLevel(logging.WARNING)
     return robosuite.make(
         "Lift",
         robots="Panda",

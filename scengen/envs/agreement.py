@@ -1,6 +1,5 @@
 """Whether certificates hold in robosuite too: a witness is played there and here, and the ends are compared."""
 
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -67,7 +66,6 @@ def compare_all(
 
 def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
     """Play one witness here and in robosuite."""
-    logging.getLogger("robosuite_logs").setLevel(logging.ERROR)  # it tells of every controller that it loads
     env = env_class(row.task, search)(
         scenario=row,
         use_object_obs=False,

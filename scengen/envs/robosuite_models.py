@@ -12,15 +12,18 @@ from numpy.typing import NDArray
 from ..robots import suction
 from ..sim import scene_text
 
-_advice = logging.getLogger("robosuite_logs")
-_advice.disabled = True  # on import, robosuite advises to install what nothing here needs
+_log = logging.getLogger("robosuite_logs")
+_log.disabled = True  # on import, robosuite advises to install what nothing here needs
 from robosuite.models.base import MujocoXML  # noqa: E402
 from robosuite.models.grippers import register_gripper  # noqa: E402
 from robosuite.models.grippers.gripper_model import GripperModel  # noqa: E402
 from robosuite.models.robots import RobotModel  # noqa: E402
 from robosuite.models.tasks import ManipulationTask  # noqa: E402
 
-_advice.disabled = False
+_log.disabled = False
+_log.setLevel(
+    logging.WARNING
+)  # at INFO it tells, for every environment, where on this machine a controller's file lies
 
 TEXT = ("compiler", "option", "size", "visual", "custom")
 """What the scene says about physics, memory and light, in place of what robosuite puts into every model."""

@@ -2,6 +2,7 @@
 
 import shutil
 import xml.etree.ElementTree as ET
+from collections import Counter
 from pathlib import Path
 
 import mujoco
@@ -9,22 +10,30 @@ import mujoco
 from ..errors import BadConfig
 from ..pool import PoolRow
 from ..robots import panda
+from ..sim import scene_text
 from ..sim.world import compose
+
+DECLARING = {"name", "class"}
+"""Attributes by which MJCF gives an element or a set of defaults its name."""
+TEXTUAL = {"file", "data"}
+"""Attributes that may hold any text, and no name."""
 
 
 def export(row: PoolRow, folder: Path, robot: bool) -> None:
     """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
 
     The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In
-    scene_with_robot.xml the robot stands as after a reset, in the key frame "home".
+    scene_with_robot.xml the robot stands as after a reset, in the key frame "home". Names are as in `without_slashes`;
+    but for them scene.xml is the certified scene.
 
     Raises:
-        BadConfig: the folder cannot be written.
+        BadConfig: the folder cannot be written, or the scene does not stand alone.
     """
     target = folder / row.id
+    scene_text.check(row.scene_xml)
     try:
         target.mkdir(parents=True, exist_ok=True)
-        (target / "scene.xml").write_text(row.scene_xml)
+        (target / "scene.xml").write_text(_written(ET.fromstring(row.scene_xml)))
         if robot:
             (target / "scene_with_robot.xml").write_text(_with_robot(row, target))
     except OSError as error:
@@ -43,7 +52,31 @@ def _with_robot(row: PoolRow, target: Path) -> str:
         if not copy.exists():
             shutil.copyfile(source, copy)
         mesh.set("file", f"../meshes/{copy.name}")
-    return ET.tostring(root, encoding="unicode")
+    return _written(root)
+
+
+def _written(root: ET.Element) -> str:
+    without_slashes(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def without_slashes(root: ET.Element) -> None:
+    """Spell `plate.rim` what a scene calls `plate/rim`, where it is declared and wherever it is referred to.
+
+    dm_control refuses names with a slash: in its own models that is where an attached model's name ends.
+
+    Raises:
+        BadConfig: the scene has both.
+    """
+    declared = {value for element in root.iter() for key, value in element.items() if key in DECLARING}
+    spelled = {name: name.replace("/", ".") for name in declared}
+    if len(set(spelled.values())) < len(declared):
+        twice, _ = Counter(spelled.values()).most_common(1)[0]
+        raise BadConfig(f"the scene has names that are both spelled {twice!r} without a slash; rename one of them")
+    for element in root.iter():
+        for key, value in element.items():
+            if key not in TEXTUAL:
+                element.set(key, spelled.get(value, value))
 
 
 def _add_home(spec: mujoco.MjSpec) -> None:

@@ -1,25 +1,32 @@
 """The command line as its users meet it: exit status, one clear line, nothing lost."""
 
 import os
+import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from helpers import REFERENCE
 from pools import QUICKLY, make
 
 from scengen import cli, config
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
+from scengen.export.mjcf import export, without_slashes
 from scengen.ood import card, discover
 from scengen.pictures import film, render
 from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.sim import scene_text
 from scengen.sim.world import World
+
+BASE = Path(__file__).parents[1] / "checker" / "base"
 
 
 @pytest.fixture(scope="module")
@@ -164,10 +171,12 @@ def test_tasks_lists_every_task_with_units_bounds_and_proofs(capsys):
     assert "tile.mass" in out and "0.005 to 0.5" in out and "stout_starter" in out
 
 
-def test_exported_scenes_open_from_anywhere(made, tmp_path):
-    assert cli.run(("export", f"pool={made}", f"to={tmp_path / 'out'}")) == 0
+@pytest.mark.parametrize("pool", [BASE / "single_severity", BASE / "packing_id", BASE / "shelf_id"])
+def test_exported_scenes_open_from_anywhere(pool, tmp_path):
+    """Jaw, suction cup, and both; in dm_control too, which refuses names with a slash."""
+    assert cli.run(("export", f"pool={pool}", f"to={tmp_path / 'out'}")) == 0
     moved = (tmp_path / "out").rename(tmp_path / "elsewhere")
-    for row in Pool.open(made).rows():
+    for row in Pool.open(pool).rows():
         folder = moved / row.id
         alone = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
         whole = mujoco.MjModel.from_xml_path(str(folder / "scene_with_robot.xml"))
@@ -176,7 +185,21 @@ def test_exported_scenes_open_from_anywhere(made, tmp_path):
         start = mujoco.MjData(whole)
         mujoco.mj_resetDataKeyframe(whole, start, whole.key("home").id)
         assert np.allclose(start.qpos, world.data.qpos, atol=1e-5)
-        assert str(tmp_path) not in (folder / "scene_with_robot.xml").read_text()
+        for text in (folder / "scene.xml").read_text(), (folder / "scene_with_robot.xml").read_text():
+            assert str(tmp_path) not in text and not re.search(r' (name|class|mesh|body\d?|joint)="[^"]*/', text)
+
+
+def test_two_names_that_differ_in_a_slash_alone_are_refused():
+    root = ET.fromstring("<mujoco><worldbody><body name='a/b'/><body name='a.b'/></worldbody></mujoco>")
+    with pytest.raises(BadConfig, match=r"both spelled 'a\.b'"):
+        without_slashes(root)
+
+
+def test_a_scene_that_is_exported_stands_alone(tmp_path):
+    includes = replace(next(Pool.open(REFERENCE).rows()), scene_xml="<mujoco><include file='/etc/passwd'/></mujoco>")
+    with pytest.raises(BadConfig, match="contains <include>"):
+        export(includes, tmp_path, robot=False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_contact_sheet_shows_every_scene_or_says_why_not(made, tmp_path):

@@ -1,7 +1,6 @@
 """robosuite plays the very scene of the certificate, with its own controller, and comes to the same verdict."""
 
 import json
-import logging
 from dataclasses import replace
 from functools import cache
 from unittest import mock
@@ -39,14 +38,6 @@ from robosuite.wrappers import DataCollectionWrapper, GymWrapper, VisualizationW
 BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
 LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}
 """Numbers that may differ: what things look like, where strings lie in memory, and how much memory there is."""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def quiet():
-    logger = logging.getLogger("robosuite_logs")
-    logger.disabled = True
-    yield
-    logger.disabled = False
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +94,14 @@ def test_robosuite_knows_every_task():
     for task in config.tasks():
         name = "".join(part.capitalize() for part in task.split("_"))
         assert robosuite.environments.base.REGISTERED_ENVS[name].NAME == task
+
+
+def test_robosuite_does_not_tell_where_files_lie_on_this_machine(row, caplog):
+    made(row, hard_reset=False).close()
+    assert not caplog.records
+    caplog.set_level("INFO", "robosuite_logs")
+    made(row, hard_reset=False).close()
+    assert any(".json" in record.message for record in caplog.records), "the control: it would have told"
 
 
 @pytest.mark.parametrize("task", config.tasks())

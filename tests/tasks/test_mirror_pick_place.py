@@ -1,6 +1,5 @@
 """What policies see is turned, bit by bit and everywhere, what they do is not; and the picture misleads."""
 
-import logging
 import math
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -102,7 +101,6 @@ def test_gymnasium_refuses_quarter_turns_of_pictures_that_are_not_square(pools):
 
 @WITH_EYES
 def test_robosuite_turns_colour_and_depth_bit_by_bit_whichever_row_comes_first(monkeypatch):
-    monkeypatch.setattr(logging.getLogger("robosuite_logs"), "disabled", True)
     eyes = {"camera_names": "agentview", "camera_heights": 48, "camera_widths": 48, "camera_depths": True}
     env = env_class(TASK.name)(scenario=row_with(PLAIN), hard_reset=False, **eyes)
     plain = env.reset()

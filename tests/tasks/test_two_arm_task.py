@@ -1,7 +1,6 @@
 """A task for two arms goes everywhere that one for one arm goes: pools, environments, recordings, the adversary."""
 
 import json
-import logging
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,7 +133,6 @@ def test_every_camera_is_in_the_model(rows, embodiment):
 
 
 def test_robosuite_makes_both_arms_and_comes_to_the_same_verdict(rows):
-    logging.getLogger("robosuite_logs").setLevel(logging.ERROR)
     made = env_class("push_pair", SEARCH)
     blind = {"use_camera_obs": False, "has_offscreen_renderer": False}
     env = made(robots=["Panda", "Panda"], scenario=rows[0], **blind)
