@@ -28,6 +28,7 @@ VERBS = (
     "export",
     "record",
     "tasks",
+    "new",
     "asset",
     "evaluate",
     "attack",

@@ -33,10 +33,19 @@ in it that holds `task/<task>.yaml`."""
 @cache
 def conf_dir() -> Path:
     """The folder of configuration files: inside an installed package, beside it in a checkout."""
+    return shipped("conf")
+
+
+def shipped(name: str) -> Path:
+    """A folder that comes with scengen: inside an installed package, beside it in a checkout.
+
+    Raises:
+        BadConfig: it is missing.
+    """
     here = Path(__file__).parent
-    found = next((d for d in (here / "conf", here.parent / "conf") if (d / "command").is_dir()), None)
+    found = next((d for d in (here / name, here.parent / name) if d.is_dir()), None)
     if found is None:
-        raise BadConfig("the conf/ folder is missing from this installation; install scengen again")
+        raise BadConfig(f"the {name}/ folder is missing from this installation; install scengen again")
     return found
 
 
@@ -190,12 +199,13 @@ def _value(where: str, kind: Any, value: Any) -> Any:
 
 def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
     """The whole configuration as plain data, and which file was chosen in each group."""
-    with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
+    with initialize_config_dir(str(_root(verb)), version_base="1.3", job_name="scengen"):
         try:
             asked = [_listed(o) for o in overrides]
             for override in asked:
                 _check_override(verb, override)
-            node = compose(f"command/{verb}", overrides=_with_packages(asked), return_hydra_config=True)
+            asked = _with_packages(asked) if _groups(verb) else asked
+            node = compose(_file(verb), overrides=asked, return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
             del node["hydra"]
@@ -207,6 +217,19 @@ def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict
             raise BadConfig(f"a configuration file is no YAML: {_first_lines(str(error))}; correct it") from None
         except (ValueError, TypeError, AssertionError, RecursionError) as error:  # Hydra checks little of what it gets
             raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
+
+
+def _root(verb: str) -> Path:
+    """The folder in which Hydra finds the file of a command, and the groups from which it chooses files.
+
+    One that chooses none sees none: Hydra would take its setting `task` for a choice among the files of conf/task.
+    """
+    return conf_dir() if _groups(verb) else conf_dir() / "command"
+
+
+def _file(verb: str) -> str:
+    """The file of a command, as it is called in its `_root`."""
+    return f"command/{verb}" if _groups(verb) else verb
 
 
 DEEPEST = 20
@@ -264,8 +287,8 @@ def _depth(text: str) -> int:
 
 
 def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything but task and certify."""
-    settings = {key: value for key, value in plain.items() if key not in ("task", "certify")}
+    """Everything but what is chosen from files, such as task and certify."""
+    settings = {key: value for key, value in plain.items() if key not in _groups(verb)}
     for key, value in settings.items():
         if value == "???":
             raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
@@ -318,7 +341,7 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     """Name the key at which the path of an override leaves the configuration."""
     groups = _with_packages([o for o in overrides if re.match(r"(task|certify|hydra\.searchpath)=", o)])
     try:
-        node: Any = compose(f"command/{verb}", overrides=groups)
+        node: Any = compose(_file(verb), overrides=groups if _groups(verb) else [])
     except HydraException:
         return None
     seen: list[str] = []

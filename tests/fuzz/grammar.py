@@ -207,7 +207,10 @@ class Grammar:
             "view": ("id", "0"),
             "evaluate": ("policy", "idle"),
             "asset": ("name", "cup"),
+            "new": ("package", "lab_tasks"),
         }
+        if verb == "new":
+            found.append(("task", "slide_home"))
         if verb in given:
             found.append(given[verb])
         return found
