@@ -18,15 +18,16 @@ from .. import config
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
-from ..errors import BadConfig, PoolError, UnknownName
+from ..errors import BadConfig, PoolError, UnknownName, cut
 from ..params import Value
 from ..pictures.render import Camera
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.world import World, action_size
+from ..sim.world import World, action_size, hands
 from ..validate.identity import check_versions
-from .observations import Reading, cameras_of, check_names, poses_of, proprioception, streams_of
+from .object_state import ObjectState, bodies_of
+from .observations import Reading, cameras_of, check_names, privileged, proprioception, streams_of
 
 Observation = dict[str, Reading]
 
@@ -40,6 +41,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     and oracles in between (`scengen.control.teleop`).
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
+    `metadata["names"]` tells of each stream what its entries are. Nothing that a scenario hides is in any of them.
     Some scenarios are seen turned or mirrored (`Scenario.orientation`): then every picture is, `render` included, while
     actions and all other streams stay as they are; `seen_<body>_pos` is where the picture lets a body appear.
 
@@ -54,7 +56,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         task: str,
-        pool: str | Path | Sequence[str | Path],
+        pool: str | Path | Sequence[str | Path] | None = None,
         observations: Sequence[str] | None = None,
         render_mode: str | None = None,
         width: int = 256,
@@ -63,6 +65,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         action_filter: str | None = None,
         settle: bool = False,
         search: Sequence[str] = (),
+        scenario: str | None = None,
+        split: str | None = None,
+        action_repeat: int = 1,
     ):
         """Open the pools.
 
@@ -70,8 +75,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             task: name of the task; scenarios of others are refused.
             pool: folder of a pool, or several.
             observations: names of streams and cameras; what is not asked for costs nothing. Proprioception if None.
-                Privileged are `<body>_pos` [m] and `<body>_quat` (xyzw) of what can move; and `seen_<body>_pos` [m], if
-                the family turns pictures.
+                Privileged are `object-state`, all poses and velocities in one vector (`scengen.envs.object_state`),
+                each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m], if the family turns pictures.
             render_mode: None or `rgb_array`.
             width: of all pictures [pixels].
             height: of all pictures [pixels].
@@ -79,6 +84,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
             settle: whether a reached goal has to last as in the certificate.
             search: `hydra.searchpath=[file:///path/to/conf]` for a task of a package that is not installed.
+            scenario: how the id of the only scenario begins that is to be played; all of the pools if None.
+            split: play those of one split only, such as `id` or `wide_gaps@3`.
+            action_repeat: control periods for which an action is held, 4 for data of 25 Hz. All else goes on at 100 Hz:
+                controller, events, goal and the filter, which sees the same action several times. The time limit is
+                in seconds and stays what it is. A step ends early where the episode does.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
@@ -87,21 +97,30 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
         check_filter(action_filter)
-        self.action_filter, self.settle = action_filter, settle
+        if action_repeat not in range(1, MOST_REPEATED + 1):
+            told = f"it must be a whole number of control periods in [1, {MOST_REPEATED}]"
+            raise BadConfig(f"action_repeat = {cut(repr(action_repeat))}; {told}")
+        self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.task: Task = config.task(task, search)
+        rows = [row for folder in _folders(pool) for row in _scenarios(folder, task)]
+        self._rows = {row.id: row for row in _chosen(rows, scenario, split)}
+        robot = self.task.embodiment
         if observations is None:
-            observations = proprioception(self.task.embodiment)
-        known, self.views = streams_of(self.task.embodiment), cameras_of(self.task.embodiment)
-        if not set(observations) <= {*known, *self.views}:  # poses cost a scene
-            poses = poses_of(self.task.family(), lambda: self.scenario.orientation)
-            check_names(observations, self.task.embodiment, poses)
-            known |= poses
+            observations = proprioception(robot)
+        known, self.views = streams_of(robot), cameras_of(robot)
+        if not set(observations) <= {*known, *self.views}:  # which bodies there are costs some scenes
+            bodies = bodies_of(self.task, {row.scene_xml for row in rows})
+            state = ObjectState(bodies, len(hands(robot)))
+            known |= privileged(state, self.task.family, lambda: self.scenario.orientation)
+            check_names(observations, robot, known)
         self.render_mode, self.size, self.camera = render_mode, (width, height), camera
         self.streams = {name: known[name] for name in observations if name in known}
         self.cameras = [name for name in observations if name in self.views]
-        self._rows = {row.id: row for folder in _folders(pool) for row in _scenarios(folder, task)}
-        if not self._rows:
-            raise PoolError("no pool was given")
+        self.metadata = {
+            **type(self).metadata,
+            "render_fps": round(1 / (Loop.PERIOD * action_repeat)),
+            "names": {name: stream.entries(name) for name, stream in self.streams.items()},
+        }
         if self._sees and width != height:
             for row in self._rows.values():
                 self.task.scenario(row.params).orientation.check_size(width, height)
@@ -110,13 +129,23 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world: World | None = None
         self._eye: Camera | None = None
         self._row: PoolRow = self._rows[self._order[0]]
-        self.task_description = self._row.instruction
         self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
         boxes: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(-s.bound, s.bound, s.shape, np.float32) for name, s in self.streams.items()
+            name: spaces.Box(np.float32(-s.bound), np.float32(s.bound), s.shape, np.float32)
+            for name, s in self.streams.items()
         }
         pictures = {name: spaces.Box(0, 255, (height, width, 3), np.uint8) for name in self.cameras}
         self.observation_space = spaces.Dict({**boxes, **pictures})  # type: ignore[assignment]
+
+    @property
+    def task_description(self) -> str:
+        """What is asked for, in words."""
+        return self._row.instruction
+
+    @property
+    def horizon(self) -> float:
+        """Time limit of the running scenario [s]."""
+        return self._row.horizon
 
     @property
     def scenarios(self) -> tuple[str, ...]:
@@ -165,7 +194,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(), self._info("", False)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Advance one control period (10 ms).
+        """Advance one control period (10 ms), or `action_repeat` of them.
 
         Raises:
             ValueError: the action has another shape than `action_space`, or is not finite; nothing was simulated then.
@@ -173,7 +202,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         given, size = np.asarray(action, np.float32), action_size(self.task.embodiment)
         if given.shape != (size,) or not np.isfinite(given).all():
             raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
-        outcome, reason = self._advance(given), self._episode.reason
+        outcome = None
+        for _ in range(self.action_repeat):
+            outcome = outcome or self._advance(given)
+        reason = self._episode.reason
         terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
         if outcome == "success" and self.settle:
             outcome, reason = self._settled()
@@ -231,8 +263,34 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return {**about, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
 
 
-def _folders(pool: str | Path | Sequence[str | Path]) -> list[str | Path]:
-    return [pool] if isinstance(pool, (str, Path)) else list(pool)
+MOST_REPEATED = 100
+"""Control periods of one second: an arm that gets an action less often is hardly controlled."""
+
+
+def _folders(pool: str | Path | Sequence[str | Path] | None) -> list[str | Path]:
+    folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
+    if not folders:
+        raise PoolError("no pool was named; say pool=FOLDER, or a list of them; scengen generate makes pools")
+    return folders
+
+
+def _chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None) -> list[PoolRow]:
+    """The scenarios of a split, and of these the one whose id begins so.
+
+    Raises:
+        UnknownName: there is none, or more than one.
+    """
+    if split is not None:
+        if split not in (known := {row.split for row in rows}):
+            raise UnknownName("split in these pools", split, known)
+        rows = [row for row in rows if row.split == split]
+    if scenario is None:
+        return list(rows)
+    found = {row.id: row for row in rows if row.id.startswith(scenario)}
+    if len(found) != 1:
+        what = "scenario" if not found else f"single scenario ({len(found)} begin so)"
+        raise UnknownName(what, scenario, [row.id for row in rows])
+    return list(found.values())
 
 
 def _scenarios(folder: str | Path, task: str) -> list[PoolRow]:
@@ -247,7 +305,7 @@ def _scenarios(folder: str | Path, task: str) -> list[PoolRow]:
     return rows
 
 
-def _clipped(reading: NDArray[np.float64], bound: float) -> NDArray[np.float32]:
+def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:
     return np.minimum(np.maximum(reading, -bound), bound, dtype=np.float32, casting="same_kind")
 
 

@@ -7,7 +7,7 @@ Where a scenario is seen turned or mirrored (`Scenario.orientation`), its pictur
 in the axes in which actions are meant. `seen_<body>_pos` tells what such a picture suggests, to policies without eyes.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownName
-from ..geometry import Mat3
 from ..orientation import Orientation
 from ..robots.panda import JOINTS, MOST_ARMS, Names
 from ..scenario import Scenario
 from ..sim.world import JAW, Arm, World, hands
+from .object_state import NAME, POSE, ObjectState, xyzw
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
@@ -33,17 +33,21 @@ PADS = {"tactile_left": "finger1_pad_collision", "tactile_right": "finger2_pad_c
 class Stream:
     """One kind of reading."""
 
-    shape: tuple[int, ...]
-    bound: float
-    """No reading is larger in size; finite where the robot's limits make it so."""
+    names: tuple[str, ...]
+    """What each entry of a vector is, such as `x`; of a grid, what its axes are."""
+    bound: float | NDArray[np.float64]
+    """No reading is larger in size; finite where the robot's limits make it so. One for all entries or one for each."""
     read: Callable[[World], NDArray[np.float64]]
+    grid: tuple[int, ...] = ()
+    """Shape of a grid; a vector has none."""
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.grid or (len(self.names),)
 
-def xyzw(rot: Mat3) -> NDArray[np.float64]:
-    """A rotation as a quaternion in the order that robosuite's keys promise, shape (4,)."""
-    quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, rot.ravel())
-    return np.array([quat[1], quat[2], quat[3], quat[0]])
+    def entries(self, name: str) -> tuple[str, ...]:
+        """Full names of the entries, such as `robot0_eef_pos.x`, of a stream of that name."""
+        return self.names if self.grid or name == NAME else tuple(f"{name}.{entry}" for entry in self.names)
 
 
 def _world_force(arm: Arm) -> NDArray[np.float64]:
@@ -73,18 +77,23 @@ def _of_arm(number: int, hand: str) -> dict[str, Stream]:
     """The streams of one arm but the cameras. Quaternions are xyzw, as robosuite's key promises."""
     robot, further = Names(number).arm, Names(number).arm if number else ""
 
-    def stream(shape: tuple[int, ...], bound: float, read: Callable[[Arm], NDArray[np.float64]]) -> Stream:
-        return Stream(shape, bound, lambda world: read(world.arms[number]))
+    def stream(names: Sequence[str], bound: float, read: Callable[[Arm], NDArray[np.float64]]) -> Stream:
+        return Stream(tuple(names), bound, lambda world: read(world.arms[number]))
 
+    def grid(pad: str) -> Stream:
+        read = _tactile(pad)
+        return Stream(("row", "column"), 1e4, lambda world: read(world.arms[number]), (TAXELS, TAXELS))
+
+    joints, push = [f"joint{i + 1}" for i in range(JOINTS)], ("force_x", "force_y", "force_z")
     found = {
-        f"{robot}eef_pos": stream((3,), 3.0, lambda arm: arm.hand),
-        f"{robot}eef_quat": stream((4,), 1.0, lambda arm: xyzw(arm.hand_rot)),
-        f"{robot}joint_pos": stream((JOINTS,), 7.0, lambda arm: arm.joint_pos),
-        f"{robot}joint_vel": stream((JOINTS,), 100.0, lambda arm: arm.joint_vel),
-        f"{robot}gripper_qpos": stream((2,), 0.1, lambda arm: arm.finger_pos),
-        f"{further}force_torque": stream((6,), 1e4, lambda arm: arm.wrench()),
-        f"{further}force_torque_world": stream((3,), 1e4, _world_force),
-        **{f"{robot}{name}": stream((TAXELS, TAXELS), 1e4, _tactile(pad)) for name, pad in PADS.items()},
+        f"{robot}eef_pos": stream(POSE["pos"], 3.0, lambda arm: arm.hand),
+        f"{robot}eef_quat": stream(POSE["quat"], 1.0, lambda arm: xyzw(arm.hand_rot)),
+        f"{robot}joint_pos": stream(joints, 7.0, lambda arm: arm.joint_pos),
+        f"{robot}joint_vel": stream(joints, 100.0, lambda arm: arm.joint_vel),
+        f"{robot}gripper_qpos": stream(("finger_joint1", "finger_joint2"), 0.1, lambda arm: arm.finger_pos),
+        f"{further}force_torque": stream((*push, "torque_x", "torque_y", "torque_z"), 1e4, lambda arm: arm.wrench()),
+        f"{further}force_torque_world": stream(push, 1e4, _world_force),
+        **{f"{robot}{name}": grid(pad) for name, pad in PADS.items()},
     }
     lacking = [] if hand == JAW else [f"{robot}{name}" for name in JAW_ONLY]
     return {name: stream for name, stream in found.items() if name not in lacking}
@@ -95,27 +104,35 @@ def turns_pictures(family: type[Scenario]) -> bool:
     return family.orientation is not Scenario.orientation
 
 
-def poses_of(scenario: Scenario, orientation: Callable[[], Orientation]) -> dict[str, Stream]:
-    """Privileged streams of everything in a scenario that can move: robosuite's names, and where pictures show it.
+def privileged(state: ObjectState, family: type[Scenario], orientation: Callable[[], Orientation]) -> dict[str, Stream]:
+    """`object-state`, each reading in it by itself, and where pictures show the bodies.
 
     Args:
         orientation: how the pictures of the running scenario are held; asked only if its family turns any.
     """
-
-    def of(body: str) -> dict[str, Stream]:
-        poses = {
-            f"{body}_pos": Stream((3,), 3.0, lambda world: world.pos(body)),
-            f"{body}_quat": Stream((4,), 1.0, lambda world: xyzw(world.rot(body))),
-        }
-        seen = Stream((3,), 3.0, lambda world: orientation().seen_at(world.pos(body)))
-        return {**poses, f"seen_{body}_pos": seen} if turns_pictures(type(scenario)) else poses
-
-    scene = scenario.build()  # held by name: the bodies of a scene that nobody holds have lost their joints
-    movable = [body.name for body in scene.bodies if body.joints or body.mocap]
-    return {name: stream for body in movable for name, stream in of(body).items()}
+    found = {NAME: Stream(state.names, state.bounds, state.read)}
+    for body, moves in state.bodies.items():
+        found |= _parts(ObjectState({body: moves}, state.arms))
+        if turns_pictures(family) and moves:
+            found[f"seen_{body}_pos"] = _seen(body, orientation)
+    return found
 
 
-POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
+def _parts(state: ObjectState) -> dict[str, Stream]:
+    """The readings of one body, each by itself."""
+
+    def part(where: slice) -> Stream:
+        names = tuple(name.rpartition(".")[2] for name in state.names[where])
+        return Stream(names, state.bounds[where], lambda world: state.read(world)[where])
+
+    return {name: part(where) for name, where in state.segments.items()}
+
+
+def _seen(body: str, orientation: Callable[[], Orientation]) -> Stream:
+    return Stream(POSE["pos"], 3.0, lambda world: orientation().seen_at(world.pos(body)))
+
+
+OWN_POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
 """Streams about an arm's own pose."""
 JAW_ONLY = ("gripper_qpos", *PADS)
 """Streams that an arm without jaw does not have."""
@@ -143,7 +160,7 @@ def cameras_of(embodiment: str) -> dict[str, str]:
 
 def proprioception(embodiment: str) -> tuple[str, ...]:
     """Names of the streams about the robot's own pose."""
-    poses = [f"{Names(number).arm}{name}" for number in range(len(hands(embodiment))) for name in POSE]
+    poses = [f"{Names(number).arm}{name}" for number in range(len(hands(embodiment))) for name in OWN_POSE]
     return tuple(name for name in streams_of(embodiment) if name in poses)
 
 
@@ -157,3 +174,17 @@ def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> 
     for name in names:
         if name not in known:
             raise UnknownName("observation", name, known)
+
+
+MOVES = ("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z", "gripper")
+"""What the seven numbers of an arm's action are."""
+
+
+def action_names(embodiment: str) -> tuple[str, ...]:
+    """What the numbers of an action are, such as `robot0_move_x`."""
+    return tuple(f"{Names(number).arm}{move}" for number in range(len(hands(embodiment))) for move in MOVES)
+
+
+def named(streams: Mapping[str, Stream], names: Iterable[str]) -> tuple[str, ...]:
+    """Full names of the entries of some vectors, one after the other."""
+    return tuple(entry for name in names for entry in streams[name].entries(name))

@@ -21,12 +21,13 @@ from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
-from ..errors import BadConfig, PoolError
+from ..errors import BadConfig, PoolError, UnknownName
 from ..pool import Pool, PoolRow
 from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, hands
 from ..validate.identity import check_versions
+from .object_state import ObjectState, bodies_of
 from .observations import turns_pictures
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
@@ -36,7 +37,6 @@ from robosuite.environments.base import REGISTERED_ENVS
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.utils.mjcf_utils import IMAGE_CONVENTION_MAPPING
 from robosuite.utils.observables import Observable, sensor
-from robosuite.utils.transform_utils import convert_quat
 
 Observations = OrderedDict[str, Any]
 
@@ -56,7 +56,10 @@ class RobosuiteEnv(ManipulationEnv):
 
     Where a scenario is seen turned or mirrored (`Scenario.orientation`), every camera observation is, depth and
     segmentation included; `seen_<body>_pos`, of modality "seen", is where the picture lets a body appear. `<body>_pos`,
-    the robot's own pose and actions stay as they are.
+    the robot's own pose and actions stay as they are. `object-state` is that of Gymnasium, entry by entry.
+
+    `get_ep_meta` names the scenario, as demonstrations of robosuite keep it; after `set_ep_meta` with it, hard resets
+    load that one.
     """
 
     NAME: ClassVar[str] = ""
@@ -96,8 +99,8 @@ class RobosuiteEnv(ManipulationEnv):
             scenario: a row of a pool (`Pool.row`), or with `pool` how an id in it begins. Without it, every hard
                 reset draws one from the pool, decided by robosuite's `seed`.
             pool: folder of a pool.
-            use_object_obs: also observe `<body>_pos` [m] and `<body>_quat` (xyzw) of everything that can move; and
-                `seen_<body>_pos` [m], if the family turns pictures.
+            use_object_obs: also observe `object-state` and every reading in it, such as `<body>_pos` [m]
+                (`scengen.envs.object_state`); and `seen_<body>_pos` [m], if the family turns pictures.
             gripper_types: "default" is the hand of each arm that the task asks for; no others are accepted.
             control_freq: actions in a second.
             horizon: actions in an episode; default: the task's time limit.
@@ -122,7 +125,10 @@ class RobosuiteEnv(ManipulationEnv):
         grippers = [GRIPPERS[hand] for hand in hands(self.task.embodiment)]
         if gripper_types != "default" and _listed(gripper_types) != grippers:
             self._refuse("gripper_types", _listed(gripper_types), grippers)
-        self.use_object_obs = use_object_obs
+        self.use_object_obs, self._seen = use_object_obs, None
+        if use_object_obs:
+            bodies = bodies_of(self.task, {row.scene_xml for row in self._choice})
+            self.objects = ObjectState(bodies, len(grippers))
         super().__init__(
             robots=[ROBOT] * len(grippers) if robots is None else robots,
             gripper_types=grippers,  # type: ignore[arg-type]
@@ -165,7 +171,7 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _load_model(self) -> None:
         super()._load_model()
-        self.row = self._choice[int(self.rng.integers(len(self._choice)))]
+        self.row = self._wanted() or self._choice[int(self.rng.integers(len(self._choice)))]
         self.scenario = self.task.scenario(self.row.params)
         for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
             self.scenario.orientation.check_size(width, height)
@@ -187,9 +193,8 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()
-        for body in self._moving() if self.use_object_obs else ():
-            for name, read in self._pose(body).items():
-                observables[name] = Observable(name=name, sensor=read, sampling_rate=self.control_freq)
+        for name, read in self._object_sensors().items() if self.use_object_obs else ():
+            observables[name] = Observable(name=name, sensor=read, sampling_rate=self.control_freq)
         return observables
 
     def _create_camera_sensors(self, *arguments: Any, **named: Any) -> tuple[list[Callable[..., Any]], list[str]]:
@@ -205,16 +210,6 @@ class RobosuiteEnv(ManipulationEnv):
             return self.scenario.orientation.apply(read(cache)[::-rows])[::-rows]
 
         return picture
-
-    def _reset_observables(self) -> None:
-        """Another scenario may hold other things."""
-        fresh = self._setup_observables()
-        things = {name for name, observable in self._observables.items() if observable.modality in ("object", "seen")}
-        for name in things - fresh.keys():
-            del self._observables[name]
-        for name in fresh.keys() - self._observables.keys():
-            self.add_observable(fresh[name])
-        super()._reset_observables()
 
     def _reset_internal(self) -> None:
         super()._reset_internal()
@@ -233,6 +228,7 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _update_observables(self, force: bool = False) -> None:
         """After every physics step; forced, after a reset."""
+        self._seen = None
         super()._update_observables(force)
         if not force:
             self._substep = (self._substep + 1) % self.world.loop.substeps
@@ -244,6 +240,21 @@ class RobosuiteEnv(ManipulationEnv):
         success = self._check_success()
         return reward, done, {**info, "scenario": self.row.id, "success": success, "reason": self.episode.reason}
 
+    # --- which scenario ---------------------------------------------------------------------
+
+    def get_ep_meta(self) -> dict[str, Any]:
+        """What a demonstration keeps of its episode: the scenario's id, and the instruction as `lang`."""
+        return {**super().get_ep_meta(), "scenario": self.row.id, "lang": self.row.instruction}
+
+    def _wanted(self) -> PoolRow | None:
+        """The scenario that `set_ep_meta` asks for, if it does."""
+        if (id_ := self._ep_meta.get("scenario")) is None:
+            return None
+        found = next((row for row in self._choice if row.id == id_), None)
+        if found is None:
+            raise UnknownName("scenario to choose from", str(id_), [row.id for row in self._choice])
+        return found
+
     # --- the certificate's clock ----------------------------------------------------------
 
     def _period_ends(self) -> None:
@@ -254,30 +265,28 @@ class RobosuiteEnv(ManipulationEnv):
         self.episode.judge()
         self.episode.begin()
 
-    def _moving(self) -> list[str]:
-        """Bodies of the scene that have joints, or that events can move."""
-        model = self.world.model
-        free = np.flatnonzero((model.body_jntnum > 0) | (model.body_mocapid >= 0))
-        return [model.body(int(body)).name for body in free if body not in self.world.own]
+    def _object_sensors(self) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
+        """Every reading of `object-state`, and where pictures show what can move [m]."""
 
-    def _pose(self, name: str) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
-        """Sensors of a body's position [m], orientation (xyzw), and of where pictures show it [m]."""
-        body = self.world.body(name)
+        def reading(where: slice) -> Callable[[Any], NDArray[np.float64]]:
+            @sensor(modality="object")
+            def part(_: Any) -> NDArray[np.float64]:
+                if self._seen is None:  # once for all readings of a moment
+                    self._seen = self.objects.read(self.world)
+                return self._seen[where]
 
-        @sensor(modality="object")
-        def pos(_: Any) -> NDArray[np.float64]:
-            return np.array(self.sim.data.body_xpos[body])
+            return part
 
-        @sensor(modality="object")
-        def quat(_: Any) -> NDArray[np.float64]:
-            return convert_quat(np.array(self.sim.data.body_xquat[body]), to="xyzw")
+        def shown(body: str) -> Callable[[Any], NDArray[np.float64]]:
+            @sensor(modality="seen")
+            def seen(_: Any) -> NDArray[np.float64]:
+                return self.scenario.orientation.seen_at(self.world.pos(body))
 
-        @sensor(modality="seen")
-        def seen(_: Any) -> NDArray[np.float64]:
-            return self.scenario.orientation.seen_at(self.sim.data.body_xpos[body])
+            return seen
 
-        poses = {f"{name}_pos": pos, f"{name}_quat": quat}
-        return {**poses, f"seen_{name}_pos": seen} if turns_pictures(self.task.family) else poses
+        readings = {name: reading(where) for name, where in self.objects.segments.items()}
+        turned = [body for body, moves in self.objects.bodies.items() if moves and turns_pictures(self.task.family)]
+        return {**readings, **{f"seen_{body}_pos": shown(body) for body in turned}}
 
 
 del REGISTERED_ENVS[RobosuiteEnv.__name__]  # only its subclasses have a task

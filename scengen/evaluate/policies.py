@@ -34,7 +34,7 @@ class Policy(Protocol):
         ...
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The action for the next control period, of the shape of `env.action_space`: seven numbers for each arm."""
+        """The action for the next step, of the shape of `env.action_space`: seven numbers for each arm."""
         ...
 
 
@@ -127,6 +127,8 @@ class Replay:
 
 BUILT_IN: dict[str, Factory] = {"idle": Idle, "random": Random, "oracle": Oracle}
 REPLAY = "replay"
+AT_FULL_RATE = (REPLAY, "oracle")
+"""Built-in policies whose actions are meant for one control period each."""
 
 
 def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
 from ..targets import refused, try_folder
 from ..validate.playable import unplayable
-from .policies import REPLAY, Policy, blamed, find, identity, made
+from .policies import AT_FULL_RATE, REPLAY, Policy, blamed, find, identity, made
 
 
 class BadPolicy(ScengenError):
@@ -45,6 +45,7 @@ class Settings:
     version: str | None = None
     fresh: bool = False
     action_filter: str | None = None
+    action_repeat: int = 1
 
     @property
     def folders(self) -> list[str]:
@@ -60,6 +61,8 @@ class Settings:
         """Raise `ScengenError` for settings that make no sense."""
         check_filter(self.action_filter)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
+        if self.action_repeat != 1 and self.policy in AT_FULL_RATE:
+            raise BadConfig(f"action_repeat = {self.action_repeat}; {self.policy} acts at 100 Hz: leave it out")
 
 
 @dataclass(frozen=True, order=True)
@@ -259,7 +262,7 @@ def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
 
 def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     """What the outcome of a rollout depends on. More seeds or rollouts continue the same run."""
-    names = ("policy", "version", "observations", "width", "height", "action_filter")
+    names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat")
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
@@ -333,6 +336,7 @@ class PolicyPlayer:
                 width=settings.width,
                 height=settings.height,
                 action_filter=settings.action_filter,
+                action_repeat=settings.action_repeat,
                 settle=True,
                 search=self.search,
             )

@@ -15,7 +15,7 @@ from scengen import config
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
 from scengen.envs.gym import PoolEnv
-from scengen.errors import PoolError, UnknownName
+from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
 from scengen.sim.world import IDLE
 
@@ -115,6 +115,37 @@ def test_a_used_environment_repeats_itself_bit_by_bit(env):
     assert (run() == first).all()
 
 
+def test_one_scenario_or_one_split_can_be_asked_for(env):
+    ids = env.unwrapped.scenarios
+    alone = PoolEnv("domino_single", REFERENCE, scenario=ids[3][:6], split="id")
+    assert alone.scenarios == (ids[3],) and alone.reset(seed=0)[1]["scenario"] == ids[3]
+    assert alone.task_description == next(Pool.open(REFERENCE).rows()).instruction
+
+
+def test_an_action_is_held_as_often_as_was_asked_for():
+    """The same control periods, with the filter in every one of them, and the same clock."""
+    once, fourfold = (PoolEnv("domino_single", REFERENCE, action_filter="teleop", action_repeat=k) for k in (1, 4))
+    once.reset(seed=0), fourfold.reset(seed=0)
+    for action in np.random.default_rng(0).uniform(-1, 1, (5, 7)):
+        for _ in range(4):
+            told = once.step(action)
+        _, reward, terminated, truncated, info = fourfold.step(action)
+        assert (reward, terminated, truncated, info) == told[1:]
+        assert fourfold.world.digest == once.world.digest
+    assert (fourfold.metadata["render_fps"], once.metadata["render_fps"]) == (25, 100)
+
+
+def test_a_held_action_ends_where_the_episode_does():
+    """The time limit is in seconds: 12.0 s are 1200 control periods, or 171.4 times seven."""
+    env = PoolEnv("domino_single", REFERENCE, action_repeat=7)
+    env.reset(seed=0)
+    truncated, steps = False, 0
+    while not truncated:
+        *_, truncated, info = env.step(IDLE)
+        steps += 1
+    assert steps == 172 and info["time"] == pytest.approx(12.0)
+
+
 @pytest.mark.parametrize("action", [np.zeros(6), np.full(7, np.nan), np.zeros((1, 7)), [0, 0, 0, 0, 0, 0, np.inf]])
 def test_what_is_no_action_never_reaches_the_simulator(env, action):
     env.reset(seed=0)
@@ -131,7 +162,13 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_singel", REFERENCE), UnknownName, "did you mean 'domino_single'"),
         (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
         (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
-        (lambda: PoolEnv("domino_single", []), PoolError, "no pool"),
+        (lambda: PoolEnv("domino_single", []), PoolError, "no pool was named; say pool=FOLDER"),
+        (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was named; say pool=FOLDER"),
+        (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
+        (lambda: PoolEnv("domino_single", REFERENCE, scenario="z"), UnknownName, "no scenario named 'z'"),
+        (lambda: PoolEnv("domino_single", REFERENCE, scenario=""), UnknownName, "no single scenario (6 begin so)"),
+        (lambda: PoolEnv("domino_single", REFERENCE, action_repeat=0), BadConfig, "action_repeat = 0; it must be"),
+        (lambda: PoolEnv("domino_single", REFERENCE, action_repeat="4"), BadConfig, "action_repeat = '4'; it must be"),
         (
             lambda: PoolEnv("domino_single", REFERENCE, ["robot0_eef_poss"]),
             UnknownName,

@@ -18,6 +18,7 @@ from scengen.cli import run as scengen
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import agreement
 from scengen.envs.agreement import Comparison, compare, compare_all
+from scengen.envs.gym import PoolEnv
 from scengen.envs.robosuite import RobosuiteEnv, env_class
 from scengen.envs.robosuite_models import SceneModel
 from scengen.episode import Episode
@@ -334,7 +335,7 @@ def test_robosuite_makes_it_with_its_usual_arguments(row):
     observations = env.reset()
     assert {"robot0_eef_pos", "robot0_joint_pos", "robot0_proprio-state", "object-state"} <= observations.keys()
     np.testing.assert_array_equal(observations["slab_pos"], env.world.pos("slab"))
-    np.testing.assert_array_equal(observations["slab_quat"], np.roll(env.world.data.body("slab").xquat, -1))
+    np.testing.assert_allclose(observations["slab_quat"], np.roll(env.world.data.body("slab").xquat, -1), atol=1e-12)
     assert np.abs(env.world.data.qpos[env.robots[0]._ref_joint_pos_indexes] - env.robots[0].init_qpos).max() > 1e-3
     assert env.action_dim == 7
     assert [env.step(IDLE)[2] for _ in range(3)] == [False, False, True]
@@ -348,9 +349,33 @@ def test_a_pool_gives_scenarios_by_seed_with_what_lies_in_them():
         again.reset()
         assert first.row.id == again.row.id
         seen.add(first.row.id)
-        tiles = {key for key in observations if key.startswith("tile_") and key.endswith("_pos")}
-        assert len(tiles) == sum(name.startswith("tile_") for name in first.world.free_bodies)
+        tiles = [key for key in observations if key.startswith("tile_") and key.count("_") == 2 and "quat" in key]
+        assert len(tiles) == 6, "as many entries as any scenario of the task has tiles"
+        there = sum(bool(observations[key].any()) for key in tiles)
+        assert there == sum(name.startswith("tile_") for name in first.world.free_bodies)
     assert len(seen) > 1
+
+
+def test_object_state_is_that_of_gymnasium_entry_by_entry(row):
+    gym = PoolEnv(row.task, REFERENCE, ["object-state"], scenario=row.id)
+    theirs, (ours, _) = made(row, hard_reset=False).reset(), gym.reset()
+    np.testing.assert_allclose(theirs["object-state"], ours["object-state"], atol=1e-6)
+    assert len(theirs["object-state"]) == len(gym.metadata["names"]["object-state"])
+    at = gym.metadata["names"]["object-state"].index("slab_to_robot0_eef_pos.x")
+    np.testing.assert_array_equal(theirs["object-state"][at : at + 3], theirs["slab_to_robot0_eef_pos"])
+
+
+def test_a_demonstration_finds_its_scenario_again():
+    """robomimic and robosuite hand `ep_meta` to `set_ep_meta` and reset."""
+    env = env_class("domino_single")(pool=REFERENCE, **BLIND)
+    for row in list(Pool.open(REFERENCE).rows())[:2]:
+        env.set_ep_meta({"scenario": row.id})
+        env.reset()
+        told = env.get_ep_meta()
+        assert (told["scenario"], told["lang"]) == (row.id, row.instruction) == (env.row.id, env.row.instruction)
+    env.set_ep_meta({"scenario": "0" * 12})
+    with pytest.raises(UnknownName, match="no scenario to choose from named '000000000000'"):
+        env.reset()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,143 @@
+"""`object-state` tells where everything is and how it moves, in the same places always, and nothing that is hidden."""
+
+import gymnasium
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from helpers import REFERENCE
+
+from scengen import config
+from scengen.envs.object_state import ObjectState, bodies_of
+from scengen.params import values, with_values
+from scengen.pool import Pool
+from scengen.samplers.split import ID
+from scengen.sim import scene_text
+from scengen.sim.world import World, hands
+
+HIDING = [name for name in config.tasks() if any(p.hidden for p in config.task(name).known.values())]
+
+
+def state_of(task):
+    return ObjectState(bodies_of(task), len(hands(task.embodiment)))
+
+
+def world_of(scenario, embodiment="panda_jaw"):
+    return World.load(scene_text.emit(scenario.build())[0], embodiment)
+
+
+def entries(state, read, name):
+    return read[state.segments[name]]
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """A slab thrown up while the hand moves: the state, the world, the vector, and the same 10 ms before."""
+    row = next(Pool.open(REFERENCE).rows())
+    state, world = state_of(config.task(row.task)), World.load(row.scene_xml)
+    reach = np.array([1, -1, 1, 1, 1, 1, -1], np.float32)
+    for _ in range(20):
+        world.apply(reach)
+    with world.events():
+        world.launch("slab", [0.1, 0.2, 3.0], [1.0, 2.0, 3.0])
+    world.apply(reach)
+    before = state.read(world)
+    world.apply(reach)
+    return state, world, state.read(world), before
+
+
+@pytest.mark.parametrize("name", HIDING)
+def test_scenarios_that_differ_in_what_is_hidden_look_alike(name):
+    task = config.task(name)
+    hidden = [p.name for p in task.known.values() if p.hidden]
+    one, state = task.draw(ID, 0, 0).scenario, state_of(task)
+    told = [values(task.draw(ID, 0, index).scenario) for index in (1, 2)]
+    others = [with_values(one, {p: other[p] for p in hidden}) for other in told]
+    assert {other.id for other in others} != {one.id}, "the negative control: something hidden does differ"
+    seen = state.read(world_of(one, task.embodiment))
+    for other in others:
+        assert (state.read(world_of(other, task.embodiment)) == seen).all()
+
+
+def test_what_is_not_hidden_shows():
+    """The negative control of the test above: a yaw is seen."""
+    task = config.task("domino_single")
+    one, state = task.draw(ID, 0, 0).scenario, state_of(task)
+    other = with_values(one, {"slab_yaw": one.slab_yaw + 3.0})
+    differ = np.flatnonzero(state.read(world_of(one)) != state.read(world_of(other)))
+    assert differ.size and {state.names[i].split("_")[0] for i in differ} == {"slab"}
+
+
+def test_a_centre_of_mass_that_is_hidden_is_in_no_velocity():
+    """The velocity of a body's origin, and not that of its centre of mass."""
+    task = config.task("balance_hard")
+    state, world = state_of(task), world_of(task.draw(ID, 0, 0).scenario)
+    with world.events():
+        world.launch("rod", [0.1, 0.2, 0.3], [4.0, 5.0, 6.0])
+    mujoco.mj_forward(world.model, world.data)
+    read = state.read(world)
+    assert np.allclose(entries(state, read, "rod_vel_lin"), [0.1, 0.2, 0.3])
+    assert np.allclose(entries(state, read, "rod_vel_ang"), [4.0, 5.0, 6.0])
+    assert np.linalg.norm(world.velocity("rod")[3:] - [0.1, 0.2, 0.3]) > 0.01, "the negative control"
+
+
+@pytest.mark.parametrize("name", ["slab", "slab_to_robot0_eef"])
+def test_velocities_are_the_change_of_the_poses(flight, name):
+    state, _, after, before = flight
+    change = (entries(state, after, f"{name}_pos") - entries(state, before, f"{name}_pos")) / 0.01
+    told = (entries(state, after, f"{name}_vel_lin") + entries(state, before, f"{name}_vel_lin")) / 2
+    lag = 0.002 * 9.81  # what is told is 2 ms old
+    assert np.linalg.norm(told) > 2.0 and np.linalg.norm(change - told) < lag + 0.02
+
+
+def test_the_hand_sees_what_stands_where_it_is_seen(flight):
+    state, world, read, _ = flight
+    hand, axes = world.arm.hand, world.arm.hand_rot
+    assert np.allclose(hand + axes @ entries(state, read, "slab_to_robot0_eef_pos"), world.pos("slab"))
+    turned = np.empty(9)
+    mujoco.mju_quat2Mat(turned, np.roll(entries(state, read, "slab_to_robot0_eef_quat"), 1))
+    assert np.allclose(axes @ turned.reshape(3, 3), world.rot("slab"))
+    assert np.allclose(entries(state, read, "slab_pos"), world.pos("slab"))
+
+
+def test_a_body_that_a_scenario_lacks_reads_zero_and_the_others_keep_their_places():
+    task = config.task("domino_single")
+    state, few = state_of(task), with_values(task.draw(ID, 0, 0).scenario, {"count": 3})
+    read = state.read(world_of(few))
+    assert state.ordered[:4] == ("slab", "tile_0", "tile_1", "tile_2")
+    assert not entries(state, read, "tile_5_quat").any() and entries(state, read, "tile_2_quat").any()
+    assert len(read) == len(state.names) == len(state.bounds) == len(set(state.names))
+
+
+@pytest.mark.parametrize("name", ["ramp_sort", "packing", "domino_select", "mass_sort", "plate_shelf_hetbi"])
+def test_every_split_of_a_task_has_its_bodies_among_the_entries(name):
+    task = config.task(name)
+    state = state_of(task)
+    for split in (ID, *list(task.axes)[:3]):
+        scene = task.draw(split, 0, 1).scenario.build()
+        assert {body.name for body in scene.bodies} - {"world", "table"} <= set(state.bodies)
+
+
+def test_bodies_of_a_pool_with_other_distributions_are_there_too():
+    task = config.task("domino_single")
+    many = with_values(task.draw(ID, 0, 0).scenario, {"count": 8})
+    assert "tile_7" not in bodies_of(task)
+    assert bodies_of(task, [scene_text.emit(many.build())[0]])["tile_7"]
+
+
+def test_what_cannot_move_has_a_pose_and_no_velocity():
+    state = state_of(config.task("sheltered_grasp"))
+    assert state.bodies["rack"] is False and "rack_quat" in state.segments and "rack_vel_lin" not in state.segments
+
+
+def test_gymnasium_offers_it_whole_and_in_parts_with_names():
+    seen = ["object-state", "slab_pos", "tile_5_quat"]
+    env = gymnasium.make("scengen.envs.gym:scengen/domino_single-v0", pool=REFERENCE, observations=seen)
+    check_env(env.unwrapped, skip_render_check=True)
+    observation, _ = env.reset(seed=0)
+    names = env.metadata["names"]
+    assert len(names["object-state"]) == observation["object-state"].shape[0] == len(set(names["object-state"]))
+    at = names["object-state"].index("slab_pos.x")
+    assert (observation["object-state"][at : at + 3] == observation["slab_pos"]).all()
+    assert names["slab_pos"] == ("slab_pos.x", "slab_pos.y", "slab_pos.z")
+    env.close()
