@@ -11,10 +11,11 @@ from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
+from ..runs.progress import ProgressBar
 from ..sim import scene_text
 from ..targets import try_file
 from ..validate.playable import check_row
-from . import OK, Arguments, one, say, write
+from . import OK, Arguments, err, one, say, write
 
 STRIP = 100_000_000
 """Largest size of a film strip [pixels]: it takes three bytes of memory for each, several times over."""
@@ -59,10 +60,11 @@ def command(arguments: Arguments) -> int:
     try_file(settings.to)
     take = _hit(settings, arguments) if settings.hit else _of_pool(settings, arguments)
     target, size = Path(settings.to), (settings.width, settings.height)
-    if target.suffix == ".png":
-        write(target, encode(strip(take, settings.frames, *size, settings.eye), "png"))
-    else:
-        movie(take, target, settings.fps, *size, settings.eye)
+    with ProgressBar(err, "film", 1) as bar:
+        if target.suffix == ".png":
+            write(target, encode(strip(take, settings.frames, *size, settings.eye, bar.of), "png"))
+        else:
+            movie(take, target, settings.fps, *size, settings.eye, bar.of)
     say(f"wrote {target}: {take.seconds:g} s")
     return OK
 

@@ -1,11 +1,12 @@
 """Films: recorded actions played again in front of a camera, as a strip of pictures or as a video."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 from ..control.loop import Loop
 from ..episode import Actions, Episode
@@ -20,6 +21,9 @@ from .video import Movie
 WITNESS = "witness"
 COLUMNS = 4
 """Pictures in a row of a strip."""
+LOOKS = 8
+"""At how many moments of a video it is looked which view hides least."""
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -45,15 +49,20 @@ class Take:
         """Its world at the start, with everything that is only looked at."""
         return World.load(self.scene_xml, self.embodiment, visual=True)
 
-    def moments(self, world: World, periods: Iterable[int]) -> Iterator[int]:
-        """Play the actions, and stop after each of these numbers of control periods."""
+    def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:
+        """Play the actions, stop after each of these numbers of control periods, and tell the time and the outcome."""
         world.reset()
-        episode, done = Episode(self.scenario, world), 0
+        episode, done, outcome, told = Episode(self.scenario, world), 0, None, ""
         for period in periods:
-            for action in self.actions[done:period]:
-                episode.step(action)
+            for number, action in enumerate(self.actions[done:period], done + 1):
+                if (now := episode.step(action)) != outcome:
+                    outcome, told = now, f", {now} at {number * Loop.PERIOD:.2f} s"
             done = period
-            yield period
+            yield f"{period * Loop.PERIOD:.2f} s{told}"
+
+    def even(self, count: int) -> list[int]:
+        """So many control periods at equal distances, from the start to the end."""
+        return [int(period) for period in np.linspace(0, len(self.actions), count).round()]
 
 
 def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> tuple[Take, Rollout]:
@@ -70,40 +79,79 @@ def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> 
     return Take(scenario, row.scene_xml, row.embodiment, rollout.actions), rollout
 
 
-def strip(take: Take, frames: int = 8, width: int = 320, height: int = 240, camera: str | None = None) -> Picture:
-    """Pictures at equal times from the start to the end, in rows of four.
+def strip(
+    take: Take,
+    frames: int = 8,
+    width: int = 320,
+    height: int = 240,
+    camera: str | None = None,
+    progress: Progress = lambda done, total: None,
+) -> Picture:
+    """Pictures at equal times from the start to the end, in rows of four, each with its time and the outcome so far.
 
     Args:
-        camera: one of the scene's or the robot's cameras; default a view that is fitted to the scene.
+        camera: one of the scene's or the robot's cameras; default the view fitted to the scene that hides least of it
+            in these pictures.
+        progress: told how many of how many pictures are taken.
 
     Raises:
         NoPictures: OpenGL is missing.
         UnknownName: there is no such camera.
     """
-    periods = np.linspace(0, len(take.actions), frames).round().astype(int)
+    pictures: list[Picture] = []
     with closing(Camera(take.world(), width, height)) as eye:
-        pictures = [eye.take(camera) for _ in take.moments(eye.world, periods.tolist())]
+        moments = [(eye.world.state(), told) for told in take.moments(eye.world, take.even(frames))]
+        if camera is None:
+            eye.look([state for state, _ in moments])
+        for state, told in moments:
+            eye.world.restore(state)
+            pictures.append(captioned(eye.take(camera), told))
+            progress(len(pictures), frames)
     columns = min(COLUMNS, frames)
     blank = np.full_like(pictures[0], 255)
     pictures += [blank] * (-frames % columns)
     return np.vstack([np.hstack(pictures[i : i + columns]) for i in range(0, len(pictures), columns)])
 
 
-def movie(take: Take, path: Path, fps: int, width: int, height: int, camera: str | None = None) -> int:
+def captioned(picture: Picture, text: str) -> Picture:
+    """The picture with a line of text in its lower left corner."""
+    height = max(9, picture.shape[0] // 16)
+    image = Image.fromarray(picture)
+    pen, font, place = (
+        ImageDraw.Draw(image),
+        ImageFont.load_default(height),
+        (height // 2, picture.shape[0] - 2 * height),
+    )
+    pen.text(place, text, "white", font, stroke_width=max(1, height // 8), stroke_fill="black")
+    return np.array(image)
+
+
+def movie(
+    take: Take,
+    path: Path,
+    fps: int,
+    width: int,
+    height: int,
+    camera: str | None = None,
+    progress: Progress = lambda done, total: None,
+) -> int:
     """Write an MP4 that runs as fast as the world did. Returns the number of its frames.
 
     Args:
         fps: frames in a second; a divisor of the control rate of 100 Hz.
-        camera: as for `strip`.
+        camera, progress: as for `strip`.
 
     Raises:
         NoPictures, NoVideo: OpenGL or PyAV is missing.
         UnknownName: there is no such camera.
     """
-    every = periods_between(fps)
+    periods = range(0, len(take.actions) + 1, periods_between(fps))
     with closing(Camera(take.world(), width, height)) as eye, Movie(path, fps, width, height) as film:
-        for _ in take.moments(eye.world, range(0, len(take.actions) + 1, every)):
+        if camera is None:
+            eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
+        for _ in take.moments(eye.world, periods):
             film.add(eye.take(camera))
+            progress(film.frames, len(periods))
         return film.frames
 
 

@@ -5,21 +5,25 @@ import io
 import itertools
 import os
 import sys
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import mujoco
 import numpy as np
-from mujoco import gl_context
+from mujoco import MjvCamera, gl_context
 from numpy.typing import NDArray
 from PIL import Image
 
 from ..errors import ScengenError, UnknownName
+from ..geometry import Vec3
 from ..robots.panda import arms
 from ..sim.world import World
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
+State = NDArray[np.float64]
+"""Of a world, see `World.state`."""
 
 
 SHADOW = 1024
@@ -45,14 +49,19 @@ class Camera:
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
-        self._view = fitted(world, width / height)
+        self._aspect = width / height
+        self._view = clearest(world, self._aspect)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
         hide_hulls(world.model)
 
+    def look(self, states: Sequence[State]) -> None:
+        """Choose the view that hides least over several states of the world, which is left in the last."""
+        self._view = clearest(self.world, self._aspect, states)
+
     def take(self, name: str | None = None) -> Picture:
-        """A picture of the world as it is now, from a named camera or in a view fitted to the scene as it began.
+        """A picture of the world as it is now, from a named camera or in the view that was chosen last.
 
         Raises:
             UnknownName: there is no such camera.
@@ -68,12 +77,21 @@ class Camera:
         self._renderer.close()
 
 
-AZIMUTH, ELEVATION = 140.0, -28.0
-"""Where the fitted view looks [deg]: from the free corner of the table to the robot, so that the arm hides little."""
+VIEWS = ((140.0, -28.0), (220.0, -28.0), (180.0, -35.0), (100.0, -28.0), (260.0, -28.0), (140.0, -55.0), (220.0, -55.0))
+"""Azimuths and elevations from which the fitted view looks [deg]: the first from the free corner of the table to the
+robot, so that the arm hides little."""
+WORTH = 0.05
+"""Another view than the first one has to show so much more, as a share of what there is to see."""
 MARGIN = 1.12
 """How much farther away the fitted view stands than it would have to."""
 CLOSEST = 0.55
 """It does not come closer than this [m], or one could not tell where on the table things are."""
+SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+"""Of the corners of a box, shape (8, 3)."""
+INSIDE = 0.8
+"""How far out the points of a box lie that are looked for: its corners themselves touch what stands beside it."""
+THROUGH = 1e-6
+"""How far behind a transparent surface one looks on, as a share of the way."""
 
 
 def hide_hulls(model: mujoco.MjModel) -> None:
@@ -83,18 +101,17 @@ def hide_hulls(model: mujoco.MjModel) -> None:
     model.geom_rgba[hulls, 3] = 0.0
 
 
-def fitted(world: World, aspect: float) -> mujoco.MjvCamera:
+def fitted(world: World, aspect: float, azimuth: float = VIEWS[0][0], elevation: float = VIEWS[0][1]) -> MjvCamera:
     """A view that just holds the scene's things and the robot's hand; the table and the floor go on beyond it.
 
     Args:
         aspect: width of the picture over its height.
+        azimuth, elevation: where it looks [deg].
     """
-    view = mujoco.MjvCamera()
-    view.azimuth, view.elevation = AZIMUTH, ELEVATION
-    turn, dip = np.radians(AZIMUTH), np.radians(ELEVATION)
-    ahead = np.array([np.cos(dip) * np.cos(turn), np.cos(dip) * np.sin(turn), np.sin(dip)])
-    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
-    axes = np.array([right, np.cross(right, ahead), ahead])
+    view = MjvCamera()
+    view.azimuth, view.elevation = azimuth, elevation
+    ahead, right, up = _axes(view)
+    axes = np.array([right, up, ahead])
     points = _corners(world) @ axes.T
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     away = points - centre
@@ -105,18 +122,81 @@ def fitted(world: World, aspect: float) -> mujoco.MjvCamera:
     return view
 
 
+def clearest(world: World, aspect: float, states: Sequence[State] = ()) -> MjvCamera:
+    """The fitted view of the scene as it began in which least is hidden, behind the robot or behind other things.
+
+    Args:
+        aspect: width of the picture over its height.
+        states: of the world, at which one looks; default as it is now. The world is left in the last.
+    """
+    views = [fitted(world, aspect, *where) for where in VIEWS]
+    shown = np.array([[_shown(world, view) for view in views] for _ in _visited(world, states)]).mean(axis=0)
+    best = int(shown.argmax())
+    return views[best if shown[best] > shown[0] + WORTH else 0]
+
+
+def _visited(world: World, states: Sequence[State]) -> Iterator[None]:
+    """Bring the world into one state after the other; without any it stays as it is."""
+    if not states:
+        yield
+    for state in states:
+        world.restore(state)
+        yield
+
+
+def _axes(view: MjvCamera) -> tuple[Vec3, Vec3, Vec3]:
+    """Where a view looks, and what is right and up for it: unit vectors."""
+    turn, dip = np.radians(view.azimuth), np.radians(view.elevation)
+    ahead = np.array([np.cos(dip) * np.cos(turn), np.cos(dip) * np.sin(turn), np.sin(dip)])
+    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
+    return ahead, right, np.cross(right, ahead)
+
+
+def _shown(world: World, view: MjvCamera) -> float:
+    """Share of the scene that a view shows: of the corners of the boxes around a body's geoms, averaged over bodies.
+
+    What is transparent hides nothing.
+    """
+    eye = view.lookat - view.distance * _axes(view)[0]
+    shown = defaultdict(list)
+    for geom in _geoms(world):
+        body = world.model.geom_bodyid[geom]
+        shown[body] += [_sees(world, eye, corner, body) for corner in _box(world, geom, INSIDE)]
+    return float(np.mean([np.mean(each) for each in shown.values()]))
+
+
+def _sees(world: World, eye: Vec3, point: Vec3, body: int) -> bool:
+    """Whether nothing opaque stands between the eye and a point but the body that the point belongs to."""
+    model, hit = world.model, np.array([-1], np.int32)
+    while True:
+        ahead = point - eye
+        share = mujoco.mj_ray(model, world.data, eye, ahead, None, 1, -1, hit, None)
+        if not 0 <= share < 1 or model.geom_bodyid[hit[0]] == body:
+            return True
+        material = model.geom_matid[hit[0]]
+        if (model.geom_rgba[hit[0], 3] if material < 0 else model.mat_rgba[material, 3]) == 1.0:
+            return False
+        eye = eye + (share + THROUGH) * ahead
+
+
 def _corners(world: World) -> NDArray[np.float64]:
     """Corners of the boxes around all geoms of the scene but table and floor, and the hand, shape (n, 3) [m]."""
-    model, data = world.model, world.data
-    apart = {model.body(name).id for name in ("world", "table", *(names.base for names in arms(model)))}
-    geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
-    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    boxes = [
-        data.geom_xpos[g]
-        + (model.geom_aabb[g, :3] + signs * model.geom_aabb[g, 3:]) @ data.geom_xmat[g].reshape(3, 3).T
-        for g in geoms
-    ]
+    boxes = [_box(world, geom) for geom in _geoms(world)]
     return np.vstack([*boxes, *(arm.hand for arm in world.arms)])
+
+
+def _geoms(world: World) -> list[int]:
+    """All geoms of the scene but table and floor."""
+    model = world.model
+    apart = {model.body(name).id for name in ("world", "table", *(names.base for names in arms(model)))}
+    return [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
+
+
+def _box(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
+    """Corners of the box around a geom, shape (8, 3) [m]; a smaller one of the same middle with `scale` below 1."""
+    centre, half = world.model.geom_aabb[geom].reshape(2, 3)
+    frame = world.data.geom_xmat[geom].reshape(3, 3)
+    return world.data.geom_xpos[geom] + (centre + scale * half * SIGNS) @ frame.T
 
 
 def _check_backend() -> None:
