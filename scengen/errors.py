@@ -87,6 +87,7 @@ MOST = {
     "any_n": 1_000_000,
     "attack": 1_000_000,
     "comparisons": 1_000_000,
+    "films": 100_000,
     "first": 1_000_000_000,
     "fps": 100,  # control periods in a second
     "frames": 200,  # a strip of them is a picture of some 100 000 pixels' width

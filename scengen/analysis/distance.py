@@ -75,7 +75,8 @@ def offsets(task: Task, scenario: Scenario) -> list[Offset]:
 def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: bool = False) -> Energy:
     """Energy distance of two samples of vectors (Szekely and Rizzo 2013), with a permutation test.
 
-    In one dimension the distance is that of `scipy.stats.energy_distance`.
+    In one dimension the distance is that of `scipy.stats.energy_distance`. Nothing is told from chance where a sample
+    is a single vector.
 
     Args:
         x, y: shapes (n, d) and (m, d).
@@ -95,8 +96,12 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: 
         np.put_along_axis(weight, b, -1 / b.shape[-1], -1)
         return -np.sum((weight @ apart) * weight, axis=-1)
 
+    one, other = np.arange(len(x)), np.arange(len(x), len(pooled))
+    if min(len(x), len(y)) < 2:
+        alone = math.sqrt(max(0.0, float(squared(one, other))))
+        return Energy(alone, 1.0, alone)
     tested = permutation_test(
-        (np.arange(len(x)), np.arange(len(x), len(pooled))),
+        (one, other),
         squared,
         vectorized=True,
         n_resamples=permutations,

@@ -2,29 +2,34 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ..certificate import STAGES
+from ..errors import Infeasible
 from ..pictures import render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
 from ..pool import Pool
+from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..targets import write
-from .bias import Bias, Marginal, bias
+from .bias import Bias, bias
 from .coverage import Evenness, evenness
 from .distance import CLOSE, Energy, Pair, energy, near_duplicates, per_parameter
+from .histogram import Histogram, figure, histogram, label
 from .redraw import redrawn, scenarios_of, task_of
 from .space import measured, of_features
 
 SHOWN = 4
 """Marginals that are drawn of each pool, the most telling ones, and scenes that are shown."""
+TRAINED = 500
+"""Training scenarios at most with which the draws of a pool are compared."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,8 @@ class Overview:
     """None for a chosen subset, which was not drawn."""
     bias: Bias | None
     """Certified against feasible draws; None as above."""
+    histograms: tuple[Histogram, ...]
+    """Of what the axes move, then of the parameters and features that selection changed most; none as above."""
 
 
 @dataclass(frozen=True)
@@ -78,15 +85,15 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
     try:
         for pool in pools:
             scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), SHOWN)
-            pictures[str(pool.folder)] = [thumbnail(*scene) for scene in scenes]
+            pictures[str(pool.folder)] = [thumbnail(*scene)[0] for scene in scenes]
     except render.NoPictures as error:
         remark = str(error)
-    marginals = {o.folder: svg(_marginals(o.bias.marginals[:SHOWN])) for o in overviews if o.bias and o.bias.marginals}
+    plots = {o.folder: svg(figure(o.histograms)) for o in overviews if o.histograms}
     text = template("report.html").render(
         overviews=overviews,
         contrasts=contrasts,
         pictures=pictures,
-        marginals=marginals,
+        plots=plots,
         steps=("proposed", *STAGES),
         remark=remark,
         close=CLOSE,
@@ -101,14 +108,20 @@ def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[
 
 
 def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario], search: Sequence[str]) -> Overview:
-    even = biased = None
+    even, biased, histograms = None, None, ()
     if scenarios and not pool.chosen:
         drawn = [p for p in redrawn(pool, search=search) if p.feasible]
         numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
         even = evenness(numbers) if numbers.size else None
         rows = [measured(p.scenario) for p in drawn]
         table = {name: np.array([row[name] for row in rows], float) for name in rows[0]}
-        biased = bias(table, np.array([p.certified for p in drawn]))
+        certified = np.array([p.certified for p in drawn])
+        biased = bias(table, certified)
+        training = _training(pool, task)
+        names = list(dict.fromkeys([*task.shifts(pool.split), *(m.name for m in biased.marginals)]))[:SHOWN]
+        histograms = tuple(
+            histogram(label(task, n), table[n], certified, np.array([row[n] for row in training])) for n in names
+        )
     return Overview(
         str(pool.folder),
         task.name,
@@ -119,7 +132,17 @@ def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario], search:
         per_parameter(task, list(scenarios.values())),
         even,
         biased,
+        histograms,
     )
+
+
+def _training(pool: Pool, task: Task) -> list[dict[str, float]]:
+    """The training scenarios of the first indices of a pool: the twins, where it is out of distribution."""
+    found = []
+    for index in range(min(pool.indices, TRAINED)):
+        with suppress(Infeasible):
+            found.append(measured(task.draw(ID, pool.seed, index, task.design(pool.sampler)).scenario))
+    return found
 
 
 Side = tuple[Pool, Mapping[str, Scenario]]
@@ -130,18 +153,3 @@ def _contrast(task: Task, one: Side, other: Side) -> Contrast:
     space = of_features(task, list(here.values()), list(there.values()))
     apart = energy(space.points(here.values()), space.points(there.values()))
     return Contrast(str(a.folder), str(b.folder), apart, near_duplicates(task, here, there))
-
-
-def _marginals(marginals: Sequence[Marginal]) -> Figure:
-    """Proposed and accepted draws over the ranges of some parameters."""
-    figure = Figure(figsize=(2.6 * len(marginals), 1.7))
-    for plot, marginal in zip(figure.subplots(1, len(marginals), squeeze=False)[0], marginals, strict=True):
-        cells = marginal.cells
-        left, width = [c.low for c in cells], [max(c.high - c.low, 1e-12) for c in cells]
-        plot.bar(left, [c.proposed for c in cells], width, align="edge", color="#c9d3de", edgecolor="white")
-        plot.bar(left, [c.accepted for c in cells], width, align="edge", color="#4a7fb5", edgecolor="white")
-        plot.set_title(f"{marginal.name}, p = {marginal.pvalue:.2g}", fontsize=8)
-        plot.tick_params(labelsize=7)
-        plot.spines[["right", "top"]].set_visible(False)
-    figure.tight_layout()
-    return figure

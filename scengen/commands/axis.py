@@ -58,7 +58,7 @@ def _table(card: Card) -> Table:
         table.add_row("oracle", f"solves {card.oracle.value:.0%} of {card.oracle.scenarios} twins")
     for who, edge in card.boundaries.items():
         at = ", ".join(f"{name} = {value:.4g}" for name, value in edge.values.items())
-        table.add_row(f"boundary of {who}", f"{edge.verdict}: {edge}" + (f", {at}" if at else ""))
+        table.add_row(f"boundary of {who}", edge.words + (f", where {at}" if at else ""))
     if card.why_no_path:
         table.add_row("boundary", card.why_no_path)
     table.add_row("energy distance of features", f"{card.energy} [training ranges]")

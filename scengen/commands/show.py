@@ -4,13 +4,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import config
+from ..analysis.redraw import task_of
 from ..config import read, search_path
 from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
+from ..pictures.sheet import contact_sheet
 from ..pool import Pool
+from ..runs.progress import ProgressBar
 from ..targets import try_file
 from ..validate.playable import check_row
-from . import OK, Arguments, out, remark, say, several, write
+from . import OK, Arguments, err, out, remark, say, several, write
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,7 @@ class Settings:
     id: str | None
     to: str | None
     images: int
+    films: int
 
 
 def command(arguments: Arguments) -> int:
@@ -29,7 +33,7 @@ def command(arguments: Arguments) -> int:
     pools = [Pool.open(folder).check() for folder in folders]
     target = Path(settings.to) if settings.to else None
     if settings.id is None:
-        at_least(settings, images=0)
+        at_least(settings, images=0, films=0)
         if target and target.suffix != ".html":
             raise BadConfig(
                 f"to = {target}; name an .html file for a contact sheet (a single scenario, id=, gives a .png)"
@@ -39,8 +43,11 @@ def command(arguments: Arguments) -> int:
             out.print(report.pool_table(pool))
             out.print(report.funnel_table(pool.funnel, pool.reasons))
             say(f"pool sha256: {pool.sha256}")
-        if target and (missing := report.contact_sheet(pools, target, settings.images)):
-            remark(f"{target} has no pictures: {missing}")
+        if target:
+            with ProgressBar(err, "contact sheet", 1) as bar:
+                made = [(pool, task_of(pool, search_path(arguments))) for pool in pools]
+                if missing := contact_sheet(made, target, settings.images, settings.films, bar.of):
+                    remark(f"{target} has no pictures: {missing}")
     else:
         if target and target.suffix != ".png":
             raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")

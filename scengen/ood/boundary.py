@@ -92,8 +92,21 @@ class Boundary:
             return HOLDS if self.low >= self.end else OPEN
         return FAILS if self.high > 0 else FAILS_AT_ONCE
 
+    @property
+    def words(self) -> str:
+        """Where it is, in a sentence: shares of the way from the edge of training to the far end of the axis."""
+        way = "of the way from the edge of training to the far end of the axis"
+        high = self.end if self.high is None else self.high
+        told = {
+            HOLDS: f"holds to the end of the path, {self.end:.0%} {way} ({self.at_end})",
+            OPEN: f"holds for {self.low:.0%} {way}, perhaps to the end of the path at {self.end:.0%} ({self.at_end})",
+            FAILS: f"fails first at {self.middle:.0%} {way}, 95 % interval {self.low:.0%} to {high:.0%}",
+            FAILS_AT_ONCE: f"fails at the edge of training ({self.at_edge})",
+        }[self.verdict]
+        return told + (f"; holds again from {self.again[0]:.0%} to {self.again[1]:.0%}" if self.again else "")
+
     def __str__(self) -> str:
-        """Where it is, in one line."""
+        """Where it is, in short."""
         at_end = f"{self.at_end}, at least {self.at_end.least:.2f} at 95 %"
         at_edge = f"{self.at_edge}, at most {self.at_edge.most:.2f} at 95 %"
         high = self.end if self.high is None else self.high

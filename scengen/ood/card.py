@@ -200,7 +200,7 @@ def _page(task: Task, card: Card, pool: Pool | None, seed: int, path: Path) -> s
     remark, pairs, strips = "", [], []
     try:
         rows = [row for row, _ in zip(pool.rows(), range(SHOWN), strict=False)] if pool else []
-        pairs = [(row.index, _picture(task, seed, row.index), thumbnail(row.scene_xml, row.embodiment)) for row in rows]
+        pairs = [(row.index, *_pair(task, seed, row)) for row in rows]
         strips = [*_strips(task, rows[0])] if rows else []
     except render.NoPictures as error:
         remark = str(error)
@@ -220,9 +220,11 @@ def _page(task: Task, card: Card, pool: Pool | None, seed: int, path: Path) -> s
     return remark
 
 
-def _picture(task: Task, seed: int, index: int) -> str:
-    """The training twin, as a data address for HTML."""
-    return thumbnail(scene_text.emit(task.draw(ID, seed, index).scenario.build())[0], task.embodiment)
+def _pair(task: Task, seed: int, row: PoolRow) -> tuple[str, str]:
+    """The training twin and the scenario from the same side, as data addresses for HTML."""
+    here, where = thumbnail(row.scene_xml, row.embodiment)
+    twin = scene_text.emit(task.draw(ID, seed, row.index).scenario.build())[0]
+    return thumbnail(twin, task.embodiment, where)[0], here
 
 
 def _strips(task: Task, row: PoolRow) -> list[tuple[str, str]]:

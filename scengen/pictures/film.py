@@ -115,14 +115,14 @@ def strip(
 
 def captioned(picture: Picture, text: str) -> Picture:
     """The picture with a line of text in its lower left corner."""
-    height = max(9, picture.shape[0] // 16)
+    height = max(12, picture.shape[0] // 16)
     image = Image.fromarray(picture)
     pen, font, place = (
         ImageDraw.Draw(image),
         ImageFont.load_default(height),
         (height // 2, picture.shape[0] - 2 * height),
     )
-    pen.text(place, text, "white", font, stroke_width=max(1, height // 8), stroke_fill="black")
+    pen.text(place, text, "white", font, stroke_width=max(1, height // 10), stroke_fill="black")
     return np.array(image)
 
 

@@ -22,6 +22,8 @@ from ..sim.world import World
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
+Where = tuple[float, float]
+"""Azimuth and elevation of a view [deg]."""
 State = NDArray[np.float64]
 """Of a world, see `World.state`."""
 
@@ -38,7 +40,12 @@ class NoPictures(ScengenError):
 class Camera:
     """A renderer that stays with one world."""
 
-    def __init__(self, world: World, width: int = 320, height: int = 240):
+    def __init__(self, world: World, width: int = 320, height: int = 240, where: Where | None = None):
+        """Begin with the fitted view of the scene, from `where` or from where least of it is hidden.
+
+        Raises:
+            NoPictures: OpenGL is missing.
+        """
         self.world = world
         _check_backend()
         world.model.vis.quality.shadowsize = SHADOW
@@ -50,7 +57,7 @@ class Camera:
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
         self._aspect = width / height
-        self._view = clearest(world, self._aspect)
+        self._view = fitted(world, self._aspect, *where) if where else clearest(world, self._aspect)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
@@ -72,6 +79,11 @@ class Camera:
         mujoco.mj_camlight(self.world.model, self.world.data)  # the control loop leaves them one physics step behind
         self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
         return self._renderer.render()
+
+    @property
+    def where(self) -> Where:
+        """From where the fitted view looks."""
+        return self._view.azimuth, self._view.elevation
 
     def close(self) -> None:
         self._renderer.close()
@@ -209,13 +221,15 @@ def _check_backend() -> None:
 
 
 @contextmanager
-def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
-    """A camera on the start of a scene, with the robot's visual meshes.
+def camera(
+    scene_xml: str, embodiment: str, width: int = 320, height: int = 240, where: Where | None = None
+) -> Iterator[Camera]:
+    """A camera on the start of a scene, with the robot's visual meshes; see `Camera`.
 
     Raises:
         NoPictures: OpenGL is missing.
     """
-    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height)
+    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height, where)
     try:
         yield view
     finally:

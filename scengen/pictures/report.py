@@ -2,8 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -17,7 +15,6 @@ from ..runs.generate import Summary
 from ..samplers.axis import spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task
-from ..targets import write
 from ..validate.playable import check_scene
 from . import render
 
@@ -124,40 +121,23 @@ def task_tables(task: Task) -> list[Table]:
     return [params, axes]
 
 
-def contact_sheet(pools: list[Pool], path: Path, images: int) -> str:
-    """Write one HTML file that shows the scenes of some pools. Returns a remark, or nothing.
-
-    Without OpenGL the page has no pictures and says so.
-    """
-    remark, sections = "", []
-    for pool in pools:
-        cards: list[tuple[PoolRow, str]] = []
-        for row in islice(pool.rows(witness=False), images):
-            picture = ""
-            if not remark:
-                try:
-                    picture = thumbnail(row.scene_xml, row.embodiment)
-                except render.NoPictures as error:
-                    remark = str(error)
-            cards.append((row, picture))
-        sections.append((pool, cards))
-    steps = ("proposed", *STAGES)
-    page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
-    write(path, page)
-    return remark
-
-
 def template(name: str) -> jinja2.Template:
     """One of the pages in scengen/pictures/templates; what is put into it is escaped."""
     loader = jinja2.PackageLoader("scengen", "pictures/templates")
     return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
 
 
-def thumbnail(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> str:
-    """A picture of the start of a scenario, as a data address for HTML."""
+def thumbnail(
+    scene_xml: str, embodiment: str, where: render.Where | None = None, width: int = 320, height: int = 240
+) -> tuple[str, render.Where]:
+    """A picture of the start of a scenario, as a data address for HTML, and from where it was taken.
+
+    Args:
+        where: from where; default the view that hides least.
+    """
     check_scene(scene_xml, embodiment)
-    with render.camera(scene_xml, embodiment, width, height) as view:
-        return render.address(render.encode(view.take()), "webp")
+    with render.camera(scene_xml, embodiment, width, height, where) as view:
+        return render.address(render.encode(view.take()), "webp"), view.where
 
 
 def _numbers(numbers: Mapping[str, Any]) -> str:

@@ -48,6 +48,11 @@ def test_without_a_shift_the_p_values_are_uniform():
     assert stats.kstest(pvalues, "uniform").pvalue > 1e-3
 
 
+def test_a_single_vector_tells_nothing_from_chance():
+    found = energy(np.zeros((1, 2)), np.ones((3, 2)))
+    assert found.pvalue == 1.0 and found.distance == found.chance == pytest.approx(math.sqrt(2 * math.sqrt(2)))
+
+
 def test_an_offset_is_the_way_to_the_nearest_training_value():
     (offset,) = offsets(TASK, with_values(TRAINED["id 0"], {"gap_ratio": 1.5}))
     assert (

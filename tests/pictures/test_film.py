@@ -9,6 +9,8 @@ from helpers import REFERENCE, pictures_are_possible
 from PIL import Image
 
 from scengen import cli, config
+from scengen.assets.box import Cube, Domino
+from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
 from scengen.pictures import film, render
 from scengen.pictures.view import view
@@ -65,15 +67,54 @@ def test_the_default_view_holds_everything_that_stands_on_the_table(task):
 
 @drawing
 def test_a_strip_begins_at_the_start_and_ends_when_the_witness_does(row, scenario):
-    take = film.Take.witness(row, scenario)
-    picture = film.strip(take, frames=3, width=96, height=72)
+    """Seen through the scene's own camera, above the captions."""
+    take, above = film.Take.witness(row, scenario), slice(0, 45)
+    picture = film.strip(take, frames=3, width=96, height=72, camera="agentview")
     assert picture.shape == (72, 288, 3)
     with render.camera(row.scene_xml, row.embodiment, 96, 72) as eye:
-        assert (picture[:, :96] == eye.take()).all()
+        assert (picture[above, :96] == eye.take("agentview")[above]).all()
         for action in row.witness:
             eye.world.apply(action)
-        assert (picture[:, -96:] == eye.take()).all()
-        assert not (picture[:, :96] == picture[:, -96:]).all()
+        assert (picture[above, -96:] == eye.take("agentview")[above]).all()
+        assert not (picture[above, :96] == picture[above, -96:]).all()
+
+
+def test_captions_tell_time_and_the_moment_of_success(row, scenario):
+    take = film.Take.witness(row, scenario)
+    told = list(take.moments(take.world(), take.even(3)))
+    (witness,) = [check for check in row.certificate.checks if check.name == "witness"]
+    assert told[0] == "0.00 s" and told[-1] == f"{take.seconds:.2f} s, success at {witness.numbers['seconds']:.2f} s"
+
+
+@drawing
+def test_a_caption_is_written_into_the_lower_left_corner():
+    grey = np.full((48, 200, 3), 90, np.uint8)
+    written = film.captioned(grey, "1.00 s")
+    changed = np.argwhere((written != grey).any(axis=2))
+    assert len(changed) > 20 and changed[:, 0].min() > 20 and changed[:, 1].max() < 100
+
+
+@pytest.mark.parametrize(("opacity", "hidden"), [(1.0, True), (0.3, False)])
+def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
+    """A cube with a wall between it and the first view; a transparent wall hides nothing."""
+    turn = np.radians(render.VIEWS[0][0])
+    scene = table()
+    place(scene, Cube(), "cube", [0.0, 0.0, TABLE_TOP])
+    between = -0.1 * np.array([np.cos(turn), np.sin(turn)])
+    wall = Domino(height=0.2, width=0.1, rgba=(0.5, 0.5, 0.5, opacity))
+    place(scene, wall, "wall", [*between, TABLE_TOP], turn, free=False)
+    world = World.load(scene_text.emit(scene)[0])
+    first, best = render.fitted(world, 1.0), render.clearest(world, 1.0)
+    assert ((best.azimuth, best.elevation) != (first.azimuth, first.elevation)) == hidden
+
+
+def test_the_view_is_chosen_over_all_states(row, scenario):
+    """Of states that are all the start it is the view of the start; the world is left in the last of them."""
+    world = World.load(row.scene_xml)
+    start, at_start = world.state(), render.clearest(world, 1.0)
+    world.apply(row.witness[0])
+    chosen = render.clearest(world, 1.0, [world.state(), start])
+    assert (world.state() == start).all() and chosen.elevation == at_start.elevation
 
 
 @drawing

@@ -19,6 +19,12 @@ def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):
     assert "6 pairs" in page.read_text() and "6 near duplicates" in capsys.readouterr().out
 
 
+def test_pools_of_one_scenario_are_reported_too(tmp_path):
+    one = tmp_path / "one"
+    assert cli.run(("subset", f"pool={REFERENCE}", "n=1", f"to={one}")) == 0
+    assert cli.run(("report", f"pool={one},{REFERENCE}", f"to={tmp_path / 'report.html'}")) == 0
+
+
 @pytest.mark.parametrize(
     ("argv", "says"),
     [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "name an .html file")],

@@ -1,0 +1,105 @@
+"""The contact sheet: what the scenarios of pools look like, beside their training twins, in one HTML file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from ..certificate import STAGES
+from ..errors import ScengenError
+from ..pool import Pool, PoolRow
+from ..samplers.axis import spell
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..sim import scene_text
+from ..targets import write
+from ..validate.playable import check_row
+from . import film, render
+from .report import template, thumbnail
+
+STRIP = (8, 240, 180)
+"""Pictures of a film strip, and width and height of each [pixels]."""
+
+
+@dataclass
+class Card:
+    """One scenario on the sheet. Pictures are data addresses; empty where there is none."""
+
+    row: PoolRow
+    moved: list[str]
+    """What its axes have moved, in words."""
+    picture: str = ""
+    twin: str = ""
+    """Its training twin."""
+    strip: str = ""
+    """A film strip of its witness."""
+
+
+def contact_sheet(
+    pools: list[tuple[Pool, Task]],
+    path: Path,
+    images: int,
+    films: int,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> str:
+    """Write one HTML file that shows the scenes of some pools. Returns a remark, or nothing.
+
+    Without OpenGL the page has no pictures and says so.
+
+    Args:
+        pools: each with its task as it was when the pool was made.
+        images: how many scenarios of a pool are shown at most.
+        films: how many of them with a film strip of the witness.
+        progress: told how many of how many scenarios are drawn.
+
+    Raises:
+        ScengenError: a scene or a witness cannot be played.
+    """
+    remark, sections = "", []
+    total = sum(min(images, len(pool)) for pool, _ in pools)
+    for pool, task in pools:
+        cards: list[Card] = []
+        for number, row in enumerate(islice(pool.rows(), images)):
+            card = Card(row, [_moved(task, name, value) for name, value in row.shifted.items()])
+            if not remark:
+                try:
+                    card.picture, where = thumbnail(row.scene_xml, row.embodiment)
+                    card.twin = thumbnail(_twin(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
+                    card.strip = _strip(task, row) if number < films else ""
+                except render.NoPictures as error:
+                    remark = str(error)
+            cards.append(card)
+            progress(sum(len(c) for *_, c in sections) + len(cards), total)
+        sections.append((pool, task, cards))
+    steps = ("proposed", *STAGES)
+    page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark, unit=_unit)
+    write(path, page)
+    return remark
+
+
+def _twin(pool: Pool, task: Task, row: PoolRow) -> str:
+    """The scene of a scenario's training twin, drawn again."""
+    trained = task.draw(ID, row.seed, row.index, task.design(pool.sampler)).scenario
+    if trained.id != row.id_twin:
+        raise ScengenError(
+            f"{row.id}: its training twin comes out as {trained.id}, but the pool names {row.id_twin}; the family has "
+            "changed since, see scengen verify"
+        )
+    return scene_text.emit(trained.build())[0]
+
+
+def _strip(task: Task, row: PoolRow) -> str:
+    """A film strip of a witness."""
+    take = film.Take.witness(check_row(row), task.scenario(row.params))
+    return render.address(render.encode(film.strip(take, *STRIP)), "webp")
+
+
+def _moved(task: Task, name: str, value: float) -> str:
+    """What an axis has done to a parameter: `tile height 0.055 m (training 0.07 to 0.09)`."""
+    named = name.replace(".", " ").replace("_", " ")
+    return f"{named} {value:.4g} {_unit(task, name)} (training {spell(task.training[name])})".replace("  ", " ")
+
+
+def _unit(task: Task, name: str) -> str:
+    """The unit of a parameter; nothing for a pure number."""
+    return task.known[name].unit.removeprefix("1")
