@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs reference bench clean checker checker-base mutants
+.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -74,6 +74,11 @@ attacks: setup
 # A page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
 docs: setup
 	$(BIN)/python tools/task_pages.py $(TASKS)
+
+# README, docs, axis cards and reports as plain HTML in SITE.
+SITE ?= generated/site
+site: setup
+	$(BIN)/python tools/site.py $(SITE)
 
 # Verification, and checkers that must do badly, on some 450 pools that are sound, false or hostile: about 15 minutes.
 # CHECKER=robosuite lets robosuite judge the sound ones.
