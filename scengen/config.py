@@ -20,6 +20,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
+from .parallel import cores
 from .samplers.task import Task, load
 from .validate.settings import CertifySettings
 
@@ -28,6 +29,10 @@ T = TypeVar("T")
 PACKAGES = "scengen.tasks"
 """Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder
 in it that holds `task/<task>.yaml`."""
+
+
+AUTO = "auto"
+"""A number of workers: as many as there are cores to use."""
 
 
 @cache
@@ -292,6 +297,8 @@ def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in settings.items():
         if value == "???":
             raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
+    if settings.get("workers") == AUTO:
+        settings["workers"] = cores()
     return settings
 
 

@@ -8,6 +8,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -39,6 +40,19 @@ class Limits:
 
 SHOWN = Limits(300.0, 4000)
 """Of one scenario of a pool that is shown, exported or recorded: it comes from a stranger. Seconds would do."""
+
+
+QUOTA = Path("/sys/fs/cgroup/cpu.max")
+"""Processor time that a container may take: microseconds in a period of microseconds, or `max`."""
+
+
+def cores() -> int:
+    """How many cores this process may use: those that it is bound to, and no more than its container is given."""
+    allowed = len(os.sched_getaffinity(0))
+    with suppress(OSError, ValueError):  # not in a container, or one of an older kind
+        quota, period = QUOTA.read_text().split()
+        allowed = allowed if quota == "max" else min(allowed, int(quota) // int(period))
+    return max(1, allowed)
 
 
 def each(

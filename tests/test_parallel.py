@@ -7,8 +7,11 @@ import time
 import numpy as np
 import pytest
 
-from scengen.errors import UnknownName
-from scengen.parallel import Limits, WorkerDied, each
+from scengen import parallel
+from scengen.commands.verify import Settings as Asked
+from scengen.config import read
+from scengen.errors import BadConfig, UnknownName
+from scengen.parallel import Limits, WorkerDied, cores, each
 
 LIMITS = Limits(0.5, 200)
 
@@ -68,3 +71,22 @@ def test_whoever_leaves_early_waits_for_nobody():
     assert next(results) == "a"
     results.close()
     assert time.monotonic() - begun < 2
+
+
+@pytest.mark.parametrize(
+    ("quota", "bound", "told"),
+    [("max 100000", 8, 8), ("250000 100000", 8, 2), ("50000 100000", 8, 1), ("800000 100000", 2, 2), (None, 3, 3)],
+)
+def test_no_more_cores_are_used_than_a_container_is_given(quota, bound, told, tmp_path, monkeypatch):
+    monkeypatch.setattr(parallel, "QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(bound)))
+    if quota:
+        parallel.QUOTA.write_text(quota)
+    assert cores() == told
+
+
+def test_workers_auto_are_as_many_as_there_are_cores(monkeypatch):
+    monkeypatch.setattr("scengen.config.cores", lambda: 5)
+    assert read("verify", ["pool=x", "workers=auto"], Asked).workers == 5
+    with pytest.raises(BadConfig, match="workers = 'many'"):
+        read("verify", ["pool=x", "workers=many"], Asked)
