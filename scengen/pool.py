@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from . import schema, shards
 from .certificate import StoredCertificate, as_json, from_json
 from .errors import PoolError, UnknownName
+from .names import Name, find
 from .params import Value
 from .shards import FORMAT
 
@@ -66,6 +67,11 @@ class PoolRow:
     """Actions of a success as the controller received them, shape (n, 7 * arms)."""
     witness_sha256: str
     certificate: StoredCertificate = field(repr=False)
+
+    @property
+    def name(self) -> Name:
+        """What it is called before people."""
+        return Name(self.task, self.split, self.index, self.id)
 
     def plain(self) -> dict[str, Any]:
         """All columns but the witness as plain data, as a shard stores them."""
@@ -250,18 +256,25 @@ class Pool:
             for values in shards.read(self.folder / shard["file"], names):
                 yield tuple(values[name] for name in names)
 
-    def row(self, prefix: str) -> PoolRow:
-        """The scenario whose id begins with `prefix`.
+    def names(self) -> Iterator[Name]:
+        """Names of all scenarios in index order.
 
         Raises:
-            UnknownName: none, or more than one.
+            PoolError: a shard cannot be read.
         """
-        ids = [id_ for (id_,) in self.columns("id")]
-        found = [id_ for id_ in ids if id_.startswith(prefix)]
-        if len(found) != 1:
-            what = "scenario" if not found else f"single scenario ({len(found)} begin so)"
-            raise UnknownName(f"{what} in {self.folder}", prefix, ids[:20] + (["..."] if len(ids) > 20 else []))
-        return next(row for row in self.rows() if row.id == found[0])
+        return (Name(*told) for told in self.columns("task", "split", "index", "id"))
+
+    def row(self, name: str) -> PoolRow:
+        """The scenario of that name, such as `domino_single/wide_gaps@3/8ed4a4577fe0`, or whose id begins so.
+
+        The id counts; a warning tells of a name that is wrong about it (`names.Misnamed`).
+
+        Raises:
+            UnknownName: there is none.
+            BadConfig: there is more than one.
+        """
+        found = find(name, self.names(), str(self.folder))
+        return next(row for row in self.rows() if row.id == found.id)
 
     @property
     def promised_rejects(self) -> int:

@@ -11,7 +11,7 @@ import scengen
 
 LAYERS = (
     ("errors", "statistics", "geometry", "certificate", "printed"),
-    ("orientation", "params", "symmetry", "targets"),
+    ("names", "orientation", "params", "symmetry", "targets"),
     ("robots",),
     ("control",),
     ("log", "parallel", "sim"),

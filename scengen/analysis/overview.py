@@ -95,6 +95,7 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
         pictures=pictures,
         plots=plots,
         steps=("proposed", *STAGES),
+        names={name.id: str(name) for pool in pools for name in pool.names()},
         remark=remark,
         close=CLOSE,
     )

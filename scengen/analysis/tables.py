@@ -1,6 +1,6 @@
 """Tables about distributions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -45,11 +45,16 @@ def map_table(found: AcceptanceMap) -> Table:
     return table
 
 
-def pairs_table(pairs: list[Pair], one: str, other: str) -> Table:
-    """Scenarios that are nearly the same."""
+def pairs_table(pairs: list[Pair], one: str, other: str, names: Mapping[str, str]) -> Table:
+    """Scenarios that are nearly the same.
+
+    Args:
+        one, other: what the two columns are called.
+        names: of the scenarios, by id.
+    """
     table = Table(one, other, "distance [training widths]", title="near duplicates", title_justify="left")
     for pair in pairs[:20]:
-        table.add_row(pair.one, pair.other, f"{pair.distance:.2g}")
+        table.add_row(names[pair.one], names[pair.other], f"{pair.distance:.2g}")
     if len(pairs) > 20:
         table.add_row(f"and {len(pairs) - 20} more", "", "")
     return table

@@ -10,6 +10,7 @@ from typing import Any
 from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
 from ..log import Log
+from ..names import Name
 from ..parallel import Limits, each
 from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
@@ -75,6 +76,7 @@ class Subject:
     embodiment: str
     horizon: float
     witness: Actions
+    name: Name
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,8 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
         text, _ = scene_text.emit(scenario.build())
         rollout = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
         if rollout.solved:
-            found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions))
+            name = Name(task.name, split, index, scenario.id)
+            found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions, name))
         if len(found) == n:
             return found
     if not found:
@@ -201,7 +204,7 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
 
 def certified(task: Task, rows: Iterable[PoolRow]) -> list[Subject]:
     """Certified scenarios, with their witnesses."""
-    return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness) for r in rows]
+    return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness, r.name) for r in rows]
 
 
 def stored(report: Report, folder: Path) -> dict[str, Any]:

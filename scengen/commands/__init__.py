@@ -2,11 +2,14 @@
 
 import json
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadConfig, cut
+from ..names import Misnamed
+from ..pool import Pool, PoolRow
 from ..printed import PlainConsole, printable
 from ..targets import write as write  # for the commands
 
@@ -46,6 +49,21 @@ def several(pool: str | list[str]) -> list[str]:
     if not pool:
         raise BadConfig("pool = ''; name the folder of a pool")
     return pool if isinstance(pool, list) else [pool]
+
+
+def chosen(pool: Pool, name: str) -> PoolRow:
+    """The scenario that id= asks for; of a name that is wrong about its id, a line says so."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", Misnamed)
+        row = pool.row(name)
+    for one in told:
+        remark(str(one.message))
+    return row
+
+
+def names(pools: Iterable[Pool]) -> Mapping[str, str]:
+    """What people call the scenarios of some pools, by id."""
+    return {name.id: str(name) for pool in pools for name in pool.names()}
 
 
 def write_json(path: str, result: Any) -> None:

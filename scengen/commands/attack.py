@@ -1,13 +1,13 @@
 """the built-in adversary: whether a goal can be reached without what the task is about"""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
 from .. import config
 from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
-from ..attack.evidence import Hit, spelled
+from ..attack.evidence import spelled
 from ..attack.priors import Prior
 from ..config import read, search_path
 from ..errors import BadConfig
@@ -34,10 +34,11 @@ def command(arguments: Arguments) -> int:
 
         report = attack(task, subjects, settings, folder, progress)
     out.print(attack_table(report))
-    for line in _remarks(report):
+    called = {one.scenario.id: str(one.name) for one in subjects}
+    for line in _remarks(report, called):
         say(line)
     for hit in report.refuting:
-        warn(_told(hit))
+        warn(f"REFUTED {called[hit.scenario]} {hit}; {hit.name}.npz")
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
@@ -64,12 +65,15 @@ def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Su
     return task, subjects
 
 
-def _remarks(report: Report) -> list[str]:
+def _remarks(report: Report, called: Mapping[str, str]) -> list[str]:
     counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
     untried = [
         f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()
     ]
-    return [*map(_fixed, report.priors), *untried, *(f"unknown: the attack on {one}" for one in report.lost)]
+    lost = [
+        f"unknown: the attack on {called[id_]} {why}" for id_, _, why in (one.partition(" ") for one in report.lost)
+    ]
+    return [*map(_fixed, report.priors), *untried, *lost]
 
 
 def _fixed(prior: Prior) -> str:
@@ -78,7 +82,3 @@ def _fixed(prior: Prior) -> str:
     if prior.fresh is None or prior.bound is None:
         return told
     return f"{told}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"
-
-
-def _told(hit: Hit) -> str:
-    return f"REFUTED {hit.scenario} {hit}; {hit.name}.npz"

@@ -17,7 +17,7 @@ from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..targets import try_file
-from . import FAILED, OK, Arguments, out, say, several, write_json
+from . import FAILED, OK, Arguments, names, out, say, several, write_json
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def _alone(
             say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws")
     pairs = near_duplicates(task, scenarios, within=settings.within)
     if pairs:
-        out.print(pairs_table(pairs, "in the pool", "again"))
+        out.print(pairs_table(pairs, "in the pool", "again", names([pool])))
     return {
         "pool": str(pool.folder),
         "outside": {name: {"least": least, "mean": mean} for name, (least, mean) in away.items()},
@@ -89,7 +89,7 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
     )
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
-        out.print(pairs_table(pairs, str(pool.folder), str(beside.folder)))
+        out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside])))
     say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs")
     return {
         "pools": [str(pool.folder), str(beside.folder)],

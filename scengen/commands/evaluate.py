@@ -4,8 +4,9 @@ from rich.table import Table
 
 from ..config import read, search_path
 from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
+from ..pool import Pool
 from ..runs.progress import ProgressBar
-from . import FAILED, OK, Arguments, err, out, say, warn, write, write_json
+from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_json
 
 
 def command(arguments: Arguments) -> int:
@@ -19,8 +20,9 @@ def command(arguments: Arguments) -> int:
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
+    called = names(map(Pool.open, settings.folders)) if found.lost else {}
     for scenario, why in found.lost.items():
-        warn(f"UNKNOWN {scenario}: {why}; it was left out")
+        warn(f"UNKNOWN {called[scenario]}: {why}; it was left out")
     if found.earlier:
         what = "the pools, the settings and the policy are the same; fresh=true plays them anew"
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")

@@ -10,7 +10,7 @@ from ..parallel import SHOWN, each
 from ..pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
 from ..targets import try_folder
-from . import FAILED, OK, Arguments, err, one, say, warn
+from . import FAILED, OK, Arguments, chosen, err, one, say, warn
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ def command(arguments: Arguments) -> int:
     settings = read("export", arguments, Settings)
     try_folder(settings.to)
     pool = Pool.open(one(settings.pool)).check()
-    rows = [pool.row(settings.id)] if settings.id else pool.rows(witness=False)
+    rows = pool.rows(witness=False) if settings.id is None else [chosen(pool, settings.id)]
     count, lost = 0, []
-    with ProgressBar(err, f"export to {settings.to}", 1 if settings.id else len(pool)) as progress_bar:
+    with ProgressBar(err, f"export to {settings.to}", len(pool) if settings.id is None else 1) as progress_bar:
         work = partial(export, folder=Path(settings.to), robot=settings.robot)
         for count, why in enumerate(each(work, rows, 1, SHOWN, _lost), 1):
             lost += [why] if why else []
@@ -41,4 +41,4 @@ def command(arguments: Arguments) -> int:
 
 
 def _lost(row: PoolRow, reason: str) -> str:
-    return f"{row.id}: its export {reason}"
+    return f"{row.name}: its export {reason}"

@@ -5,8 +5,9 @@ from functools import partial
 from .. import config
 from ..config import read, search_path
 from ..export.recording import Settings, record
+from ..pool import Pool
 from ..runs.progress import ProgressBar
-from . import FAILED, INTERRUPTED, OK, Arguments, err, say, warn
+from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
 
 
 def command(arguments: Arguments) -> int:
@@ -21,8 +22,9 @@ def command(arguments: Arguments) -> int:
         f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.fps} a second, "
         f"{len(settings.eyes)} cameras to {settings.to}"
     )
+    called = names(map(Pool.open, settings.folders)) if summary.failed or summary.lost else {}
     for scenario in summary.failed:
-        warn(f"FAILED {scenario}: the witness does not reach the goal here; its episode has success = false")
+        warn(f"FAILED {called[scenario]}: the witness does not reach the goal here; its episode has success = false")
     for scenario, why in summary.lost.items():
-        warn(f"UNKNOWN {scenario}: {why}; it was left out")
+        warn(f"UNKNOWN {called[scenario]}: {why}; it was left out")
     return FAILED if summary.failed or summary.lost else OK

@@ -11,7 +11,7 @@ from ..parallel import Limits
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
-from . import FAILED, OK, Arguments, err, out, say, several, warn, write_json
+from . import FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ def command(arguments: Arguments) -> int:
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     with ProgressBar(err, "robosuite", total) as progress_bar:
         found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments), limits)
-    tasks = defaultdict(list)
+    called, tasks = names(pools), defaultdict(list)
     for comparison in found:
         tasks[comparison.task].append(comparison)
         if not comparison.agrees:
             told = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
-            warn(f"DIFFERS {comparison.id} of {comparison.task}: {told}")
+            warn(f"DIFFERS {called[comparison.id]}: {told}")
     table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdicts apart at most (s)")
     for task, those in tasks.items():
         apart, later = max(c.apart for c in those), max(abs(c.later) for c in those)

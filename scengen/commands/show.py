@@ -13,7 +13,7 @@ from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
 from ..validate.playable import check_row
-from . import OK, Arguments, err, out, remark, say, several, write
+from . import OK, Arguments, chosen, err, out, remark, say, several, write
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,9 @@ def command(arguments: Arguments) -> int:
         if target and target.suffix != ".png":
             raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")
         try_file(target)
-        row = pools[0].row(settings.id)
+        if len(pools) > 1:
+            raise BadConfig(f"pool = {','.join(folders)}; id= shows a scenario of one pool: name that one")
+        row = chosen(pools[0], settings.id)
         for table in report.scenario_tables(row):
             out.print(table)
         if target:

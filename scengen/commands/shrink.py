@@ -10,6 +10,7 @@ from ..attack.check import attacked
 from ..certificate import Check
 from ..config import read_task
 from ..errors import BadConfig, at_least
+from ..names import Name
 from ..params import Value, values, with_values
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
@@ -37,7 +38,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     scenario = _proposed(task, settings)
     failed = certify(scenario, task.horizon, certify_settings, task.embodiment, adversary=attacked).certificate.failed
-    where = f"{task.name}/{settings.split}/{settings.index}"
+    where = Name(task.name, settings.split, settings.index, scenario.id)
     if failed is None:
         raise BadConfig(f"{where} passes every check of certify={certify_settings.name}; there is nothing to shrink")
     say(f"{where} fails {failed.name}: {failed.reason}")

@@ -74,7 +74,8 @@ def command(arguments: Arguments) -> int:
         report = verify(pool, task, config.levels(task), options, progress_bar.show)
     report = _with_hits(report, pool, task, limits)
     if settings.json:
-        write_json(settings.json, {"pool_sha256": pool.sha256, **asdict(report)})
+        plain = {key: value for key, value in asdict(report).items() if key != "names"}
+        write_json(settings.json, {"pool_sha256": pool.sha256, **plain})
     if settings.junit:
         write(Path(settings.junit), junit(str(pool.folder), report))
     _tell(pool, report)
@@ -122,7 +123,8 @@ def _tell(pool: Pool, report: Report) -> None:
         if (more := len(report.differences) - SHOWN) > 0:
             say(f"and {more} more; json= writes them all")
     for failure in report.failed[:SHOWN]:
-        warn(f"{failure['verdict'].upper()} {failure['id']}: {failure['reason'][:2000]}")
+        called = report.names.get(failure["id"], failure["id"])
+        warn(f"{failure['verdict'].upper()} {called}: {failure['reason'][:2000]}")
     if (more := len(report.failed) - SHOWN) > 0:
         warn(f"and {more} more faults; json= writes them all")
     for remark in report.remarks:

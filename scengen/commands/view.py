@@ -7,7 +7,7 @@ from ..config import read, search_path
 from ..pictures.view import check_display, view
 from ..pool import Pool
 from ..validate.playable import check_row
-from . import OK, Arguments, one
+from . import OK, Arguments, chosen, one
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("view", arguments, Settings)
-    row = Pool.open(one(settings.pool)).check().row(settings.id)
+    row = chosen(Pool.open(one(settings.pool)).check(), settings.id)
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     check_display()
     check_row(row)

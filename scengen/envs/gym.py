@@ -19,6 +19,7 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
 from ..errors import BadConfig, PoolError, UnknownName, cut
+from ..names import find
 from ..params import Value
 from ..pictures.render import Camera
 from ..pool import Pool, PoolRow
@@ -84,7 +85,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
             settle: whether a reached goal has to last as in the certificate.
             search: `hydra.searchpath=[file:///path/to/conf]` for a task of a package that is not installed.
-            scenario: how the id of the only scenario begins that is to be played; all of the pools if None.
+            scenario: the only one that is to be played, named as in `reset`; all of the pools if None.
             split: play those of one split only, such as `id` or `wide_gaps@3`.
             action_repeat: control periods for which an action is held, 4 for data of 25 Hz. All else goes on at 100 Hz:
                 controller, events, goal and the filter, which sees the same action several times. The time limit is
@@ -160,6 +161,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._world
 
     @property
+    def row(self) -> PoolRow:
+        """The running scenario as its pool tells it. Privileged, like `scenario`."""
+        return self._row
+
+    @property
     def scenario(self) -> Scenario:
         """The running scenario. Privileged: a policy that reads it knows what it should find out."""
         if self._world is None:
@@ -174,10 +180,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Put a scenario at its start: `options={"scenario": id}`, else number `seed` of the pool, else the next one.
+        """Put a scenario at its start: `options={"scenario": name}`, else number `seed` of the pool, else the next one.
+
+        A scenario is named by its id, by the beginning of it, or as `PoolRow.name` does.
 
         Raises:
             UnknownName: there is no such scenario or option.
+            BadConfig: several ids begin so.
         """
         super().reset(seed=seed)
         unknown = set(options or {}) - {"scenario"}
@@ -187,7 +196,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._next = seed % len(self._order)
         chosen = (options or {}).get("scenario", self._order[self._next])
         if chosen not in self._rows:
-            raise UnknownName("scenario", str(chosen), self._order)
+            chosen = find(str(chosen), (row.name for row in self._rows.values()), "these pools").id
         self._next = (self._order.index(chosen) + 1) % len(self._order)
         self._load(self._rows[chosen])
         self._over = False
@@ -275,10 +284,11 @@ def _folders(pool: str | Path | Sequence[str | Path] | None) -> list[str | Path]
 
 
 def _chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None) -> list[PoolRow]:
-    """The scenarios of a split, and of these the one whose id begins so.
+    """The scenarios of a split, and of these the one of that name.
 
     Raises:
-        UnknownName: there is none, or more than one.
+        UnknownName: there is none.
+        BadConfig: several ids begin so.
     """
     if split is not None:
         if split not in (known := {row.split for row in rows}):
@@ -286,11 +296,8 @@ def _chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None) ->
         rows = [row for row in rows if row.split == split]
     if scenario is None:
         return list(rows)
-    found = {row.id: row for row in rows if row.id.startswith(scenario)}
-    if len(found) != 1:
-        what = "scenario" if not found else f"single scenario ({len(found)} begin so)"
-        raise UnknownName(what, scenario, [row.id for row in rows])
-    return list(found.values())
+    found = {row.id: row for row in rows}
+    return [found[find(scenario, (row.name for row in found.values()), "these pools").id]]
 
 
 def _scenarios(folder: str | Path, task: str) -> list[PoolRow]:

@@ -96,8 +96,8 @@ class RobosuiteEnv(ManipulationEnv):
 
         Args:
             robots: "Panda", or a list of two where the task has two arms; default: what the task asks for.
-            scenario: a row of a pool (`Pool.row`), or with `pool` how an id in it begins. Without it, every hard
-                reset draws one from the pool, decided by robosuite's `seed`.
+            scenario: a row of a pool, or with `pool` what `Pool.row` takes: a name, an id, or how one begins. Without
+                it, every hard reset draws one from the pool, decided by robosuite's `seed`.
             pool: folder of a pool.
             use_object_obs: also observe `object-state` and every reading in it, such as `<body>_pos` [m]
                 (`scengen.envs.object_state`); and `seen_<body>_pos` [m], if the family turns pictures.
@@ -323,7 +323,7 @@ def _choice(task: str, scenario: PoolRow | str | None, pool: str | Path | None) 
         ScengenError: there is none, or one of another task or made with other versions.
     """
     if isinstance(scenario, PoolRow) and pool is None:
-        rows, where, made = [scenario], f"scenario {scenario.id}", scenario.certificate.versions
+        rows, where, made = [scenario], f"scenario {scenario.name}", scenario.certificate.versions
     elif pool is not None and not isinstance(scenario, PoolRow):
         found = Pool.open(pool).check()
         rows = list(found.rows(witness=False)) if scenario is None else [found.row(scenario)]

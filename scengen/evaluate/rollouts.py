@@ -292,8 +292,8 @@ class PolicyPlayer:
             BadPolicy: the policy gave something that is no action.
         """
         env, policy = self._prepared(which.task)
-        name, where = self.settings.policy, f"on scenario {which.scenario}"
         observation, info = env.reset(options={"scenario": which.scenario})
+        name, where = self.settings.policy, f"on scenario {env.row.name}"
         with blamed(name, f"its reset {where}"):
             policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
         over = False
@@ -303,7 +303,7 @@ class PolicyPlayer:
             try:
                 observation, _, terminated, truncated, info = env.step(action)
             except (ValueError, TypeError) as error:
-                raise BadPolicy(f"policy {self.settings.policy} on scenario {which.scenario}: {error}") from None
+                raise BadPolicy(f"policy {name} {where}: {error}") from None
             over = terminated or truncated
         return {
             "pool": which.pool,

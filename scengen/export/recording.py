@@ -144,7 +144,7 @@ def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings
         views = cameras_of(row.embodiment)
         pictures = _camera(stack, world, settings, views, held)
         for name in settings.eyes:
-            data.calibrate(name, calibration(world, views[name], *size, held), row.id)
+            data.calibrate(name, calibration(world, views[name], *size, held), str(row.name))
         for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
             data.add(moment.values(proprioception(row.embodiment)), moment.pictures)
             success = moment.success

@@ -66,19 +66,21 @@ def _cells(rate: Rate) -> list[str]:
 
 def pool_table(pool: Pool) -> Table:
     """One line per scenario, with the parameters that differ from one to another."""
-    rows = list(pool.columns("id", "index", "shifted", "params"))
-    every = [params for *_, params in rows]
+    rows = list(zip(pool.names(), pool.columns("shifted", "params"), strict=True))
+    every = [params for _, (_, params) in rows]
     drawn = [name for name in (every[0] if every else ()) if any(params[name] != every[0][name] for params in every)]
-    table = Table("id", "index", "parameters", title=f"{pool.folder}: {pool.split}", title_justify="left")
-    for id_, index, shifted, params in rows:
+    table = Table(title=f"{pool.folder}: {pool.split}", title_justify="left")
+    table.add_column("scenario", no_wrap=True)  # a name is there to be copied
+    table.add_column("parameters")
+    for called, (shifted, params) in rows:
         shown = [name for name in params if name in drawn or name in shifted]
-        table.add_row(id_, str(index), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
+        table.add_row(str(called), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
     return table
 
 
 def scenario_tables(row: PoolRow) -> list[Table]:
     """One scenario: what it is, its parameters, and its certificate."""
-    about = Table(title=f"{row.task} {row.id}", title_justify="left", show_header=False)
+    about = Table(title=str(row.name), title_justify="left", show_header=False)
     for name in ("instruction", "split", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
         about.add_row(name, str(getattr(row, name)))
     about.add_row("shifted", _numbers(row.shifted))

@@ -43,6 +43,8 @@ class Report:
     """What holds and yet should be known."""
     examinations: list[dict[str, Any]]
     """`id`, `verdict` and `reason` of every scenario."""
+    names: dict[str, str]
+    """What people call the scenarios in `failed`, by id."""
 
     @property
     def holds(self) -> bool:
@@ -63,6 +65,8 @@ class Findings:
         self.left_out: dict[int, str] = {}
         """Why indices without a scenario are not certified."""
         self.expired = False
+        self.names: dict[str, str] = {}
+        """What people call the scenarios that were looked at, by id."""
 
     @property
     def pool_verdict(self) -> Verdict:
@@ -119,7 +123,7 @@ class Findings:
         verdicts = [e.verdict for e in self.examinations]
         faults = [{"id": e.id, "verdict": e.verdict, "reason": "; ".join(e.reasons)} for e in self.examinations]
         simulated = sum(e.simulated for e in self.examinations)
-        level = self.level
+        level, failed = self.level, self.failed + [f for f in faults if f["verdict"] != "sound"]
         return Report(
             self.pool_verdict,
             level,
@@ -132,7 +136,7 @@ class Findings:
             simulated if level in ("recheck", "full") else 0,
             simulated if level == "full" else 0,
             len(self.left_out),
-            self.failed + [f for f in faults if f["verdict"] != "sound"],
+            failed,
             sum(e.expired for e in self.examinations),
             sum(e.drifted for e in self.examinations),
             self.settings,
@@ -140,6 +144,7 @@ class Findings:
             self.sample,
             self.remarks,
             faults,
+            {id_: self.names[id_] for f in failed if (id_ := f["id"]) in self.names},
         )
 
 

@@ -44,7 +44,7 @@ def check_row(row: PoolRow) -> PoolRow:
     Raises:
         ScengenError: it does; or its scene does not compile.
     """
-    apart(play, (row.scene_xml, row.embodiment, row.witness), SHOWN, f"playing {row.id}")
+    apart(play, (row.scene_xml, row.embodiment, row.witness), SHOWN, f"playing {row.name}")
     return row
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from ..errors import PoolError, ScengenError
+from ..errors import PoolError, ScengenError, cut
 from ..parallel import Limits, each
 from ..pool import Pool
 from ..samplers.task import Task
@@ -134,12 +134,14 @@ class _Run:
             for place, row in enumerate(self.pool.rows()):
                 self.indices.append(row.index)
                 self.ids.append(row.id)
+                self.found.names[row.id] = cut(str(row.name))
                 self.certified[row.index] = row.attempt
                 if self._hopeless():
                     return
                 yield row, self.chosen is None or place in self.chosen, True
             for row in self.pool.rejects():
                 self.rejected.append(survey.Reject.of(row))
+                self.found.names[row.id] = cut(str(row.name))
                 if self._hopeless():
                     return
                 yield row, self.options.sample is None, False

@@ -18,6 +18,7 @@ from unittest import mock
 from scengen import config
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
+from scengen.names import Name
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.sim import scene_text
@@ -84,7 +85,8 @@ class Mutant:
             text, _ = scene_text.emit(scenario.build())
             rollout = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
             if rollout.solved:
-                found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions))
+                name = Name(task.name, "id", index, scenario.id)
+                found.append(Subject(scenario, text, task.embodiment, task.horizon, rollout.actions, name))
             if len(found) == n:
                 break
         return found

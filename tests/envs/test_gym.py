@@ -165,8 +165,12 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_single", []), PoolError, "no pool was named; say pool=FOLDER"),
         (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was named; say pool=FOLDER"),
         (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
-        (lambda: PoolEnv("domino_single", REFERENCE, scenario="z"), UnknownName, "no scenario named 'z'"),
-        (lambda: PoolEnv("domino_single", REFERENCE, scenario=""), UnknownName, "no single scenario (6 begin so)"),
+        (
+            lambda: PoolEnv("domino_single", REFERENCE, scenario="z"),
+            UnknownName,
+            "no scenario in these pools named 'z'",
+        ),
+        (lambda: PoolEnv("domino_single", REFERENCE, scenario=""), UnknownName, "no scenario in these pools named ''"),
         (lambda: PoolEnv("domino_single", REFERENCE, action_repeat=0), BadConfig, "action_repeat = 0; it must be"),
         (lambda: PoolEnv("domino_single", REFERENCE, action_repeat="4"), BadConfig, "action_repeat = '4'; it must be"),
         (
