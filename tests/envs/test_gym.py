@@ -186,7 +186,7 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (
             lambda: PoolEnv("domino_single", REFERENCE).reset(options={"scenario": "0000"}),
             UnknownName,
-            "no scenario named '0000'",
+            "no scenario in these pools named '0000'",
         ),
         (
             lambda: PoolEnv("domino_single", REFERENCE).reset(options={"scenari": 1}),
