@@ -5,12 +5,12 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test slow fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo test wheel slow fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "scengen needs Python 3.11 or newer; say make PYTHON=...")'
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)] and "scengen needs Python 3.11 or 3.12; say make PYTHON=...")'
 	$(PYTHON) -m venv $(ENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
@@ -27,6 +27,16 @@ demo: setup
 test: setup
 	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
 	$(BIN)/python -m pytest -n 2
+
+# The wheel with all its extras, tried away from this folder in an environment of its own, as pip makes it: needs a C
+# compiler for the keyboard driver that robosuite asks for.
+WHEEL := build/wheel
+wheel:
+	rm -rf $(WHEEL)
+	$(PYTHON) -m venv $(WHEEL)/env
+	$(WHEEL)/env/bin/pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(WHEEL) .
+	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
+	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
 
 # Tests that simulate for minutes: coverage of intervals, power.
 slow: setup

@@ -126,6 +126,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
 
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:
+    _check_platform()
     from .commands import out, say
     from .control import native
 
@@ -150,6 +151,12 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if signals:
         signals.working = True
     return command(arguments)
+
+
+def _check_platform() -> None:
+    """Raise `BadConfig` where scengen cannot run, before modules are imported that fail there in many lines."""
+    if sys.platform != "linux":  # the control loop is compiled against the libmujoco.so of MuJoCo's Linux wheel
+        raise BadConfig(f"scengen runs on Linux, this is {sys.platform}; use its Dockerfile, or WSL on Windows")
 
 
 def _line(text: str) -> None:

@@ -122,6 +122,8 @@ def discover(
     Raises:
         BadConfig: the method is none of `METHODS`, scikit-learn is missing, or no training scenario can be solved.
     """
+    if settings.method == FOREST:
+        _forest()  # before any work, to say at once that it is missing
     known = regions(task)
     asked = _Asked(task, checks, settings, known, folder, progress)
     with asked.log:
@@ -301,20 +303,29 @@ def _hypercube(n: int, count: int, random: np.random.Generator) -> list[tuple[Po
     return [(tuple((i, round(float(places[i].pop()), 6)) for i in chosen), None) for chosen in turns]
 
 
-def _uncertain(records: list[dict[str, Any]], count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
-    """The points of which a forest knows least whether they break the memory, all in different regions."""
+def _forest() -> type[Any]:
+    """Scikit-learn's classifier.
+
+    Raises:
+        BadConfig: scikit-learn is missing.
+    """
     try:
         from sklearn.ensemble import RandomForestClassifier
     except ImportError:
         raise BadConfig(
-            "method=forest needs scikit-learn: pip install 'scengen[discover]', or method=hypercube"
+            "no scikit-learn for method=forest; say pip install 'scengen[discover]', or method=hypercube"
         ) from None
+    return RandomForestClassifier
+
+
+def _uncertain(records: list[dict[str, Any]], count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
+    """The points of which a forest knows least whether they break the memory, all in different regions."""
     table = np.stack([_row(r["point"], count) for r in records])
     breaks = np.array([r["outcome"] == BREAKS for r in records])
     points = [point for point, _ in _hypercube(POOL, count, random)]
     if breaks.all() or not breaks.any():
         return [(point, None) for point in points[:BATCH]]
-    forest = RandomForestClassifier(200, min_samples_leaf=2, random_state=int(random.integers(2**31)))
+    forest = _forest()(200, min_samples_leaf=2, random_state=int(random.integers(2**31)))
     share = forest.fit(table, breaks).predict_proba(np.stack([_row(p, count) for p in points]))[:, 1]
     chosen, used = list[tuple[Point, None]](), set[int]()
     for k in np.argsort(-share * (1 - share), kind="stable"):

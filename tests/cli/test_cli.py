@@ -84,6 +84,15 @@ def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
     assert err.startswith("scengen: ") and err.count("\n") == 1 and "Traceback" not in err
 
 
+@pytest.mark.parametrize("argv", [(), ("--help",), ("--version",), ("tasks",)])
+def test_elsewhere_than_on_linux_every_command_is_one_line(capsys, monkeypatch, argv):
+    monkeypatch.setattr(sys, "platform", "darwin")
+    status, err = said(capsys, *argv)
+    assert (
+        status == 2 and err == "scengen: scengen runs on Linux, this is darwin; use its Dockerfile, or WSL on Windows\n"
+    )
+
+
 def test_a_pool_that_cannot_be_written_is_one_line(capsys, tmp_path):
     (tmp_path / "file").write_text("")
     status, err = said(capsys, *GENERATE, "n=1", f"pool={tmp_path}/file/pool")
