@@ -1,0 +1,114 @@
+"""Wooden shapes to be stacked: cube, cylinder, hexagonal and triangular prism, and a cone frustum on a collar.
+
+                                        __
+       ____    ____      ____          /  \\       All stand on a flat underside. On the frustum nothing stands.
+      |    |  |    |    |    |        /    \\
+      |____|  |____|    |____|       |______|
+
+They stand on small spheres, their feet: MuJoCo gives two convex geoms one point of contact, and a flat face on one
+point rocks. An inner ring of feet bears what overhangs the face under it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..params import param
+from .prop import Prop, Rgba, show, solid
+from .turned import FOOT, PROUD
+
+KINDS = ("cube", "cylinder", "hexagonal prism", "triangular prism", "cone frustum")
+CUBE, CYLINDER, HEXAGON, TRIANGLE, FRUSTUM = range(len(KINDS))
+SIDES = (4, 24, 6, 3, 24)
+"""Of the outlines; a round one has so many flat faces that it is 0.9 % wider over its corners."""
+COLLAR, TIP = 0.65, 0.0005
+"""Share of the frustum's height that is straight, so that a jaw can hold it, and radius of its top [m]. A taper would
+slip out of parallel pads, unless its tangent were less than the friction. On a top of 3 mm stands what a jaw puts."""
+FEET = 6
+"""In the ring under a round shape; under others there is one at each corner."""
+INNER = 0.5
+"""Radius of the inner ring of three or four feet, of the outer one's."""
+BEECH = 700.0
+"""Density [kg/m^3]."""
+PAINT: tuple[Rgba, ...] = (
+    (0.80, 0.25, 0.20, 1.0),
+    (0.20, 0.45, 0.75, 1.0),
+    (0.30, 0.62, 0.32, 1.0),
+    (0.90, 0.70, 0.20, 1.0),
+    (0.55, 0.32, 0.62, 1.0),
+)
+"""By kind."""
+
+MESH, SPHERE, ROUND = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CYLINDER
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape(Prop):
+    """The origin is the middle of its foot, below the centre of mass. x is the normal of a side."""
+
+    kind: int = param(CUBE, "", 0, len(KINDS) - 1)
+    """Which of `KINDS`."""
+    width: float = param(0.045, "m", 0.02, 0.07)
+    """Along x: from side to side, or from a side to the opposite edge."""
+    height: float = param(0.036, "m", 0.015, 0.08)
+    friction: float = param(0.7, "1", 0.05, 1.5)
+
+    @property
+    def reach(self) -> float:
+        """Distance of the outline's corners from the axis [m]."""
+        if self.kind == CYLINDER:
+            return self.width / 2
+        return self.width / 1.5 if self.kind == TRIANGLE else self.width / 2 / math.cos(math.pi / SIDES[self.kind])
+
+    @property
+    def pointed(self) -> bool:
+        """Whether nothing can stand on it."""
+        return self.kind == FRUSTUM
+
+    @property
+    def between(self) -> float:
+        """Where a jaw that closes across a side has its middle, along that side's normal [m]."""
+        return (self.width - 2 * self.reach) / 2 if self.kind == TRIANGLE else 0.0
+
+    @property
+    def sides(self) -> NDArray[np.float64]:
+        """Directions of the sides' normals [rad]."""
+        return 2 * math.pi * np.arange(SIDES[self.kind]) / SIDES[self.kind]
+
+    @property
+    def rays(self) -> NDArray[np.float64]:
+        """Directions of the corners, shape (sides, 2)."""
+        angles = 2 * math.pi * (np.arange(SIDES[self.kind]) + 0.5) / SIDES[self.kind]
+        return np.column_stack([np.cos(angles), np.sin(angles)])
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Of the solid, shape (n, 3) [m]."""
+        levels = [(PROUD, self.reach), (self.height, self.reach)]
+        if self.pointed:
+            levels[1:] = [(COLLAR * self.height, self.reach), (self.height, TIP)]
+        return np.vstack([np.column_stack([r * self.rays, np.full(len(self.rays), z)]) for z, r in levels])
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        look = {"friction": self.friction, "density": BEECH, "rgba": PAINT[self.kind]}
+        half, middle = (self.height - PROUD) / 2, [0.0, 0.0, (self.height + PROUD) / 2]
+        if self.kind == CUBE:
+            solid(body, "hull", [self.width / 2, self.width / 2, half], middle, **look)
+        elif self.kind == CYLINDER:
+            solid(body, "hull", [self.width / 2, half], middle, type=ROUND, **look)
+        else:
+            spec.add_mesh(name="hull", uservert=self.corners.ravel().tolist())
+            solid(body, "hull", (), type=MESH, **look).meshname = "hull"
+        feet = {"type": SPHERE, "friction": self.friction, "mass": 0.0, "condim": 3, "group": 3}
+        rays = self.rays if len(self.rays) <= FEET else self.rays[:: len(self.rays) // FEET]
+        for k, ray in enumerate(rays):
+            solid(body, f"outer_{k}", [FOOT], [*(self.reach - FOOT) * ray, FOOT], **feet)
+        for k, ray in enumerate(rays[:: max(1, len(rays) // 3)]):
+            solid(body, f"inner_{k}", [FOOT], [*INNER * self.reach * ray, FOOT], **feet)
+
+
+if __name__ == "__main__":
+    show(Shape(kind=FRUSTUM))

@@ -1,0 +1,147 @@
+"""A pile stands if the cone is its top; what is put on the cone topples, and two piles are none."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+from controls import (
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    not_certified,
+    play_shortcut,
+    replayed,
+    unguarded,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.shape import FRUSTUM, Shape
+from scengen.attack.priors import fit
+from scengen.geometry import UP
+from scengen.sim.world import IDLE
+from scengen.tasks.shape_stack import Piece, ShapeStack
+
+TASK = config.task("shape_stack")
+THREE = ShapeStack(count=3)
+
+
+def piled(scenario, *orders, seconds=2.0):
+    """The world after some time in which nobody acts, with piles in these orders, from the bottom up."""
+    world = load(TASK, scenario)
+    for order in orders:
+        spot = scenario.pieces[order[0]].spot
+        for name in order:
+            at = world.model.jnt_qposadr[world.model.body(name).jntadr[0]]
+            world.data.qpos[at : at + 3] = spot
+            spot = spot + scenario.pieces[name].shape.height * UP
+    for _ in range(round(100 * seconds)):
+        world.step(IDLE)
+    return world
+
+
+# --- the goal -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_piled_with_the_cone_on_top_it_stands_and_that_is_the_goal(index):
+    scenario = TASK.draw("id", 0, index).scenario
+    assert scenario.pieces[scenario.order[-1]].shape.kind == FRUSTUM
+    world = piled(scenario, scenario.order)
+    assert scenario.success(world) and scenario.failure(world) is None
+
+
+def test_flat_shapes_may_be_piled_in_any_order():
+    """What is asked for is a pile that stands, not the one that the oracle builds."""
+    four = ShapeStack()
+    *flat, cone = four.order
+    assert four.success(piled(four, [*reversed(flat), cone]))
+
+
+@pytest.mark.parametrize("orders", [["ac", "b"], ["ab", "c"], ["a", "b", "c"]])
+def test_two_piles_or_three_are_not_the_goal(orders):
+    assert not THREE.success(piled(THREE, *orders))
+
+
+def test_two_shapes_on_one_count_for_only_one_touches_the_table():
+    """The paper's words; none of the shapes is so wide that it matters."""
+    widest = max(piece.shape.width for piece in ShapeStack(count=5).pieces.values())
+    assert widest < 2 * 0.03
+
+
+# --- ways around ----------------------------------------------------------------------------
+
+
+def test_what_is_put_on_the_cone_topples_and_would_not_stand_without_the_rule_either():
+    assert play_shortcut(TASK, THREE, "cone_at_the_bottom").reason == "a shape toppled"
+    assert not play_shortcut(TASK, unguarded(ShapeStack)(count=3), "cone_at_the_bottom").solved
+
+
+def test_what_toppled_could_be_put_up_again_and_that_is_why_it_is_lost():
+    """A cone knocked off the top while nobody has touched it since: the rule is what ends the episode."""
+    world = load(TASK, THREE)
+    at = world.model.jnt_qposadr[world.model.body("b").jntadr[0]]
+    world.data.qpos[at + 3 : at + 7] = [0.7071, 0.0, 0.7071, 0.0]
+    world.data.qpos[at + 2] += 0.05
+    world.step(IDLE)
+    assert THREE.failure(world) == "a shape toppled"
+
+
+def test_without_the_cone_the_pile_is_not_complete():
+    ended = play_shortcut(TASK, THREE, "leave_the_cone")
+    assert not ended.solved and "without reaching the goal" in ended.reason
+
+
+def test_a_fixed_place_of_the_cone_is_right_in_a_third_of_training():
+    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(150)] for seed in (1, 2))
+    (prior,) = fit(training, fresh=fresh)
+    assert 0.2 < prior.fresh <= 0.38
+
+
+@pytest.mark.parametrize("split", ["id", *TASK.axes])
+def test_three_shortcuts_at_least_are_wrong_everywhere(split):
+    for index in range(6):
+        scenario = TASK.draw(split, 0, index).scenario
+        assert len(scenario.shortcuts()) >= 3 and scenario.infeasible() is None
+
+
+def test_memorised_actions_are_lost_where_the_shapes_are_higher():
+    trained, other = (TASK.draw(split, 0, 0).scenario for split in ("id", "tall"))
+    assert not replayed(TASK, trained, other).solved
+
+
+# --- scenes that must not be certified --------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Careless(ShapeStack):
+    """The oracle takes the shapes as they stand."""
+
+    def oracle(self, world):
+        yield from self.pile(world, tuple(self.pieces))
+
+    def shortcuts(self):
+        return {}
+
+
+def test_an_oracle_that_does_not_look_at_the_shapes_is_not_certified():
+    not_certified(TASK, Careless(count=3), "solved", "a shape toppled")
+
+
+def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
+    each_refuted_for_its_own_reason(
+        [
+            replace(THREE, cone=3),
+            replace(THREE, a=Piece(y=0.19, shape=Shape(width=0.07))),
+            replace(THREE, b=Piece(shape=Shape(height=0.08))),
+            replace(THREE, a=Piece(y=0.38)),
+            replace(THREE, a=Piece(y=0.10)),
+            replace(THREE, a=Piece(x=0.33, y=0.3)),
+        ]
+    )
+
+
+@given(scenario=anywhere(ShapeStack))
+@settings(max_examples=25, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
