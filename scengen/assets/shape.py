@@ -5,6 +5,9 @@
       |    |  |    |    |    |        /    \\
       |____|  |____|    |____|       |______|
 
+Two convex bodies touch in one plane. Under the frustum's slope that plane is inclined by `STEEP`, more than friction
+holds, and any flatter one touches nothing but the tip, on which a flat face balances and does not stand.
+
 They stand on small spheres, their feet: MuJoCo gives two convex geoms one point of contact, and a flat face on one
 point rocks. An inner ring of feet bears what overhangs the face under it.
 """
@@ -24,9 +27,14 @@ KINDS = ("cube", "cylinder", "hexagonal prism", "triangular prism", "cone frustu
 CUBE, CYLINDER, HEXAGON, TRIANGLE, FRUSTUM = range(len(KINDS))
 SIDES = (4, 24, 6, 3, 24)
 """Of the outlines; a round one has so many flat faces that it is 0.9 % wider over its corners."""
-COLLAR, TIP = 0.65, 0.0005
-"""Share of the frustum's height that is straight, so that a jaw can hold it, and radius of its top [m]. A taper would
-slip out of parallel pads, unless its tangent were less than the friction. On a top of 3 mm stands what a jaw puts."""
+STEEP = math.radians(50.0)
+"""Inclination of the frustum's slope [rad]. Friction holds up to atan(friction), 35 deg for wood, MuJoCo's cone 1 deg
+more."""
+TIP = 0.0001
+"""Radius of the face on a frustum that is high enough for its width [m]. On one of 3 mm stands what a jaw puts."""
+COLLAR = 0.004
+"""Least height of the frustum's foot, which is straight, so that a jaw can hold it [m]: a slope slips out of parallel
+pads unless the friction exceeds the tangent of its angle to them."""
 FEET = 6
 """In the ring under a round shape; under others there is one at each corner."""
 INNER = 0.5
@@ -65,8 +73,18 @@ class Shape(Prop):
 
     @property
     def pointed(self) -> bool:
-        """Whether nothing can stand on it."""
-        return self.kind == FRUSTUM
+        """Whether it is a frustum that ends in a tip, on which nothing can stand."""
+        return self.kind == FRUSTUM and self.top < 2 * TIP
+
+    @property
+    def collar(self) -> float:
+        """How high a frustum is straight [m]."""
+        return max(COLLAR, self.height - math.tan(STEEP) * (self.width / 2 - TIP))
+
+    @property
+    def top(self) -> float:
+        """Radius of a frustum's upper face [m], between its sides."""
+        return self.width / 2 - (self.height - self.collar) / math.tan(STEEP)
 
     @property
     def between(self) -> float:
@@ -88,8 +106,8 @@ class Shape(Prop):
     def corners(self) -> NDArray[np.float64]:
         """Of the solid, shape (n, 3) [m]."""
         levels = [(PROUD, self.reach), (self.height, self.reach)]
-        if self.pointed:
-            levels[1:] = [(COLLAR * self.height, self.reach), (self.height, TIP)]
+        if self.kind == FRUSTUM:
+            levels[1:] = [(self.collar, self.reach), (self.height, self.top * 2 * self.reach / self.width)]
         return np.vstack([np.column_stack([r * self.rays, np.full(len(self.rays), z)]) for z, r in levels])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -111,4 +129,4 @@ class Shape(Prop):
 
 
 if __name__ == "__main__":
-    show(Shape(kind=FRUSTUM))
+    show(Shape(kind=FRUSTUM, width=0.042, height=0.041))

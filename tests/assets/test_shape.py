@@ -1,15 +1,17 @@
 """Shapes weigh what a textbook says, stand where their centre of mass is over what is under them, and not on a cone."""
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.shape import BEECH, COLLAR, CUBE, CYLINDER, FRUSTUM, HEXAGON, KINDS, TIP, TRIANGLE, Shape
+from scengen.assets.shape import BEECH, CUBE, CYLINDER, FRUSTUM, HEXAGON, KINDS, STEEP, TIP, TRIANGLE, Shape
 
 FLAT = (CUBE, CYLINDER, HEXAGON, TRIANGLE)
+CONE = Shape(kind=FRUSTUM, width=0.042, height=0.041)
 
 
 def left_alone(lower, upper, off=0.0, yaw=0.0, seconds=2.0):
@@ -37,11 +39,13 @@ def test_prisms_weigh_density_times_area_times_height(kind):
     assert shape.spec().compile().body("body").mass == pytest.approx(BEECH * area(shape) * shape.height, rel=0.01)
 
 
-def test_a_frustum_weighs_its_collar_and_its_cone():
-    cone = Shape(kind=FRUSTUM)
-    r, low = cone.width / 2, COLLAR * cone.height
-    volume = math.pi * r**2 * low + math.pi / 3 * (cone.height - low) * (r**2 + r * TIP + TIP**2)
-    assert cone.spec().compile().body("body").mass == pytest.approx(BEECH * volume, rel=0.02)
+@pytest.mark.parametrize("height", [0.025, 0.041])
+def test_a_frustum_weighs_its_foot_and_its_cone(height):
+    frustum = replace(CONE, height=height)
+    r, top, low = frustum.width / 2, frustum.top, frustum.collar
+    volume = math.pi * r**2 * low + math.pi / 3 * (height - low) * (r**2 + r * top + top**2)
+    assert frustum.spec().compile().body("body").mass == pytest.approx(BEECH * volume, rel=0.02)
+    assert math.atan2(height - low, r - top) == pytest.approx(STEEP)
 
 
 @pytest.mark.parametrize("upper", [*FLAT, FRUSTUM], ids=KINDS.__getitem__)
@@ -59,10 +63,18 @@ def test_a_shape_stands_on_a_cube_as_long_as_its_middle_is_over_it(kind, beyond,
     assert (sunk < 0.005) == stands
 
 
-@pytest.mark.parametrize("upper", FLAT, ids=KINDS.__getitem__)
-def test_nothing_stands_on_a_cone_a_millimetre_off_its_tip(upper):
-    sunk, lean = left_alone(Shape(kind=FRUSTUM), Shape(kind=upper), off=TIP + 0.001)
-    assert sunk > 0.005 or lean > math.radians(20.0)
+@pytest.mark.parametrize(("off", "friction"), [(3 * TIP, 0.7), (0.003, 0.7), (0.009, 0.7), (0.003, 1.0)])
+@pytest.mark.parametrize("kind", FLAT, ids=KINDS.__getitem__)
+def test_off_its_tip_nothing_rests_on_a_cone_that_is_steeper_than_friction_holds(kind, off, friction):
+    assert math.tan(STEEP) > 1.0
+    upper = Shape(kind=kind, friction=friction)
+    assert left_alone(replace(CONE, friction=friction), upper, off=off, yaw=0.2)[1] > math.radians(75.0)
+
+
+def test_on_a_frustum_with_a_face_something_stands():
+    low = replace(CONE, height=0.025)
+    assert low.top > 0.003 and not low.pointed and CONE.pointed
+    assert left_alone(low, Shape(), off=0.0005)[1] < math.radians(1.0)
 
 
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS.__getitem__)

@@ -1,12 +1,13 @@
 """A pile stands if the cone is its top; what is put on the cone topples, and two piles are none."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import pytest
 from controls import (
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
+    mistaken,
     not_certified,
     play_shortcut,
     replayed,
@@ -18,26 +19,34 @@ from hypothesis import given, settings
 from scengen import config
 from scengen.assets.shape import FRUSTUM, Shape
 from scengen.attack.priors import fit
-from scengen.geometry import UP
+from scengen.geometry import UP, heading
 from scengen.sim.world import IDLE
 from scengen.tasks.shape_stack import Piece, ShapeStack
 
 TASK = config.task("shape_stack")
 THREE = ShapeStack(count=3)
+Y = heading(90.0)
 
 
-def piled(scenario, *orders, seconds=2.0):
-    """The world after some time in which nobody acts, with piles in these orders, from the bottom up."""
+def put_up(scenario, spots, seconds=2.0):
+    """The world after some time in which nobody acts, with the feet of shapes at these spots [m] at first."""
     world = load(TASK, scenario)
-    for order in orders:
-        spot = scenario.pieces[order[0]].spot
-        for name in order:
-            at = world.model.jnt_qposadr[world.model.body(name).jntadr[0]]
-            world.data.qpos[at : at + 3] = spot
-            spot = spot + scenario.pieces[name].shape.height * UP
+    for name, spot in spots.items():
+        at = world.model.jnt_qposadr[world.model.body(name).jntadr[0]]
+        world.data.qpos[at : at + 3] = spot
     for _ in range(round(100 * seconds)):
         world.step(IDLE)
     return world
+
+
+def piled(scenario, *orders):
+    """The world with piles in these orders, from the bottom up."""
+    spots = {}
+    for order in orders:
+        spot = scenario.pieces[order[0]].spot
+        for name in order:
+            spots[name], spot = spot, spot + scenario.pieces[name].shape.height * UP
+    return put_up(scenario, spots)
 
 
 # --- the goal -----------------------------------------------------------------------------
@@ -63,10 +72,12 @@ def test_two_piles_or_three_are_not_the_goal(orders):
     assert not THREE.success(piled(THREE, *orders))
 
 
-def test_two_shapes_on_one_count_for_only_one_touches_the_table():
-    """The paper's words; none of the shapes is so wide that it matters."""
-    widest = max(piece.shape.width for piece in ShapeStack(count=5).pieces.values())
-    assert widest < 2 * 0.03
+def test_two_shapes_beside_each_other_on_a_third_stand_and_are_no_stack():
+    wide = replace(THREE, a=Piece(y=0.19, shape=Shape(width=0.06)))
+    on_top = wide.a.spot + wide.a.shape.height * UP
+    world = put_up(wide, {"b": on_top + 0.022 * Y, "c": on_top - 0.0235 * Y})
+    assert world.touching("a", "b") and world.touching("a", "c") and not world.touching("c", "table")
+    assert not wide.success(world)
 
 
 # --- ways around ----------------------------------------------------------------------------
@@ -77,8 +88,7 @@ def test_what_is_put_on_the_cone_topples_and_would_not_stand_without_the_rule_ei
     assert not play_shortcut(TASK, unguarded(ShapeStack)(count=3), "cone_at_the_bottom").solved
 
 
-def test_what_toppled_could_be_put_up_again_and_that_is_why_it_is_lost():
-    """A cone knocked off the top while nobody has touched it since: the rule is what ends the episode."""
+def test_what_lies_on_its_side_is_lost_unless_it_is_held():
     world = load(TASK, THREE)
     at = world.model.jnt_qposadr[world.model.body("b").jntadr[0]]
     world.data.qpos[at + 3 : at + 7] = [0.7071, 0.0, 0.7071, 0.0]
@@ -93,7 +103,7 @@ def test_without_the_cone_the_pile_is_not_complete():
 
 
 def test_a_fixed_place_of_the_cone_is_right_in_a_third_of_training():
-    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(150)] for seed in (1, 2))
+    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(80)] for seed in (1, 2))
     (prior,) = fit(training, fresh=fresh)
     assert 0.2 < prior.fresh <= 0.38
 
@@ -113,27 +123,19 @@ def test_memorised_actions_are_lost_where_the_shapes_are_higher():
 # --- scenes that must not be certified --------------------------------------------------------
 
 
-@dataclass(frozen=True, kw_only=True)
-class Careless(ShapeStack):
-    """The oracle takes the shapes as they stand."""
-
-    def oracle(self, world):
-        yield from self.pile(world, tuple(self.pieces))
-
-    def shortcuts(self):
-        return {}
-
-
 def test_an_oracle_that_does_not_look_at_the_shapes_is_not_certified():
-    not_certified(TASK, Careless(count=3), "solved", "a shape toppled")
+    not_certified(TASK, mistaken(ShapeStack, "as_they_stand")(count=3), "solved", "a shape toppled")
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     each_refuted_for_its_own_reason(
         [
-            replace(THREE, cone=3),
+            replace(THREE, cone_at=3),
+            replace(THREE, a=Piece(y=0.19, shape=THREE.cone)),
+            replace(THREE, cone=replace(THREE.cone, height=0.027)),
+            replace(THREE, b=Piece(shape=Shape(friction=1.0)), cone_at=0),
+            replace(THREE, cone=replace(THREE.cone, width=0.046, height=0.038)),
             replace(THREE, a=Piece(y=0.19, shape=Shape(width=0.07))),
-            replace(THREE, b=Piece(shape=Shape(height=0.08))),
             replace(THREE, a=Piece(y=0.38)),
             replace(THREE, a=Piece(y=0.10)),
             replace(THREE, a=Piece(x=0.33, y=0.3)),
