@@ -21,10 +21,9 @@ Decisions where the paper (App. B, T30) is silent:
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import Field, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import combinations, pairwise
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -88,7 +87,7 @@ class ShapeStack(Scenario):
     NO_ABLATIONS = "every shape is part of what is asked for: none can be taken away"
 
     count: int = param(4, "", 3, 5)
-    """How many of the pieces there are: the first ones."""
+    """How many there are: the cone, and pieces from the first one on."""
     cone_at: int = param(1, "", 0, 4)
     """In whose place the cone stands."""
     cone: Shape = Shape(kind=FRUSTUM, width=0.042, height=0.041)
@@ -197,7 +196,6 @@ class ShapeStack(Scenario):
     def constraints(self) -> Iterator[Refutation | None]:
         pieces = list(self.pieces.values())
         frustums = sum(piece.shape.kind == FRUSTUM for piece in pieces)
-        yield require(self.cone_at < self.count, "the cone is not among the shapes", cone_at=self.cone_at)
         yield require(frustums == 1, "not exactly one shape is a frustum", frustums=frustums)
         yield require(self.cone.pointed, "the cone has a face to stand on", radius=self.cone.top)
         held = math.atan(max(piece.shape.friction for piece in pieces)) + SLACK
@@ -229,13 +227,11 @@ class ShapeStack(Scenario):
     @cached_property
     def pieces(self) -> dict[str, Piece]:
         """By name: those that there are."""
-        found = {field.name: getattr(self, field.name) for field in self._places[: self.count]}
-        cone = list(found)[min(self.cone_at, self.count - 1)]
-        return found | {cone: replace(found[cone], shape=self.cone)}
-
-    @property
-    def _places(self) -> list[Field[Any]]:
-        return [field for field in fields(self) if isinstance(getattr(self, field.name), Piece)]
+        places = {f.name: getattr(self, f.name) for f in fields(self) if isinstance(getattr(self, f.name), Piece)}
+        cone = list(places)[self.cone_at]
+        others = [name for name in places if name != cone][: self.count - 1]
+        places[cone] = replace(places[cone], shape=self.cone)
+        return {name: piece for name, piece in places.items() if name in (cone, *others)}
 
     @cached_property
     def order(self) -> tuple[str, ...]:

@@ -130,7 +130,6 @@ def test_an_oracle_that_does_not_look_at_the_shapes_is_not_certified():
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     each_refuted_for_its_own_reason(
         [
-            replace(THREE, cone_at=3),
             replace(THREE, a=Piece(y=0.19, shape=THREE.cone)),
             replace(THREE, cone=replace(THREE.cone, height=0.027)),
             replace(THREE, b=Piece(shape=Shape(friction=1.0)), cone_at=0),
