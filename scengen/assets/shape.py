@@ -9,7 +9,7 @@ Two convex bodies touch in one plane. Under the frustum's slope that plane is in
 holds, and any flatter one touches nothing but the tip, on which a flat face balances and does not stand.
 
 They stand on small spheres, their feet: MuJoCo gives two convex geoms one point of contact, and a flat face on one
-point rocks. An inner ring of feet bears what overhangs the face under it.
+point rocks. The ring of feet is so narrow that it bears what overhangs the face under it.
 """
 
 import math
@@ -35,10 +35,10 @@ TIP = 0.0001
 COLLAR = 0.004
 """Least height of the frustum's foot, which is straight, so that a jaw can hold it [m]: a slope slips out of parallel
 pads unless the friction exceeds the tangent of its angle to them."""
-FEET = 6
-"""In the ring under a round shape; under others there is one at each corner."""
-INNER = 0.5
-"""Radius of the inner ring of three or four feet, of the outer one's."""
+FEET = 4
+"""In the ring at most; under a shape with corners there is one to each corner, or to every second one."""
+RING = 0.65
+"""Radius of the ring, of the outline's."""
 BEECH = 700.0
 """Density [kg/m^3]."""
 PAINT: tuple[Rgba, ...] = (
@@ -121,11 +121,8 @@ class Shape(Prop):
             spec.add_mesh(name="hull", uservert=self.corners.ravel().tolist())
             solid(body, "hull", (), type=MESH, **look).meshname = "hull"
         feet = {"type": SPHERE, "friction": self.friction, "mass": 0.0, "condim": 3, "group": 3}
-        rays = self.rays if len(self.rays) <= FEET else self.rays[:: len(self.rays) // FEET]
-        for k, ray in enumerate(rays):
-            solid(body, f"outer_{k}", [FOOT], [*(self.reach - FOOT) * ray, FOOT], **feet)
-        for k, ray in enumerate(rays[:: max(1, len(rays) // 3)]):
-            solid(body, f"inner_{k}", [FOOT], [*INNER * self.reach * ray, FOOT], **feet)
+        for k, ray in enumerate(self.rays[:: math.ceil(len(self.rays) / FEET)]):
+            solid(body, f"foot_{k}", [FOOT], [*RING * self.reach * ray, FOOT], **feet)
 
 
 if __name__ == "__main__":
