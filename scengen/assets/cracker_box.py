@@ -25,7 +25,7 @@ class CrackerBox(Box):
 
     scale: float = param(1.0, "1", 0.75, 1.15)
     """Of all edges."""
-    friction: float = param(0.20, "1", 0.05, 0.60)
+    friction: float = param(0.20, "1", 0.02, 0.60)
     rgba: Rgba = (0.75, 0.16, 0.14, 1.0)
 
     @property

@@ -9,7 +9,7 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.world import Arm
-from .motion import CLOSED, OPEN, STEADY, Pace, hold, retreat, steer
+from .motion import ASKEW, CLOSED, MOST, OPEN, STEADY, Pace, hold, retreat, steer
 
 FIRMLY = 0.15
 """How long the cup must hold on before a piece is lifted [s]."""
@@ -22,6 +22,11 @@ NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
 """Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
 MEMORY = 0.15
 """Time over which the error is averaged [s]; noise on the actions makes the hand tremble by half a millimetre."""
+STAND_OFF, SQUARE, SQUARED = 0.012, math.radians(0.1), 2.0
+"""How far in front of an upright face the hand is squared up [m], how exactly [rad], and for how long at most [s]:
+under noise the mean error may stay above that."""
+ADDING = 2.0
+"""How fast the error of a hand that is to be square adds up [1/s]; at 4 it swings by a degree to either side."""
 
 
 def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
@@ -37,6 +42,42 @@ def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 
         if not arm.sealed:
             sealed, setpoint = arm.world.time, setpoint - speed * Loop.PERIOD * UP
         yield firm(arm, setpoint, -speed * UP * (not arm.sealed), between(arm.hand_rot, rot))
+
+
+def suck_upright(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.02, give_up: float = 6.0) -> Plan:
+    """Take hold of an upright face of a thing that stands free, at `spot` [m], from `STAND_OFF` in front of it.
+
+    What touches it before the lip is closed pushes it along, by 1 to 20 mm: three pads of the cup must meet it within
+    micrometres of each other. So the hand is squared up first, and what its turn lacks adds up until the cup holds.
+    Then it draws back: the ground's friction, which was against the push, would help to peel the cup off in the lift.
+
+    Args:
+        rot: orientation of the hand, which looks at the face.
+
+    Raises:
+        GaveUp: the cup did not get hold of the face within `give_up` [s].
+    """
+    world, along, aim, off, mean = arm.world, rot[:, 2], rot, np.zeros(3), np.full(3, 1.0)
+    before, start = spot - STAND_OFF * along, world.time
+
+    def add_up(aim: Mat3) -> Mat3:
+        turn = between(arm.hand_rot, rot)
+        return rotation(ADDING * Loop.PERIOD * turn) @ aim if turn @ turn < ASKEW**2 else aim
+
+    while math.sqrt(mean @ mean) > SQUARE and world.time - start < SQUARED:
+        mean = mean + Loop.PERIOD / MEMORY * (between(arm.hand_rot, rot) - mean)
+        aim, off = add_up(aim), np.clip(off + ADDING * Loop.PERIOD * (before - arm.hand), -MOST, MOST)
+        yield steer(arm, before + off, np.zeros(3), FIRM_TURN * between(arm.hand_rot, aim), OPEN)
+    setpoint, sealed, end = before + off, world.time, world.time + give_up
+    while world.time - sealed < FIRMLY:
+        if world.time > end:
+            raise GaveUp(f"the cup did not get hold of the face for {give_up:g} s")
+        if not arm.sealed:
+            sealed, setpoint, aim = world.time, setpoint + speed * Loop.PERIOD * along, add_up(aim)
+            yield firm(arm, setpoint, speed * along, between(arm.hand_rot, aim))
+        else:
+            setpoint, aim = arm.hand, arm.hand_rot
+            yield firm(arm, setpoint, -speed * along, np.zeros(3))
 
 
 def let_go(arm: Arm) -> Plan:
@@ -58,7 +99,12 @@ def carry(
     pace: Pace = STEADY,
     slack: float = math.inf,
 ) -> Plan:
-    """Bring a body that hangs on the hand to `target` [m], upright and turned to `yaw` [rad], looking at the body.
+    """As `carry_to`, of a body that hangs upright: it is brought to `target` [m], turned to `yaw` [rad]."""
+    yield from carry_to(arm, body, target, about_z(yaw), pace, slack)
+
+
+def carry_to(arm: Arm, body: str, target: Vec3, rot: Mat3, pace: Pace = STEADY, slack: float = math.inf) -> Plan:
+    """Bring a body that hangs on the hand to `target` [m], turned to `rot`, looking at the body.
 
     The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
     against the weight and the friction of the joints. It waits where it lags on its way by `slack` [m], as something is
@@ -67,12 +113,12 @@ def carry(
     Raises:
         GaveUp: that took too long.
     """
-    end, goal, upright, setpoint = arm.world.time + pace.give_up, np.asarray(target, float), about_z(yaw), arm.hand
-    turned, way, mean = upright @ arm.world.rot(body).T, goal - arm.world.pos(body), np.full(6, 1.0)
+    end, goal, setpoint = arm.world.time + pace.give_up, np.asarray(target, float), arm.hand
+    turned, way, mean = rot @ arm.world.rot(body).T, goal - arm.world.pos(body), np.full(6, 1.0)
     aim, aim_rot = goal + turned @ (arm.hand - arm.world.pos(body)), turned @ arm.hand_rot
     way = way / max(math.sqrt(way @ way), 1e-9)
     while True:
-        left, askew = goal - arm.world.pos(body), between(arm.world.rot(body), upright)
+        left, askew = goal - arm.world.pos(body), between(arm.world.rot(body), rot)
         mean = mean + Loop.PERIOD / MEMORY * (np.concatenate([left, LEVER * askew]) - mean)
         if math.sqrt(mean @ mean) < pace.within:
             return

@@ -12,7 +12,7 @@ from scengen.control import osc
 from scengen.errors import GaveUp
 from scengen.geometry import UP, yaw_of
 from scengen.robots import suction
-from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES
+from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES, TORQUE
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, SUCTION, World
 from scengen.skills.jaw import release
@@ -88,6 +88,11 @@ def test_a_weight_beside_the_cup_peels_it_off_where_the_pressure_at_the_lip_vani
     """The law of the core of a section: (pull - weight) / n = weight * beside * lip / (n * mean square of the lip)."""
     peels = PULL / (1 + beside * LIP.max() / np.mean(LIP**2))
     assert hangs(factor * peels, beside) == held
+
+
+def test_the_torque_that_peels_it_off_is_that_law_for_a_weight_far_beside_the_cup():
+    far = 1000.0
+    assert pytest.approx(far * PULL / (1 + far * LIP.max() / np.mean(LIP**2)), rel=1e-4) == TORQUE
 
 
 def test_switched_off_it_does_not_stick():

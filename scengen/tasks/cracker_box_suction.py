@@ -1,0 +1,336 @@
+"""T08 cracker-box-suction: lay a cracker box that stands upright flat into a slot, with a suction cup.
+
+         ____
+        |    |                                 The slot has the outline of the box' broad face, the one that is seen
+        |    |              |            |     here, and four fifths of its thickness as its depth. From the side:
+        |    |              |            |     the box stands on its smallest face, and has to lie in the slot.
+    ----+----+--------------+------------+----
+
+Bottleneck: which face. Taken by its top the box goes in upright, or hangs beside a level hand, which meets the slot's
+walls before the box is down. Only a cup on the broad face is above the box once it lies. That face is upright at the
+start: the hand has to come level and square, else the lip does not close and the box is pushed along; and friction
+alone carries the box until it has been turned flat.
+
+Decisions, where the paper (App. B, T08) says no more than "a horizontal slot fixture" and "its centroid aligned":
+
+* The slot is a pocket with the outline of the broad face, in which the box lies flat: only then is the broad face the
+  right one, and the descent "uniform". A lip on a side face ends 30 mm or more under the upper edge. So does the slot's
+  wall stop a cup there while the box has 1 to 2 cm left to fall.
+* A box of which a corner goes down faster than 0.35 m/s, as one that falls from 6 mm, has broken its crackers, and the
+  episode is lost: neither knocking it over nor letting it drop is a way. No hand lowers anything faster than 0.3 m/s.
+* One arm, as in the catalogue (App. B.1); the text has a second one, which is frozen.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from ..assets.bin import Bin
+from ..assets.cracker_box import CrackerBox
+from ..assets.prop import TABLE_TOP, place, table
+from ..errors import GaveUp
+from ..geometry import UP, Mat3, Outline, Vec3, corners, gap, shortest
+from ..params import param
+from ..predicates import fallen, rests_on
+from ..robots.suction import PULL, REACHES, TORQUE
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.world import Arm, World
+from ..skills.jaw import poke
+from ..skills.motion import (
+    CLOSED,
+    OPEN,
+    STEADY,
+    Pace,
+    facing,
+    go_to,
+    push,
+    retreat,
+    turn_to,
+    until,
+)
+from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
+
+FLAT = math.radians(3.0)
+"""Largest angle between the box' thin axis and the vertical [rad]."""
+OFF, HIGH = 0.006, 0.003
+"""Largest distances of the box' middle from where it would be in the middle of the slot, level and upright [m]."""
+BREAKS = 0.35
+"""Speed of a corner on its way down that the crackers do not survive [m/s]."""
+RIM = 0.8
+"""Depth of the slot by the thickness of the box."""
+AT = 0.6
+"""Where the cup takes the box, by its height: so high that links 6 and 7, which reach 47 mm below the middle of a level
+cup, pass over the slot; so low that the box slides along. It tips where friction > thickness / (2 height), 0.28."""
+STEADILY = 0.9
+"""Share of the friction at which it would tip that a box may have."""
+GRIPS = 1.4
+"""How many times its weight the friction of a box that is carried by a side must hold: at 1.2 half of them slip off."""
+PEELS = 1.5
+"""How many times its torque about the face the cup must hold: at 1.4 most boxes are peeled off by the lift."""
+TURNING = 1.2
+"""How fast an empty hand turns [rad/s]."""
+GENTLY, LIFTING = Pace(0.05, 0.005), Pace(0.15, 0.01)
+"""How the box is lifted off the table, where a jerk peels it off the cup; how it is lifted further."""
+TIPPING = 0.8
+"""How fast the box is turned flat [rad/s]."""
+OVER = 0.02
+"""How far over the slot's walls the box is brought [m]."""
+AIMING, LOWERING, SLACK = Pace(0.05, 0.001), Pace(0.06, 0.0, 4.0), 0.002
+"""To that place; how it is lowered; by how much the hand may lag where something is in the way [m]."""
+MISFIT = 5.0
+"""Angle from which on a box that is not turned stays on the slot's walls [deg]: 2 deg take up all clearance."""
+SHORT, SLIPPERY = 0.02, 0.02
+"""By how much a slot is too short [m]; friction at which every box slips off: the cup holds 0.8 N."""
+APART, KNOCKED = 0.01, math.radians(25.0)
+"""Least distance of box and slot [m]; tilt at which a box that is pushed tips over by itself, as 18 deg are enough:
+tan = thickness / height [rad]."""
+DOWN, UNDER = 0.0015, 0.003
+"""Height over the slot's floor at which the box is let go, and how far below it its way ends [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrackerBoxSuction(Scenario):
+    """A box of crackers that stands on the table, and a slot."""
+
+    HOLD = 0.5
+
+    box_x: float = param(-0.13, "m", -0.4, 0.4)
+    box_y: float = param(0.13, "m", -0.4, 0.4)
+    box_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
+    """At 0 the broad faces look along y."""
+    slot_x: float = param(0.08, "m", -0.4, 0.4)
+    slot_y: float = param(-0.06, "m", -0.4, 0.4)
+    slot_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
+    """At 0 the slot's long side is along y."""
+    clearance: float = param(0.004, "m", 0.0005, 0.02)
+    """Between the box in the middle of the slot and each wall."""
+    box: CrackerBox = CrackerBox(friction=0.21)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        return self._scene(self.box, self.slot)
+
+    def _scene(self, box: CrackerBox, slot: Bin) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, slot, "slot", self.foot, math.radians(self.slot_yaw), free=False)
+        place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        off = world.rot("slot").T @ (world.com("box") - self.seat)
+        flat = abs(world.rot("box")[2, 0]) > math.cos(FLAT)
+        aligned = math.hypot(off[0], off[1]) < OFF and abs(off[2]) < HIGH
+        return flat and aligned and rests_on(world, "box", "slot")
+
+    def failure(self, world: World) -> str | None:
+        if fallen(world, "box"):
+            return "the box fell off the table"
+        return "the box was dropped" if self.sinking(world) > BREAKS else None
+
+    def sinking(self, world: World) -> float:
+        """Speed of the box' fastest corner on its way down [m/s]."""
+        velocity, rot = world.velocity("box"), world.rot("box")
+        turning = velocity[0] * rot[1] - velocity[1] * rot[0]  # z of the turn's velocity at the tip of each axis
+        return float(np.abs(turning) @ self.box.size / 2 - velocity[5])
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Take the box by its broad face, turn it flat, bring it over the slot, lower it evenly, let go."""
+        arm = world.arm
+        yield from self.take(arm)
+        yield from self.tip(arm)
+        yield from self.bring(arm, self.laid(world))
+        yield from self.lower(arm, self.laid(world))
+        yield from let_go(arm)
+
+    def take(self, arm: Arm) -> Plan:
+        """Bring the cup, level, in front of the broad face that looks at the robot's middle; take hold, and lift."""
+        face, out = self.broad_face(arm.world)
+        level = facing(math.atan2(out[1], out[0]), 0.0)
+        yield from turn_to(arm, level, TURNING, grip=OPEN)  # up here: a hand that turns fast swings out by 15 cm
+        yield from go_to(arm, face - 5 * STAND_OFF * out, level, Pace(0.25, 0.02), OPEN)
+        yield from suck_upright(arm, face, level)
+        yield from retreat(arm, 0.02, GENTLY)
+        yield from retreat(arm, self.slot.depth + self.box.size[2] / 2, LIFTING)
+
+    def broad_face(self, world: World) -> tuple[Vec3, Vec3]:
+        """Where the cup takes the box [m], and the direction in which the hand looks then."""
+        thickness, _, height = self.box.size
+        thin = world.rot("box")[:, 0]
+        out = math.copysign(1.0, float(thin[1] * world.pos("box")[1])) * thin
+        return world.pos("box") + AT * height * UP - thickness / 2 * out, out
+
+    def tip(self, arm: Arm) -> Plan:
+        """Turn the level hand down, and the box with it."""
+        yield from turn_to(arm, axes(arm.hand_rot[:, 0], -UP), TIPPING)
+
+    def bring(self, arm: Arm, rot: Mat3, over: float = OVER) -> Plan:
+        """Bring the box over the slot, `over` its walls [m], turned to `rot`."""
+        for pace in (STEADY, AIMING):
+            yield from carry_to(arm, "box", self.origin(rot, self.slot.depth + over), rot, pace)
+
+    def lower(self, arm: Arm, rot: Mat3) -> Plan:
+        """Lower the box, turned to `rot`, until it lies on the slot's floor."""
+        down = carry_to(arm, "box", self.origin(rot, -UNDER), rot, LOWERING, SLACK)
+        yield from until(down, lambda: arm.world.com("box")[2] - self.seat[2] < DOWN)
+
+    def laid(self, world: World) -> Mat3:
+        """How the box lies in the slot, turned the least from how it is now."""
+        now, along = world.rot("box"), world.rot("slot")[:, 1]
+        tall = math.copysign(1.0, float(now[:, 2] @ along)) * along
+        return axes(math.copysign(1.0, now[2, 0]) * UP, tall)
+
+    def origin(self, rot: Mat3, above: float) -> Vec3:
+        """Where the box' origin is when its middle is over the middle of the slot, `above` its seat [m]."""
+        return self.seat + above * UP - self.box.size[2] / 2 * rot[:, 2]
+
+    # --- shortcuts and ablations ------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        """Not turning it is tempting, and wrong, where the slot is turned from how the box comes."""
+        return {
+            "upright_into_the_slot": Shortcut(self._upright),
+            "flat_by_the_top": Shortcut(self._by_the_top),
+            "knock_it_over": Shortcut(self._knock_over),
+            "let_it_drop": Shortcut(self._let_drop),
+            **({"as_it_comes": Shortcut(self._as_it_comes)} if self.misfit > MISFIT else {}),
+        }
+
+    def _take_top(self, arm: Arm, beside: float = 0.0) -> Plan:
+        """Take the box by its top, so far behind the middle [m], and lift it over the slot's walls."""
+        world = arm.world
+        _, out = self.broad_face(world)
+        top = world.pos("box") + self.box.size[2] * UP + beside * out
+        down = axes(facing(math.atan2(out[1], out[0]), 0.0)[:, 0], -UP)
+        yield from go_to(arm, top + 0.03 * UP, down, STEADY, OPEN)
+        yield from suck(arm, top, down, 0.04)
+        yield from retreat(arm, self.slot.depth + 2 * OVER, LIFTING)
+
+    def _upright(self, world: World) -> Plan:
+        """Take the box by its top, and put it into the slot as it stands."""
+        arm, along = world.arm, world.rot("slot")[:, 1]
+        yield from self._take_top(arm)
+        thin = math.copysign(1.0, float(world.rot("box")[:, 0] @ along)) * along
+        above = self.foot + (self.slot.floor + self.slot.depth + OVER) * UP
+        yield from carry_to(arm, "box", above, axes(thin, UP), STEADY)
+        yield from push(arm, -0.05 * UP, lambda: world.touching("box", "slot"), CLOSED, give_up=5.0)
+        yield from let_go(arm)
+
+    def _by_the_top(self, world: World) -> Plan:
+        """Take the box by its top, turn the hand level, lower the box until something stops the hand, let go."""
+        arm = world.arm
+        yield from self._take_top(arm, self.box.size[0] / 2 - REACHES)
+        yield from retreat(arm, self.box.size[2] / 2, LIFTING)
+        yield from turn_to(arm, axes(arm.hand_rot[:, 0], self.broad_face(world)[1]), TIPPING)
+        with suppress(GaveUp):
+            yield from self.bring(arm, self.laid(world))
+            yield from self.lower(arm, self.laid(world))
+        yield from let_go(arm)
+
+    def _knock_over(self, world: World) -> Plan:
+        """Push the box at its top."""
+        face, out = self.broad_face(world)
+        high = world.pos("box")[2] + 0.9 * self.box.size[2]
+        start = np.array([*(face - (REACHES + 0.03) * out)[:2], high])
+        yield from poke(world.arm, start, 0.15 * out, lambda: world.tilt("box") > KNOCKED)
+
+    def _let_drop(self, world: World) -> Plan:
+        """As the oracle, but let the box fall into the slot."""
+        yield from self.take(world.arm)
+        yield from self.tip(world.arm)
+        yield from self.bring(world.arm, self.laid(world))
+        yield from let_go(world.arm)
+
+    def _as_it_comes(self, world: World) -> Plan:
+        """As the oracle, but without turning the box to lie as the slot does."""
+        arm = world.arm
+        yield from self.take(arm)
+        yield from self.tip(arm)
+        flat = shortest(math.copysign(1.0, world.rot("box")[2, 0]) * world.rot("box")[:, 0], UP) @ world.rot("box")
+        with suppress(GaveUp):
+            yield from self.bring(arm, flat)
+            yield from self.lower(arm, flat)
+        yield from let_go(arm)
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        """A slot that is too short; a face so slippery that the cup cannot carry the box by it."""
+        short, slippery = replace(self.slot, length=self.slot.length - SHORT), replace(self.box, friction=SLIPPERY)
+        return {"short_slot": self._scene(self.box, short), "slippery_box": self._scene(slippery, self.slot)}
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        yield on_table("the box", self._footprint)
+        yield on_table("the slot", self._outline)
+        apart, high = gap(self._footprint, self._outline), AT * self.box.size[2]
+        yield require(apart > APART, "the box stands in the slot's place", apart=apart)
+        steady, friction = STEADILY * self.box.size[0] / (2 * high), self.box.friction
+        yield require(friction < steady, "the box tips when the cup is pressed on", friction=friction, most=steady)
+        grip, weight = self.box.friction * PULL, 9.81 * self.box.mass
+        yield require(grip > GRIPS * weight, "the box slips off a cup on its side", grip=grip, weight=weight)
+        torque = weight * self.box.size[0] / 2
+        yield require(TORQUE > PEELS * torque, "the box peels a cup off its side", torque=torque, most=TORQUE)
+        yield within_reach("the box", self.start + high * UP)
+        yield within_reach("the slot", self.seat + (self.slot.depth + OVER + self.box.size[0] / 2) * UP)
+
+    def features(self) -> Mapping[str, float]:
+        """What the cup carries over what it could, how readily the box tips, its size, room in the slot, turn, way."""
+        return {
+            "weight_on_friction": 9.81 * self.box.mass / (self.box.friction * PULL),
+            "tipping": self.box.friction * self.box.size[2] / self.box.size[0],
+            "size": self.box.scale,
+            "room": self.clearance / self.box.size[2],
+            "turn": math.radians(self.misfit),
+            "azimuth": math.radians(self.box_yaw + math.copysign(90.0, self.box_y)),
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @cached_property
+    def slot(self) -> Bin:
+        """The slot, made to measure."""
+        thickness, width, height = self.box.size
+        air = 2 * self.clearance
+        return Bin(width=width + air, length=height + air, depth=RIM * thickness)
+
+    @property
+    def start(self) -> Vec3:
+        """Where the box stands [m]."""
+        return np.array([self.box_x, self.box_y, TABLE_TOP])
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the slot stands [m]."""
+        return np.array([self.slot_x, self.slot_y, TABLE_TOP])
+
+    @cached_property
+    def seat(self) -> Vec3:
+        """The middle of a box that lies in the middle of the slot [m]."""
+        return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
+
+    @property
+    def misfit(self) -> float:
+        """Angle between the long side of a box that is turned down as it comes, and that of the slot [deg]."""
+        return abs(math.remainder(self.slot_yaw - self.box_yaw, 180.0))
+
+    @property
+    def _footprint(self) -> Outline:
+        return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
+
+    @property
+    def _outline(self) -> Outline:
+        return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)
+
+
+def axes(x: Vec3, z: Vec3) -> Mat3:
+    """The orientation of what has these two directions, at right angles, as its first and its last axis."""
+    return np.stack([x, np.cross(z, x), z], axis=1)
