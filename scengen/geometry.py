@@ -70,6 +70,11 @@ def shortest(here: Vec3, there: Vec3) -> Mat3:
     return np.eye(3) + k + k @ k / (1.0 + c)
 
 
+def axes(x: Vec3, z: Vec3) -> Mat3:
+    """The orientation of what has these two unit vectors, at right angles, as its first and its last axis."""
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
 def yaw_of(rot: Mat3) -> float:
     """Direction of a body's x axis, seen from above [rad]."""
     return math.atan2(rot[1, 0], rot[0, 0])

@@ -48,6 +48,18 @@ def inside(world: World, body: str, container: str, low: Vec3, high: Vec3) -> bo
     return bool(np.all(place >= low) and np.all(place <= high))
 
 
+def seated(world: World, body: str, container: str, middle: Vec3, off: float, high: float) -> bool:
+    """Whether a body rests on `container` alone, its centre of mass near a place.
+
+    Args:
+        middle: the place [m].
+        off: how far from there it may be along the table [m].
+        high: how far above or below [m].
+    """
+    away = world.com(body) - middle
+    return math.hypot(away[0], away[1]) < off and abs(away[2]) < high and rests_on(world, body, container)
+
+
 def over(world: World, body: str, spot: Vec3, half: float) -> bool:
     """Whether a body's centre of mass is over a square along x and y, given by its middle and half a side [m]."""
     return bool(np.abs(world.com(body) - spot)[:2].max() <= half)

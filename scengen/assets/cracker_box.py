@@ -6,6 +6,7 @@ import numpy as np
 
 from ..geometry import Vec3
 from ..params import param
+from .bin import Bin
 from .box import Box
 from .prop import Rgba, show
 
@@ -36,6 +37,19 @@ class CrackerBox(Box):
     @property
     def size(self) -> Vec3:
         return self.scale * np.array(EDGES)
+
+
+RIM = 0.8
+"""Depth of the slot that a box lies in, by the thickness of the box."""
+
+
+def slot_for(box: CrackerBox, clearance: float) -> Bin:
+    """A slot in which a box lies on its broad face, long side along y, with `clearance` to every wall [m].
+
+    The paper says "a horizontal slot fixture" (App. B, T08) with a "tight slot outline" (T09), and gives no numbers.
+    """
+    thickness, width, height = box.size
+    return Bin(width=width + 2 * clearance, length=height + 2 * clearance, depth=RIM * thickness)
 
 
 if __name__ == "__main__":

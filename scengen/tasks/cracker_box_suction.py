@@ -31,12 +31,12 @@ import mujoco
 import numpy as np
 
 from ..assets.bin import Bin
-from ..assets.cracker_box import CrackerBox
+from ..assets.cracker_box import CrackerBox, slot_for
 from ..assets.prop import TABLE_TOP, place, table
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, corners, gap, shortest
+from ..geometry import UP, Mat3, Outline, Vec3, axes, corners, gap, shortest
 from ..params import param
-from ..predicates import fallen, rests_on
+from ..predicates import fallen, seated
 from ..robots.suction import PULL, REACHES, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
@@ -58,11 +58,9 @@ from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
 FLAT = math.radians(3.0)
 """Largest angle between the box' thin axis and the vertical [rad]."""
 OFF, HIGH = 0.006, 0.003
-"""Largest distances of the box' middle from where it would be in the middle of the slot, level and upright [m]."""
+"""Largest distances of the box' middle from its seat, along the table and upright [m]."""
 BREAKS = 0.35
 """Speed of a corner on its way down that the crackers do not survive [m/s]."""
-RIM = 0.8
-"""Depth of the slot by the thickness of the box."""
 AT = 0.6
 """Where the cup takes the box, by its height: so high that links 6 and 7, which reach 47 mm below the middle of a level
 cup, pass over the slot; so low that the box slides along. It tips where friction > thickness / (2 height), 0.28."""
@@ -125,10 +123,8 @@ class CrackerBoxSuction(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        off = world.rot("slot").T @ (world.com("box") - self.seat)
         flat = abs(world.rot("box")[2, 0]) > math.cos(FLAT)
-        aligned = math.hypot(off[0], off[1]) < OFF and abs(off[2]) < HIGH
-        return flat and aligned and rests_on(world, "box", "slot")
+        return flat and seated(world, "box", "slot", self.seat, OFF, HIGH)
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "box"):
@@ -298,9 +294,7 @@ class CrackerBoxSuction(Scenario):
     @cached_property
     def slot(self) -> Bin:
         """The slot, made to measure."""
-        thickness, width, height = self.box.size
-        air = 2 * self.clearance
-        return Bin(width=width + air, length=height + air, depth=RIM * thickness)
+        return slot_for(self.box, self.clearance)
 
     @property
     def start(self) -> Vec3:
@@ -329,8 +323,3 @@ class CrackerBoxSuction(Scenario):
     @property
     def _outline(self) -> Outline:
         return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)
-
-
-def axes(x: Vec3, z: Vec3) -> Mat3:
-    """The orientation of what has these two directions, at right angles, as its first and its last axis."""
-    return np.stack([x, np.cross(z, x), z], axis=1)

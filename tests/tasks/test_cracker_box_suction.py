@@ -21,11 +21,11 @@ from helpers import anywhere
 from hypothesis import given, settings
 
 from scengen import config
-from scengen.geometry import UP, about_z
+from scengen.geometry import UP, about_z, axes
 from scengen.params import values, with_values
 from scengen.robots import suction
 from scengen.robots.suction import REACHES, TORQUE
-from scengen.tasks.cracker_box_suction import BREAKS, FLAT, HIGH, OFF, CrackerBoxSuction, axes
+from scengen.tasks.cracker_box_suction import BREAKS, FLAT, HIGH, OFF, CrackerBoxSuction
 
 TASK = config.task("cracker_box_suction")
 NOMINAL = CrackerBoxSuction()
