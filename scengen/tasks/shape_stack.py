@@ -184,12 +184,13 @@ class ShapeStack(Scenario):
     def answer(self) -> Answer:
         """Which shape comes last, by its place. One try: what is put on the cone topples."""
 
+        names = list(self.pieces)
+
         def last(world: World, number: float) -> Plan:
-            names = list(self.pieces)
-            top = names[min(round(number), self.count - 1)]
+            top = names[round(number)]
             yield from self.pile(world, [*(name for name in self.order if name != top), top])
 
-        return Answer((0.0, 1.0, 2.0), last, lambda number: round(number) == self.cone_at, tries=1)
+        return Answer((0.0, 1.0, 2.0), last, lambda number: names[round(number)] == self.order[-1], tries=1)
 
     # --- constraints ------------------------------------------------------------------------
 
@@ -226,12 +227,12 @@ class ShapeStack(Scenario):
 
     @cached_property
     def pieces(self) -> dict[str, Piece]:
-        """By name: those that there are."""
-        places = {f.name: getattr(self, f.name) for f in fields(self) if isinstance(getattr(self, f.name), Piece)}
-        cone = list(places)[self.cone_at]
-        others = [name for name in places if name != cone][: self.count - 1]
-        places[cone] = replace(places[cone], shape=self.cone)
-        return {name: piece for name, piece in places.items() if name in (cone, *others)}
+        """Those that there are, by names that say nothing about shapes or places."""
+        places = [piece for field in fields(self) if isinstance(piece := getattr(self, field.name), Piece)]
+        cone = places.pop(self.cone_at)
+        found = places[: self.count - 1]
+        found.insert(self.cone_at, replace(cone, shape=self.cone))
+        return {f"shape_{k}": piece for k, piece in enumerate(found)}
 
     @cached_property
     def order(self) -> tuple[str, ...]:
