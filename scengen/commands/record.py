@@ -1,8 +1,5 @@
-"""write witnesses as a LeRobot data set, with proprioception, forces, touch and videos"""
+"""write witnesses as a LeRobot data set or for robomimic, with proprioception, forces, touch and pictures"""
 
-from functools import partial
-
-from .. import config
 from ..config import read, search_path
 from ..export.recording import Settings, record
 from ..pool import Pool
@@ -14,12 +11,12 @@ def command(arguments: Arguments) -> int:
     settings = read("record", arguments, Settings)
     with ProgressBar(err, f"record to {settings.to}", 0) as progress_bar:
         try:
-            summary = record(settings, partial(config.task, search=search_path(arguments)), progress_bar.of)
+            summary = record(settings, progress_bar.of, search_path(arguments))
         except KeyboardInterrupt:
             warn("scengen: interrupted; nothing was written")
             return INTERRUPTED
     say(
-        f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.fps} a second, "
+        f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} a second, "
         f"{len(settings.eyes)} cameras to {settings.to}"
     )
     called = names(map(Pool.open, settings.folders)) if summary.failed or summary.lost else {}

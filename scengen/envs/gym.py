@@ -6,7 +6,6 @@ speaks of. Nothing is sampled at reset: the seed chooses among the stored scenar
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -18,17 +17,17 @@ from .. import config
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
-from ..errors import BadConfig, PoolError, UnknownName, cut
+from ..errors import BadConfig, UnknownName, cut
 from ..names import find
 from ..params import Value
 from ..pictures.render import Camera
-from ..pool import Pool, PoolRow
+from ..pool import PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size, hands
-from ..validate.identity import check_versions
 from .object_state import ObjectState, bodies_of
 from .observations import Reading, cameras_of, check_names, privileged, proprioception, streams_of
+from .pools import Folders, chosen, rows_of
 
 Observation = dict[str, Reading]
 
@@ -57,7 +56,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         task: str,
-        pool: str | Path | Sequence[str | Path] | None = None,
+        pool: Folders | None = None,
         observations: Sequence[str] | None = None,
         render_mode: str | None = None,
         width: int = 256,
@@ -103,8 +102,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise BadConfig(f"action_repeat = {cut(repr(action_repeat))}; {told}")
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.task: Task = config.task(task, search)
-        rows = [row for folder in _folders(pool) for row in _scenarios(folder, task)]
-        self._rows = {row.id: row for row in _chosen(rows, scenario, split)}
+        rows = rows_of(pool, task)
+        self._rows = {row.id: row for row in chosen(rows, scenario, split)}
         robot = self.task.embodiment
         if observations is None:
             observations = proprioception(robot)
@@ -274,42 +273,6 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
 MOST_REPEATED = 100
 """Control periods of one second: an arm that gets an action less often is hardly controlled."""
-
-
-def _folders(pool: str | Path | Sequence[str | Path] | None) -> list[str | Path]:
-    folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
-    if not folders:
-        raise PoolError("no pool was named; say pool=FOLDER, or a list of them; scengen generate makes pools")
-    return folders
-
-
-def _chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None) -> list[PoolRow]:
-    """The scenarios of a split, and of these the one of that name.
-
-    Raises:
-        UnknownName: there is none.
-        BadConfig: several ids begin so.
-    """
-    if split is not None:
-        if split not in (known := {row.split for row in rows}):
-            raise UnknownName("split in these pools", split, known)
-        rows = [row for row in rows if row.split == split]
-    if scenario is None:
-        return list(rows)
-    found = {row.id: row for row in rows}
-    return [found[find(scenario, (row.name for row in found.values()), "these pools").id]]
-
-
-def _scenarios(folder: str | Path, task: str) -> list[PoolRow]:
-    """The rows of a pool without witnesses."""
-    pool = Pool.open(folder).check()
-    check_versions(pool.versions, str(folder))
-    rows = list(pool.rows(witness=False))
-    if not rows:
-        raise PoolError(f"{folder} holds no scenario; see scengen generate")
-    if others := {row.task for row in rows} - {task}:
-        raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
-    return rows
 
 
 def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:

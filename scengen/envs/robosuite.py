@@ -7,9 +7,9 @@ robosuite composes the model, its controller moves the robot, its clock steps th
 the scene, the suction cup, the events of the scene, and the verdict, which is the one of certification.
 """
 
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 import mujoco
@@ -22,13 +22,14 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
-from ..pool import Pool, PoolRow
+from ..pool import PoolRow
 from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, hands
 from ..validate.identity import check_versions
 from .object_state import ObjectState, bodies_of
 from .observations import turns_pictures
+from .pools import Folders, chosen, rows_of
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
 # isort: split
@@ -82,7 +83,7 @@ class RobosuiteEnv(ManipulationEnv):
         self,
         robots: str | Sequence[str] | None = None,
         scenario: PoolRow | str | None = None,
-        pool: str | Path | None = None,
+        pool: Folders | None = None,
         use_object_obs: bool = True,
         gripper_types: str | Sequence[str] = "default",
         control_freq: int = 100,
@@ -97,8 +98,8 @@ class RobosuiteEnv(ManipulationEnv):
         Args:
             robots: "Panda", or a list of two where the task has two arms; default: what the task asks for.
             scenario: a row of a pool, or with `pool` what `Pool.row` takes: a name, an id, or how one begins. Without
-                it, every hard reset draws one from the pool, decided by robosuite's `seed`.
-            pool: folder of a pool.
+                it, every hard reset draws one from the pools, decided by robosuite's `seed`.
+            pool: folder of a pool, or several.
             use_object_obs: also observe `object-state` and every reading in it, such as `<body>_pos` [m]
                 (`scengen.envs.object_state`); and `seen_<body>_pos` [m], if the family turns pictures.
             gripper_types: "default" is the hand of each arm that the task asks for; no others are accepted.
@@ -175,10 +176,22 @@ class RobosuiteEnv(ManipulationEnv):
         self.scenario = self.task.scenario(self.row.params)
         for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
             self.scenario.orientation.check_size(width, height)
+        self.model = self._composed(self.row)
+
+    def _composed(self, row: PoolRow) -> SceneTask:
+        """A scene with the robots that have been loaded."""
         robots = [robot.robot_model for robot in self.robots]
         for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
             robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
-        self.model = SceneTask(SceneModel(self.row.scene_xml), robots)
+        return SceneTask(SceneModel(row.scene_xml), robots)
+
+    def model_text(self, row: PoolRow) -> str:
+        """The MJCF that robosuite composes of a scenario, as demonstrations keep it.
+
+        Paths of meshes begin at robosuite's own folder, from where `edit_model_xml` finds them on any machine.
+        """
+        text = self._composed(row).get_xml()
+        return re.sub(r'file="[^"]*?(robosuite/models/[^"]*)"', r'file="\1"', text)
 
     def _initialize_sim(self, xml_string: str | None = None) -> None:
         super()._initialize_sim(xml_string)
@@ -316,26 +329,21 @@ def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 
 
-def _choice(task: str, scenario: PoolRow | str | None, pool: str | Path | None) -> list[PoolRow]:
-    """The scenarios to draw from: one row, the one of a pool whose id begins with a text, or the whole pool.
+def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> list[PoolRow]:
+    """The scenarios to draw from: one row, the one of some pools whose id begins with a text, or all of them.
 
     Raises:
         ScengenError: there is none, or one of another task or made with other versions.
     """
     if isinstance(scenario, PoolRow) and pool is None:
-        rows, where, made = [scenario], f"scenario {scenario.name}", scenario.certificate.versions
-    elif pool is not None and not isinstance(scenario, PoolRow):
-        found = Pool.open(pool).check()
-        rows = list(found.rows(witness=False)) if scenario is None else [found.row(scenario)]
-        where, made = str(found.folder), found.versions
-    else:
+        where = f"scenario {scenario.name}"
+        check_versions(scenario.certificate.versions, where)
+        if scenario.task != task:
+            raise PoolError(f"{where} belongs to {scenario.task}, not to {task}")
+        return [scenario]
+    if pool is None or isinstance(scenario, PoolRow):
         raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
-    check_versions(made, where)
-    if others := {row.task for row in rows} - {task}:
-        raise PoolError(f"{where} belongs to {', '.join(sorted(others))}, not to {task}")
-    if not rows:
-        raise PoolError(f"{where} holds no scenario; see scengen generate")
-    return rows
+    return chosen(rows_of(pool, task), scenario)
 
 
 for _name in config.tasks():

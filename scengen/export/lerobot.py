@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pyarrow as pa
@@ -48,6 +48,8 @@ class Feature:
 
     dtype: str
     shape: tuple[int, ...] = ()
+    names: tuple[str, ...] | None = None
+    """What each entry of a vector is; of a grid, what its axes are."""
 
     def arrow(self) -> pa.DataType:
         """The type that Hugging Face's `datasets` expects: lists of known length, and plain lists for grids."""
@@ -63,9 +65,9 @@ class Feature:
             return {"feature": value, "length": self.shape[0], "_type": "Sequence"}
         return {"shape": list(self.shape), "dtype": self.dtype, "_type": "Array2D"} if self.shape else value
 
-    def info(self, name: str) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """The same in the words of LeRobot, which calls a number a list of one."""
-        names = [f"{name}.{i}" for i in range(self.shape[0])] if len(self.shape) == 1 else None
+        names = None if self.names is None else list(self.names)
         return {"dtype": self.dtype, "shape": list(self.shape or (1,)), "names": names}
 
 
@@ -100,7 +102,7 @@ class DataSet:
         """
         self.folder, self.fps, self.robot = folder, fps, robot
         self.features = {**features, **OWN}
-        self.rows, self.episodes, self.tasks = 0, list[dict[str, Any]](), dict[str, int]()
+        self.rows, self.tasks, self._table = 0, dict[str, int](), list[dict[str, Any]]()
         self._videos = {f"{IMAGES}{name}": _Video(folder, f"{IMAGES}{name}", fps, size) for name in cameras}
         self._size = size
         self._cameras: dict[str, dict[str, Any]] = {}
@@ -110,6 +112,11 @@ class DataSet:
             [(name, f.arrow()) for name, f in self.features.items()], metadata={"huggingface": json.dumps(info)}
         )
         self._file, self._writer = 0, None
+
+    @property
+    def episodes(self) -> int:
+        """How many were written so far."""
+        return len(self._table)
 
     def calibrate(self, camera: str, calibration: dict[str, Any], scenario: str) -> None:
         """Say how a camera stands in the next episode, and how its pictures are turned.
@@ -125,7 +132,7 @@ class DataSet:
     def add(self, values: Mapping[str, Any], pictures: Mapping[str, Picture]) -> None:
         """Append a row to the present episode."""
         frame = len(self._columns["index"])
-        own = (np.float32(frame / self.fps), frame, len(self.episodes), self.rows + frame)
+        own = (np.float32(frame / self.fps), frame, self.episodes, self.rows + frame)
         for name, value in {**values, **dict(zip(OWN, own, strict=False))}.items():
             self._columns[name].append(value)
         for name, picture in pictures.items():
@@ -140,7 +147,7 @@ class DataSet:
         self._columns.clear()
         stats = {name: describe(column) for name, column in columns.items()}
         row = {
-            "episode_index": len(self.episodes),
+            "episode_index": self.episodes,
             "tasks": [instruction],
             "length": length,
             **_whereabouts("data", self._file),
@@ -154,30 +161,28 @@ class DataSet:
             stats[name] = video.shades.describe()
             row |= video.end_episode()
         row |= {f"stats/{name}/{kind}": value for name, found in stats.items() for kind, value in found.items()}
-        self.episodes.append(row)
+        self._table.append(row)
         self.rows += length
 
-    def finish(self) -> None:
-        """Write everything under meta."""
+    def finish(self, source: Mapping[str, Any]) -> None:
+        """Write everything under meta. `source`: where the data came from."""
         self._close()
         path = EPISODES.format(chunk_index=0, file_index=0)
-        _write_table(self.folder / path, pa.Table.from_pylist(self.episodes))
+        _write_table(self.folder / path, pa.Table.from_pylist(self._table))
         _write_table(self.folder / "meta" / "tasks.parquet", _task_table(self.tasks))
         for name, calibration in self._cameras.items():
             _write_json(self.folder / "meta" / "cameras" / f"{name}.json", calibration)
         _write_json(self.folder / "meta" / "stats.json", self._stats())
         _write_json(self.folder / "meta" / "info.json", self._info())
+        _write_json(self.folder / "meta" / "scengen.json", source)
 
-    def __enter__(self) -> "DataSet":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
-            self.finish()
-        else:
-            self._close()
+        self._close()
 
     def _write(self, columns: Mapping[str, np.ndarray]) -> None:
         path = self.folder / DATA.format(**_numbers(self._file))
@@ -208,17 +213,17 @@ class DataSet:
         return {
             "codebase_version": VERSION,
             "robot_type": self.robot,
-            "total_episodes": len(self.episodes),
+            "total_episodes": self.episodes,
             "total_frames": self.rows,
             "total_tasks": len(self.tasks),
             "chunks_size": FILES,
             "data_files_size_in_mb": DATA_SIZE,
             "video_files_size_in_mb": VIDEO_SIZE,
             "fps": self.fps,
-            "splits": {"train": f"0:{len(self.episodes)}"},
+            "splits": {"train": f"0:{self.episodes}"},
             "data_path": DATA,
             "video_path": VIDEO if self._videos else None,
-            "features": {name: f.info(name) for name, f in self.features.items()}
+            "features": {name: f.info() for name, f in self.features.items()}
             | {name: self._video_info() for name in self._videos},
         }
 

@@ -1,8 +1,7 @@
 """Replay a witness and yield dataset rows."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,34 +16,33 @@ from ..sim.world import World
 
 
 @dataclass(frozen=True)
-class Moment:
-    """One row: what is seen, then what is done until the next row."""
+class View:
+    """What is seen at one moment."""
 
     streams: Mapping[str, NDArray[np.float32]]
     pictures: Mapping[str, Picture]
+    physics: NDArray[np.float64]
+    """Time, `qpos` and `qvel`, one after the other: what robosuite calls a flattened state."""
+
+    @classmethod
+    def of(cls, world: World, streams: Mapping[str, Stream], pictures: Callable[[], dict[str, Picture]]) -> "View":
+        """What is seen now. `pictures` takes those of this moment."""
+        read = {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
+        data = world.data
+        return cls(read, pictures(), np.concatenate([[data.time], data.qpos, data.qvel]))
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One row: what is seen, then what is done until the next row."""
+
+    seen: View
     actions: Actions
     """What the controller received in the control periods of the row, shape (periods, 7 * arms)."""
     success: bool
     """Whether the goal was reached in them."""
     done: bool
     """Whether the episode was over then."""
-
-    def values(self, state: Sequence[str]) -> dict[str, Any]:
-        """The columns of the row: the paper's streams, the actions, and what LeRobot looks for.
-
-        Args:
-            state: names of the streams that make up `observation.state`.
-        """
-        return {
-            **self.streams,
-            "observation.state": np.concatenate([self.streams[name] for name in state]),
-            "action": self.action,
-            "actions": self.actions,
-            "reward": np.float32(self.success),
-            "next.reward": np.float32(self.success),
-            "next.done": self.done,
-            "next.success": self.success,
-        }
 
     @property
     def action(self) -> NDArray[np.float32]:
@@ -54,31 +52,30 @@ class Moment:
         return action.astype(np.float32)
 
 
-def play(
-    world: World,
-    scenario: Scenario,
-    row: PoolRow,
-    every: int,
-    streams: Mapping[str, Stream],
-    pictures: Callable[[], dict[str, Picture]],
-) -> Iterator[Moment]:
-    """Play the witness of a pool's row until the episode is over, as the Gymnasium environment would.
+@dataclass(frozen=True)
+class Replay:
+    """A witness to be played, as the Gymnasium environment would."""
 
-    After the last recorded action the robot is idle. The control periods of the last row are all simulated.
+    row: PoolRow
+    scenario: Scenario
+    world: World
+    every: int
+    """Control periods in a row of the data."""
+    look: Callable[[], View]
+    """What is seen now."""
 
-    Args:
-        every: control periods in a row.
-        streams: what is read at the beginning of each row.
-        pictures: takes the pictures of that moment.
-    """
-    world.reset()
-    episode, over, recorded = Episode(scenario, world, row.horizon), None, iter(row.witness)
-    while over is None:
-        seen = {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
-        taken, done = pictures(), []
-        for _ in range(every):
-            action = next(recorded, None)
-            done.append(world.idle.astype(np.float32) if action is None else action)
-            outcome = episode.step(done[-1])
-            over = over or outcome
-        yield Moment(seen, taken, np.array(done), over == "success", over is not None)
+    def moments(self) -> Iterator[Moment]:
+        """The rows, from the start until the episode is over.
+
+        After the last recorded action the robot is idle. The control periods of the last row are all simulated.
+        """
+        self.world.reset()
+        episode, over, recorded = Episode(self.scenario, self.world, self.row.horizon), None, iter(self.row.witness)
+        while over is None:
+            seen, done = self.look(), []
+            for _ in range(self.every):
+                action = next(recorded, None)
+                done.append(self.world.idle.astype(np.float32) if action is None else action)
+                outcome = episode.step(done[-1])
+                over = over or outcome
+            yield Moment(seen, np.array(done), over == "success", over is not None)

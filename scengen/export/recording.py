@@ -1,39 +1,55 @@
-"""Recordings: witnesses played again and written as a LeRobot data set, with the paper's streams.
+"""Recordings: witnesses played again and written as a LeRobot data set or for robomimic, with the paper's streams.
 
 LeRobot gives a data set one rate, `fps`. A row is what was seen at one moment and what was done from then to the next
 row: with 25 rows a second, in four control periods. Nothing of the witness gets lost: `actions` holds what the
 controller received in all control periods of the row. These actions have passed the teleoperation filter; an
-environment takes them as they are.
+environment takes them as they are. robomimic's data has a row for every control period (`scengen.export.robomimic`).
 """
 
-import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
 
-from ..envs.observations import CAMERAS, Stream, cameras_of, proprioception, streams_of
+import numpy as np
+
+from .. import config
+from ..control.loop import Loop
+from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
+from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
 from ..pool import Pool, PoolRow
-from ..samplers.task import Task
-from ..scenario import Scenario
-from ..sim.world import World, action_size
-from ..targets import try_folder
+from ..sim.world import World, hands
+from ..targets import refused, try_file, try_folder
 from ..validate.identity import check_versions, versions
 from ..validate.playable import unplayable
 from .cameras import calibration
+from .hdf5 import check_target
 from .lerobot import DataSet, Feature
-from .play import play
+from .play import Moment, Replay, View
 
 NONE = "none"
-ABOUT = ("id", "task", "code", "split", "axes", "shifted", "seed", "index", "id_twin", "scene_sha256", "witness_sha256")
+LEROBOT, ROBOMIMIC = "lerobot", "robomimic"
+FULL_RATE = round(1 / Loop.PERIOD)
+"""Control periods in a second."""
+PAPER_RATE = 25
+"""The paper's rate for pictures."""
+ABOUT = (
+    *("id", "task", "code", "split", "axes", "shifted", "params", "seed", "index", "id_twin", "horizon"),
+    *("scene_sha256", "witness_sha256"),
+)
 """Columns of a pool that every episode carries, as `scengen/<column>` in LeRobot's table of episodes."""
+STATE, ENVIRONMENT = "observation.state", "observation.environment_state"
+"""LeRobot's names of the robot's own pose and of `object-state`."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +58,10 @@ class Settings:
 
     pool: str | list[str] = ""
     to: str = ""
+    format: str = LEROBOT
     n: int | None = None
-    fps: int = 25
+    fps: int | None = None
+    environment_state: bool | None = None
     cameras: str | list[str] = field(default_factory=lambda: list(CAMERAS))
     width: int = 640
     height: int = 480
@@ -64,17 +82,38 @@ class Settings:
         """Where the data set is until everything is in it."""
         return Path(f"{self.to}.unfinished")
 
+    @property
+    def rate(self) -> int:
+        """Rows a second."""
+        return self.fps or (PAPER_RATE if self.format == LEROBOT else FULL_RATE)
+
+    @property
+    def privileged(self) -> bool:
+        """Whether the rows tell where everything is: unless policies are meant to look for themselves."""
+        if self.environment_state is None:
+            return self.format == ROBOMIMIC or not self.eyes
+        return self.environment_state
+
     def check(self) -> None:
         """Raise `ScengenError` for settings that make no sense."""
-        periods_between(self.fps)
-        check_size(self.width, self.height)
-        at_least(self, n=1, width=2, height=2)
+        if self.format not in (LEROBOT, ROBOMIMIC):
+            raise UnknownName("format of recordings", self.format, [LEROBOT, ROBOMIMIC])
+        at_least(self, n=1, fps=1, width=2, height=2)
+        periods_between(self.rate)
+        if self.format == ROBOMIMIC:
+            check_target(self.to)
+            if self.rate != FULL_RATE:
+                told = f"robosuite plays these actions, and certificates hold for {FULL_RATE} a second: leave it out"
+                raise BadConfig(f"fps = {self.fps}; {told}")
+        else:
+            check_size(self.width, self.height)
         if Path(self.to).exists():
-            raise BadConfig(f"{self.to} exists already; delete it, or name another folder")
+            raise BadConfig(f"{self.to} exists already; delete it, or name another one")
         if self.unfinished.exists():
             raise BadConfig(
                 f"{self.unfinished} is left from a recording that was killed, or one is under way; delete it"
             )
+        (try_file if self.format == ROBOMIMIC else try_folder)(self.to)
 
 
 @dataclass(frozen=True)
@@ -89,69 +128,164 @@ class Summary:
     """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
-def record(settings: Settings, find_task: Callable[[str], Task], progress: Callable[[int, int], None]) -> Summary:
-    """Write the data set that the settings describe; its folder appears when it is complete.
+def record(settings: Settings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> Summary:
+    """Write the recording that the settings describe; it appears when it is complete.
 
     Args:
-        find_task: gives the task of a name.
         progress: told how many episodes are done and how many there are.
+        search: overrides that add folders of other packages, see `config.search_path`.
 
     Raises:
         ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.
     """
     settings.check()
-    try_folder(settings.to)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     robot, count = _robot(pools), sum(map(len, pools))
     for name in settings.eyes:
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
+    tasks = {name: config.task(name, search) for name in sorted({n for pool in pools for (n,) in pool.columns("task")})}
     streams = streams_of(robot)
+    if settings.privileged:
+        scenes = {name: {x for p in pools for n, x in p.columns("task", "scene_xml") if n == name} for name in tasks}
+        bodies = all_bodies(bodies_of(task, scenes[name]) for name, task in tasks.items())
+        state = ObjectState(bodies, len(hands(robot)))
+        streams[NAME] = Stream(state.names, state.bounds, state.read)
+    failed = []
+    _begin(settings)
     try:
-        settings.unfinished.mkdir(parents=True)
-    except OSError as error:
-        raise BadConfig(f"{settings.unfinished} cannot be written: {error.strerror}") from None
-    try:
-        size, features = (settings.width, settings.height), _features(settings, robot)
-        failed, lost = [], dict(unplayable(_rows(pools, count)))
-        with DataSet(settings.unfinished, settings.fps, robot, features, settings.eyes, size) as data:
+        lost = dict(unplayable(_rows(pools, count)))
+        with _writer(settings, robot, streams, list(tasks), tuple(search)) as writer:
             for row in _rows(pools, count):
                 if row.id in lost:
                     continue
-                scenario = find_task(row.task).scenario(row.params)
-                if not _episode(data, row, scenario, settings, streams):
-                    failed.append(row.id)
-                progress(len(data.episodes), count)
-        source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
-        (settings.unfinished / "meta" / "scengen.json").write_text(json.dumps(source, indent=1) + "\n")
+                with ExitStack() as stack:
+                    world = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes))
+                    scenario = tasks[row.task].scenario(row.params)
+                    pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
+                    look = partial(View.of, world, writer.streams, pictures)
+                    if not writer.episode(Replay(row, scenario, world, periods_between(settings.rate), look)):
+                        failed.append(row.id)
+                progress(writer.episodes, count)
+            writer.finish({"pools": [pool.sha256 for pool in pools], "versions": versions()})
         settings.unfinished.rename(settings.to)
     except BaseException:
-        shutil.rmtree(settings.unfinished)
+        _discard(settings.unfinished)
         raise
-    return Summary(len(data.episodes), data.rows, tuple(failed), lost)
+    return Summary(writer.episodes, writer.rows, tuple(failed), lost)
+
+
+def _begin(settings: Settings) -> None:
+    """Make the unfinished file or folder, which nobody else may have begun."""
+    path = settings.unfinished
+    try:
+        if settings.format == ROBOMIMIC:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch(exist_ok=False)
+        else:
+            path.mkdir(parents=True)
+    except OSError as error:
+        raise refused(path, error) from None
+
+
+def _discard(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
     return islice(chain.from_iterable(pool.rows() for pool in pools), count)
 
 
-def _episode(data: DataSet, row: PoolRow, scenario: Scenario, settings: Settings, streams: dict[str, Stream]) -> bool:
-    """Add one scenario's episode, and say whether it reached the goal."""
-    world, success = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes)), False
-    held, size = scenario.orientation, (settings.width, settings.height)
-    with ExitStack() as stack:
-        views = cameras_of(row.embodiment)
-        pictures = _camera(stack, world, settings, views, held)
-        for name in settings.eyes:
-            data.calibrate(name, calibration(world, views[name], *size, held), str(row.name))
-        for moment in play(world, scenario, row, periods_between(settings.fps), streams, pictures):
-            data.add(moment.values(proprioception(row.embodiment)), moment.pictures)
+class Writer(Protocol):
+    """A format that is being written; used in a `with` statement."""
+
+    streams: Mapping[str, Stream]
+    """What it wants to be read at every moment."""
+
+    @property
+    def episodes(self) -> int:
+        """How many were written so far."""
+        ...
+
+    @property
+    def rows(self) -> int:
+        """How many were written so far."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def episode(self, replay: Replay) -> bool:
+        """Add one scenario's episode, and say whether it reached the goal."""
+        ...
+
+    def finish(self, source: Mapping[str, Any]) -> None:
+        """Write what is known at the end. `source`: where the data came from."""
+        ...
+
+
+def _writer(
+    settings: Settings, robot: str, streams: Mapping[str, Stream], tasks: Sequence[str], search: tuple[str, ...]
+) -> Writer:
+    if settings.format == LEROBOT:
+        return _LeRobot(settings, robot, streams)
+    from . import robomimic
+
+    if len(tasks) > 1:
+        raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
+    size = (settings.width, settings.height)
+    env, arguments = robomimic.environment(tasks[0], settings.folders, settings.eyes, size, search)
+    return robomimic.Demonstrations(settings.unfinished, robomimic.streams_of(streams, robot), env, arguments)
+
+
+class _LeRobot(DataSet):
+    """A LeRobot data set of replayed witnesses."""
+
+    def __init__(self, settings: Settings, robot: str, streams: Mapping[str, Stream]):
+        size = (settings.width, settings.height)
+        features = _features(settings, robot, streams)
+        super().__init__(settings.unfinished, settings.rate, robot, features, settings.eyes, size)
+        self.settings, self.streams = settings, streams
+
+    def episode(self, replay: Replay) -> bool:
+        row, success = replay.row, False
+        size, views = (self.settings.width, self.settings.height), cameras_of(row.embodiment)
+        for name in self.settings.eyes:
+            held = replay.scenario.orientation
+            self.calibrate(name, calibration(replay.world, views[name], *size, held), str(row.name))
+        for moment in replay.moments():
+            self.add(_values(moment, proprioception(row.embodiment)), moment.seen.pictures)
             success = moment.success
-    columns = row.plain()
-    about = {f"scengen/{name}": columns[name] for name in ABOUT}
-    data.end_episode(row.instruction, {**about, "scengen/success": success})
-    return success
+        columns = row.plain()
+        about = {f"scengen/{name}": columns[name] for name in ABOUT}
+        self.end_episode(row.instruction, {**about, "scengen/success": success})
+        return success
+
+
+def _values(moment: Moment, state: Sequence[str]) -> dict[str, Any]:
+    """The columns of a row: the paper's streams, the actions, and what LeRobot looks for.
+
+    Args:
+        state: names of the streams that make up `observation.state`.
+    """
+    seen = moment.seen.streams
+    return {
+        **{ENVIRONMENT if name == NAME else name: values for name, values in seen.items()},
+        STATE: np.concatenate([seen[name] for name in state]),
+        "action": moment.action,
+        "actions": moment.actions,
+        "reward": np.float32(moment.success),
+        "next.reward": np.float32(moment.success),
+        "next.done": moment.done,
+        "next.success": moment.success,
+    }
 
 
 def _camera(
@@ -170,15 +304,18 @@ def _camera(
     return lambda: {name: held.apply(camera.take(views[name])) for name in settings.eyes}
 
 
-def _features(settings: Settings, robot: str) -> dict[str, Feature]:
-    """The columns of `Moment.values`."""
-    seen = {name: Feature("float32", stream.shape) for name, stream in streams_of(robot).items()}
-    state = sum(seen[name].shape[0] for name in proprioception(robot))
+def _features(settings: Settings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:
+    """The columns of `_values`."""
+    own, numbers = named(streams, proprioception(robot)), action_names(robot)
+    seen = {
+        ENVIRONMENT if name == NAME else name: Feature("float32", stream.shape, stream.entries(name))
+        for name, stream in streams.items()
+    }
     return {
         **seen,
-        "observation.state": Feature("float32", (state,)),
-        "action": Feature("float32", (action_size(robot),)),
-        "actions": Feature("float32", (periods_between(settings.fps), action_size(robot))),
+        STATE: Feature("float32", (len(own),), own),
+        "action": Feature("float32", (len(numbers),), numbers),
+        "actions": Feature("float32", (periods_between(settings.rate), len(numbers)), ("period", "action")),
         "reward": Feature("float32"),
         "next.reward": Feature("float32"),
         "next.done": Feature("bool"),

@@ -15,7 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import cli, config, pool
+from scengen import cli, pool
+from scengen.envs.gym import PoolEnv
+from scengen.envs.observations import streams_of
 from scengen.export import recording
 from scengen.export.cameras import calibration
 from scengen.export.lerobot import DataSet, Feature
@@ -44,7 +46,7 @@ WIDTH, HEIGHT = 96, 72
 
 def recorded(folder, **changed):
     settings = Settings(pool=str(REFERENCE), to=str(folder), **{"cameras": "none", **changed})
-    return record(settings, config.task, lambda *_: None)
+    return record(settings, lambda *_: None)
 
 
 def rows_of(folder):
@@ -135,8 +137,9 @@ def test_rewards_are_zero_until_the_last_row_and_one_there(made):
 
 def test_episodes_name_their_scenario_and_nothing_else_does(made, witnesses):
     for episode, row in zip(episodes_of(made), witnesses, strict=False):
-        for name in ("id", "split", "scene_sha256", "witness_sha256", "seed", "index", "id_twin"):
+        for name in ("id", "split", "scene_sha256", "witness_sha256", "seed", "index", "id_twin", "horizon"):
             assert episode[f"scengen/{name}"] == getattr(row, name)
+        assert json.loads(episode["scengen/params"]) == row.params
         assert episode["scengen/success"] and episode["tasks"] == [row.instruction]
     tasks = pq.read_table(made / "meta" / "tasks.parquet")
     assert tasks.to_pylist() == [{"task_index": 0, "task": witnesses[0].instruction}]
@@ -171,6 +174,39 @@ def test_the_state_is_all_proprioception(made):
     assert (column(made, "observation.state") == np.hstack([column(made, name) for name in names])).all()
 
 
+def test_every_entry_of_a_vector_has_a_name(made):
+    features = read_json(made, "info.json")["features"]
+    for name, feature in features.items():
+        if feature["shape"] != [1]:
+            wanted = len(feature["shape"]) if len(feature["shape"]) > 1 else feature["shape"][0]
+            assert len(feature["names"]) == len(set(feature["names"])) == wanted, name
+    assert features["action"]["names"][0] == "robot0_move_x" and features["action"]["names"][-1] == "robot0_gripper"
+    assert features["observation.state"]["names"][3:5] == ["robot0_eef_quat.x", "robot0_eef_quat.y"]
+    assert features["robot0_tactile_left"]["names"] == ["row", "column"]
+
+
+def test_the_environment_state_is_object_state_as_gymnasium_has_it(made, witnesses):
+    names = read_json(made, "info.json")["features"]["observation.environment_state"]["names"]
+    env = PoolEnv("domino_single", REFERENCE, ["object-state"])
+    assert tuple(names) == env.metadata["names"]["object-state"]
+    for episode, row in zip(episodes_of(made)[:2], witnesses, strict=False):
+        seen, _ = env.reset(options={"scenario": row.id})
+        for number in range(30):
+            there = column(made, "observation.environment_state")[episode["dataset_from_index"] + number]
+            assert (there.astype(np.float32) == seen["object-state"]).all()
+            for action in row.witness[4 * number : 4 * number + 4]:
+                seen, *_ = env.step(action)
+
+
+@pytest.mark.parametrize(
+    ("asked", "cameras", "there"),
+    [(None, "none", True), (None, CAMERA, False), (True, CAMERA, True), (False, "none", False)],
+)
+def test_where_there_are_cameras_rows_do_not_tell_where_everything_is(asked, cameras, there):
+    """LeRobot's policies read `observation.environment_state` wherever it is."""
+    assert Settings(cameras=cameras, environment_state=asked).privileged is there
+
+
 def test_at_100_rows_a_second_every_action_has_its_row(tmp_path, witnesses):
     recorded(tmp_path / "fast", n=1, fps=100)
     actions = column(tmp_path / "fast", "action").astype(np.float32)
@@ -178,7 +214,7 @@ def test_at_100_rows_a_second_every_action_has_its_row(tmp_path, witnesses):
 
 
 def test_a_suction_cup_has_no_jaw_streams():
-    names = set(recording._features(Settings(), SUCTION))
+    names = set(recording._features(Settings(), SUCTION, streams_of(SUCTION)))
     assert set(PAPER) - names == {"robot0_gripper_qpos", "robot0_tactile_left", "robot0_tactile_right"}
 
 
@@ -290,7 +326,7 @@ def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        record(Settings(pool=str(REFERENCE), to=str(tmp_path / "new"), cameras="none"), config.task, interrupt)
+        record(Settings(pool=str(REFERENCE), to=str(tmp_path / "new"), cameras="none"), interrupt)
     assert not list(tmp_path.iterdir())
 
 
@@ -311,6 +347,7 @@ def test_a_full_file_is_followed_by_another(tmp_path, monkeypatch):
         for episode in range(3):
             data.add({"x": float(episode)}, {})
             data.end_episode("do it", {})
+        data.finish({})
     files = sorted(str(path.relative_to(tmp_path / "data")) for path in (tmp_path / "data").rglob("*.parquet"))
     assert files == ["chunk-000/file-000.parquet", "chunk-000/file-001.parquet", "chunk-001/file-000.parquet"]
     assert [(e["data/chunk_index"], e["data/file_index"]) for e in episodes_of(tmp_path)] == [(0, 0), (0, 1), (1, 0)]
@@ -326,6 +363,8 @@ def test_without_cameras_neither_opengl_nor_pyav_is_needed(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
+        (["format=robomimc"], "no format of recordings named 'robomimc' (did you mean 'robomimic'?)"),
+        (["format=robomimic"], "robomimic's format is one file: name one that ends in .hdf5 or .h5"),
         (["fps=30"], "no fps that divides the control rate of 100 Hz named '30'"),
         (["cameras=rgb_griper_cam"], "no camera named 'rgb_griper_cam' (did you mean 'rgb_gripper_cam'?)"),
         (["cameras=rgb_ego_cam,rgb_griper_cam"], "no camera named 'rgb_griper_cam'"),

@@ -1,0 +1,178 @@
+"""Recordings in robomimic's format: one HDF5 file, as its loaders and its robosuite environments expect it.
+
+    data                    attributes: total (rows), env_args (which robosuite environment, and its arguments)
+    data/demo_0             attributes: num_samples, model_file (MJCF), ep_meta (the scenario, its parameters, `lang`)
+      actions  states  rewards  dones
+      obs/<key>  next_obs/<key>
+    mask/<split>            the demonstrations of a split, by name; mask/success those that reach the goal
+
+Observations have robosuite's names: `object` is `object-state`, pictures are `<camera>_image`, first row on top. Each
+row is a control period of 10 ms with the action that the controller received, so that they can be played in robosuite.
+States are time, `qpos` and `qvel`; what events have moved or remember (a mark, a count of jumps) is not in them.
+"""
+
+import json
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control.loop import Loop
+from ..envs import object_state
+from ..envs.observations import Stream, cameras_of
+from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
+from ..errors import BadConfig
+from ..robots.panda import Names
+from ..sim.world import World, hands
+from ..validate.identity import versions
+from .play import Replay, View
+
+ROBOSUITE_TYPE = 1
+"""robomimic's number for robosuite environments."""
+SUCCESS = "success"
+"""Name of the mask of demonstrations that reach the goal."""
+OBJECT = "object"
+"""robomimic's name of robosuite's `object-state`."""
+
+
+def streams_of(streams: Mapping[str, Stream], embodiment: str) -> dict[str, Stream]:
+    """Streams under robosuite's names: its `eef_quat` is that of the hand's body, ours its `eef_quat_site`."""
+    found = {OBJECT if name == object_state.NAME else name: stream for name, stream in streams.items()}
+    for number in range(len(hands(embodiment))):
+        arm = Names(number).arm
+        found[f"{arm}eef_quat_site"] = found[f"{arm}eef_quat"]
+        found[f"{arm}eef_quat"] = Stream(object_state.POSE["quat"], 1.0, _hand_of(arm))
+    return found
+
+
+def _hand_of(arm: str) -> Callable[[World], NDArray[np.float64]]:
+    return lambda world: world.data.xquat[world.body(f"{arm}right_hand")][[1, 2, 3, 0]]
+
+
+class Demonstrations:
+    """A file that is being written."""
+
+    def __init__(
+        self, path: Path, streams: Mapping[str, Stream], environment: RobosuiteEnv, arguments: Mapping[str, Any]
+    ):
+        """Begin a file.
+
+        Args:
+            streams: what is observed, by robosuite's names.
+            environment: composes the models of the scenarios; nothing is simulated in it.
+            arguments: with which to make it again, for robomimic to play in.
+
+        Raises:
+            BadConfig: the file cannot be written.
+        """
+        import h5py
+
+        try:
+            self._file = h5py.File(path, "w")
+        except OSError as error:
+            raise BadConfig(f"{path} cannot be written: {error}") from None
+        self.streams, self.episodes, self.rows = streams, 0, 0
+        self._environment, self._arguments = environment, arguments
+        self._data = self._file.create_group("data")
+        self._masks: dict[str, list[str]] = defaultdict(list)
+
+    def episode(self, replay: Replay) -> bool:
+        """Add one scenario's demonstration, and say whether it reached the goal."""
+        row, name, success = replay.row, f"demo_{self.episodes}", False
+        group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[View]()
+        views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
+        for moment in replay.moments():
+            columns["actions"].append(moment.action)
+            columns["states"].append(moment.seen.physics)
+            columns["rewards"].append(np.float32(moment.success))
+            columns["dones"].append(np.int64(moment.done))
+            self._add(group, "obs", moment.seen, views)
+            if seen:
+                self._add(group, "next_obs", moment.seen, views)
+            seen.append(replace(moment.seen, pictures={}))
+            success = moment.success
+        last = replay.look()
+        self._add(group, "next_obs", last, views)
+        for key in last.streams:
+            values = np.array([view.streams[key] for view in (*seen, last)])
+            group.create_dataset(f"obs/{key}", data=values[:-1])
+            group.create_dataset(f"next_obs/{key}", data=values[1:])
+        for key, values in columns.items():
+            group.create_dataset(key, data=np.array(values))
+        group.attrs["num_samples"] = len(seen)
+        group.attrs["model_file"] = self._environment.model_text(row)
+        told = {"scenario": row.id, "lang": row.instruction, "task": row.task, "split": row.split, "success": success}
+        place = {"axes": list(row.axes), "seed": row.seed, "index": row.index, "id_twin": row.id_twin}
+        group.attrs["ep_meta"] = json.dumps({**told, **place, "params": dict(row.params)})
+        for mask in (row.split, *([SUCCESS] if success else [])):
+            self._masks[mask].append(name)
+        self.episodes, self.rows = self.episodes + 1, self.rows + len(seen)
+        return success
+
+    def finish(self, source: Mapping[str, Any]) -> None:
+        """Write what is known at the end. `source`: where the data came from."""
+        self._data.attrs["total"] = self.rows
+        self._data.attrs["env_args"] = json.dumps(self._arguments, indent=4)
+        self._data.attrs["scengen"] = json.dumps(source)
+        for mask, names in self._masks.items():
+            self._file.create_dataset(f"mask/{mask}", data=np.array(names, dtype="S"))
+
+    def __enter__(self) -> "Demonstrations":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    @staticmethod
+    def _add(group: Any, what: str, seen: View, views: Mapping[str, str]) -> None:
+        """Append the pictures of a view: all of an episode would not fit into memory."""
+        for camera, picture in seen.pictures.items():
+            key, shape = f"{what}/{views[camera]}", picture.shape
+            if key not in group:
+                packed = {"maxshape": (None, *shape), "chunks": (1, *shape), "compression": "gzip"}
+                group.create_dataset(key, (0, *shape), np.uint8, **packed)
+            group[key].resize(len(group[key]) + 1, axis=0)
+            group[key][-1] = picture
+
+
+def environment(
+    task: str, pools: Sequence[str], cameras: Sequence[str], size: tuple[int, int], search: tuple[str, ...]
+) -> tuple[RobosuiteEnv, dict[str, Any]]:
+    """The robosuite environment in which demonstrations can be played, and robomimic's `env_args` of it.
+
+    Args:
+        pools: folders of the pools.
+        cameras: the paper's names of the cameras to be observed.
+        size: width and height of the pictures [pixels].
+        search: folders of other packages with tasks, see `config.search_path`.
+    """
+    kind, rate = env_class(task, search), round(1 / Loop.PERIOD)
+    blind: dict[str, Any] = {
+        "use_object_obs": False,
+        "use_camera_obs": False,
+        "has_renderer": False,
+        "has_offscreen_renderer": False,
+    }
+    made = kind(pool=pools, control_freq=rate, **blind)
+    views = [cameras_of(made.task.embodiment)[camera] for camera in cameras]
+    arguments = {
+        "robots": [ROBOT] * len(made.robots),
+        "pool": list(pools),
+        "control_freq": rate,
+        "reward_shaping": False,
+        "ignore_done": True,
+        "use_object_obs": True,
+        "use_camera_obs": bool(views),
+        "has_renderer": False,
+        "has_offscreen_renderer": bool(views),
+        **({"camera_names": views, "camera_widths": size[0], "camera_heights": size[1]} if views else {}),
+    }
+    told = {"env_name": kind.__name__, "env_version": versions()["robosuite"], "type": ROBOSUITE_TYPE}
+    return made, {**told, "env_kwargs": arguments}
