@@ -5,27 +5,37 @@ In the tests of a package whose task files lie in `conf/task`, three lines do:
     @pytest.mark.parametrize("check", conformance.checks("push_block", conf="path/to/conf"), ids=str)
     def test_push_block_keeps_to_the_rules(check):
         check()
+
+`frame_checks` and `axis_checks` are more of the same kind. `pytest --scengen-task=push_block --scengen-axis=far` runs
+all of them without a file (`pytest_plugin`).
 """
 
 import json
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
-from . import config
+from . import config, frames
 from .errors import ScengenError
-from .ood import features
+from .ood import behaviour, card, features
 from .params import canonical, values, with_values
 from .samplers.split import ID
 from .samplers.task import Task
+from .scenario import Scenario
 from .sim import scene_text
+from .sim.world import World
 from .validate.certify import NOT_TRIED, certify
+from .validate.rollout import run
 from .validate.settings import QUICK
 
 TRIED = 2
 """How many shortcuts of every scenario must be carried out to their end: one that gives up shows nothing."""
+
+
+SURE = 0.95
+"""Share of fresh draws of every split that an oracle has to solve without jitter."""
 
 
 class Nonconformity(ScengenError):
@@ -80,6 +90,57 @@ def checks(
     return told + [
         Rule(f"{split}: {rule.__name__.strip('_').replace('_', ' ')}", partial(rule, found, split, scenarios, seed))
         for split, rule in wanted
+    ]
+
+
+def frame_checks(task: str, conf: str | Path | None = None, seed: int = 0) -> list[Rule]:
+    """Checks that the first training scenario is judged alike wherever it stands, see `frames`: some CPU seconds.
+
+    Returns:
+        One check for each parameter that moves or turns the whole scene; none where a family has no such parameter.
+
+    Raises:
+        ScengenError: the file cannot be loaded.
+    """
+    found = config.task(task, search(conf))
+    scenario = found.draw(ID, seed, 0).scenario
+    return [
+        Rule(f"judged alike wherever {other.parameter} puts the scene", partial(_judged_alike, found, scenario, other))
+        for other in frames.moved(scenario, f"{task}/{seed}")
+    ]
+
+
+def axis_checks(
+    task: str,
+    axis: str,
+    conf: str | Path | None = None,
+    n: int = 30,
+    seed: int = 0,
+    to: str | Path | None = None,
+    workers: int = 1,
+) -> list[Rule]:
+    """Checks of what an axis does to memories of training, from its card, at some 5 CPU seconds a twin.
+
+    Args:
+        axis: its name in the task's file.
+        n: twins; a fifth of them are tried with any of 16 memories.
+        to: folder of the card, which a second call continues; generated/axes/<task>-<axis> by default.
+
+    Raises:
+        ScengenError: the file cannot be loaded, it has no such axis, or n is less than 2.
+    """
+    found = config.task(task, search(conf))
+    settings = card.Settings(axis, n, any_n=n // 5, certify_n=0, seed=seed, rounds=0, workers=workers)
+    settings.check(found)
+    folder = Path(to or f"generated/axes/{task}-{axis}")
+
+    @cache
+    def made() -> card.Card:
+        return card.make(found, QUICK, settings, folder, lambda *_: None)[0]
+
+    return [
+        Rule(f"{axis}: the oracle solves it", lambda: _solvable(made())),
+        Rule(f"{axis}: memory of training does not", lambda: _breaks(made())),
     ]
 
 
@@ -149,6 +210,30 @@ def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) 
         tried = [name for name, told in ends.items() if any(end["outcome"] != NOT_TRIED for end in told.values())]
         gave_up = "; ".join(f"{name}: {told['filtered']['reason']}" for name, told in ends.items() if name not in tried)
         _ask(len(tried) >= TRIED, f"{where}: of its shortcuts only {len(tried)} could be carried out; {gave_up}")
+
+
+def _judged_alike(task: Task, scenario: Scenario, other: frames.Moved) -> None:
+    """What a family says of every moment of a solution does not depend on where the scene stands."""
+    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    solution = run(scenario, world, scenario.oracle, task.horizon)
+    _ask(solution.solved, f"{task.name}/id/0: the oracle fails: {solution.reason}")
+    differs = frames.differing(scenario, other, solution.actions, task.embodiment)
+    _ask(not differs, f"{task.name}/id/0 moved by {other.parameter}: {differs}")
+
+
+def _solvable(made: card.Card) -> None:
+    """The oracle solves nearly all twins."""
+    solved = made.oracle.value if made.oracle else 0.0
+    _ask(solved >= SURE, f"{made.task}/{made.axis}: the oracle solves {solved:.0%} of the twins, less than {SURE:.0%}")
+
+
+def _breaks(made: card.Card) -> None:
+    """A memory that works in training fails; where none works there, a feature of the physics leaves training."""
+    weak = all(rung.finding in ("too weak", "not tried") for rung in made.rungs)
+    leaves = weak and any(departure.leaves for departure in made.features)
+    told = ", ".join(f"{rung.name} {rung.finding}" for rung in made.rungs)
+    helps = "more twins may tell" if made.verdict == behaviour.CANNOT_TELL else "say in its why what it asks of the eye"
+    _ask(made.verdict.startswith("breaks") or leaves, f"{made.task}/{made.axis}: {made.verdict} ({told}); {helps}")
 
 
 def _ask(holds: bool, otherwise: str) -> None:
