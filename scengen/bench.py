@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from . import config
+from .certificate import CHECKS
 from .control import native
 from .control.loop import ACTION, Loop
 from .envs.gym import PoolEnv
@@ -22,8 +23,11 @@ from .pictures.render import NoPictures
 from .pool import Pool, PoolRow
 from .robots import panda
 from .runs.generate import Settings, generate
+from .samplers.split import ID
+from .samplers.task import Task
 from .sim import scene_text
 from .sim.world import JAW, World
+from .validate.certify import Trial
 from .validate.rollout import Rollout, run
 from .validate.settings import QUICK
 
@@ -40,6 +44,8 @@ LIMITS = {
 
 TICKS = 200
 """Control periods of the comparison with robosuite: two seconds."""
+NOTHING = 0.05
+"""What costs less than this is no part of the cost of a certificate [s]."""
 CAMERA_TICKS = 20
 """Control periods with a camera, which takes a hundred times as long without a graphics card."""
 
@@ -76,6 +82,33 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
     for name, value in periods.items():
         beside.add_row(name, f"{value:.2f}", f"{value / next(iter(periods.values())):.1f}")
     return [table, beside], {**result, "control_period_ms": periods}
+
+
+def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
+    """Processor time of a quick certificate of every task, by check [s]: of its first training scenario."""
+    costs = {name: _certificate(config.task(name)) for name in config.tasks()}
+    named = [check for check in CHECKS if any(check in cost for cost in costs.values())]
+    table = Table("task", *named, "all", title="processor time of a certificate (s)", title_justify="left")
+    for name, cost in costs.items():
+        cells = (f"{cost[check]:.1f}" if check in cost else "" for check in named)
+        table.add_row(name, *cells, f"{sum(cost.values()):.1f}")
+    totals = [sum(cost.get(check, 0.0) for cost in costs.values()) for check in named]
+    table.add_section()
+    table.add_row("all", *(f"{total:.1f}" for total in totals), f"{sum(totals):.1f}")
+    return table, costs
+
+
+def _certificate(task: Task) -> dict[str, float]:
+    """What each check costs that is made on the first training scenario [s]."""
+    trial = Trial(task.draw(ID, 0, 0).scenario, task.horizon, QUICK, task.embodiment)
+    cost = {}
+    for name in CHECKS:
+        begin = time.process_time()
+        check = trial.check(name)
+        cost[name] = time.process_time() - begin
+        if check.passed is False:
+            break
+    return {name: seconds for name, seconds in cost.items() if seconds >= NOTHING}
 
 
 def rollout_to_raw(repeats: int) -> float:

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from ..bench import bench
+from rich.table import Table
+
+from ..bench import bench, certificates
 from ..config import read
 from ..errors import at_least
 from ..targets import try_file
@@ -15,13 +17,19 @@ class Settings:
 
     json: str | None
     repeats: int
+    certify: bool
 
 
 def command(arguments: Arguments) -> int:
     settings = read("bench", arguments, Settings)
     at_least(settings, repeats=1)
     try_file(settings.json)
-    tables, result = bench(settings.repeats)
+    tables: list[Table]
+    if settings.certify:
+        table, result = certificates()
+        tables = [table]
+    else:
+        tables, result = bench(settings.repeats)
     for table in tables:
         out.print(table)
     if settings.json:
