@@ -32,6 +32,7 @@ class Episode:
         """Why it is no success; empty as long as that is open, and for a success."""
         self.held = 0.0
         """How long the goal has held without interruption [s]."""
+        self._eventful = type(scenario).events is not Scenario.events
 
     def step(self, action: NDArray[np.float32]) -> Outcome | None:
         """Simulate one control period (10 ms) under an action that has passed the filter, shape (7 * arms,).
@@ -48,9 +49,10 @@ class Episode:
         return self.judge()
 
     def begin(self) -> None:
-        """Let the events of the coming control period happen."""
-        with self.world.events():
-            self.scenario.events(self.world)
+        """Let the events of the coming control period happen, if the family has any."""
+        if self._eventful:
+            with self.world.events():
+                self.scenario.events(self.world)
 
     def judge(self) -> Outcome | None:
         """Decide what the control period that has passed means. Failure comes before success, success before time."""

@@ -11,12 +11,8 @@ _NORMAL = statistics.NormalDist()
 
 
 def unit(*key: str | int) -> float:
-    """A number in (0, 1), uniform over keys: 53 bits of BLAKE2b of the key, centred in their cell.
-
-    The centre of the last cell rounds to 1, which is no number below 1: there it is the largest one."""
-    text = "\x1f".join(map(str, key))
-    digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
-    return min(((int.from_bytes(digest, "big") >> 11) + 0.5) / 2**53, 1.0 - 2.0**-53)
+    """A number in (0, 1), uniform over keys: 53 bits of BLAKE2b of the key, see `_unit`."""
+    return _unit(_digest(8, key))
 
 
 def spread(size: float, *key: str | int) -> float:
@@ -24,6 +20,18 @@ def spread(size: float, *key: str | int) -> float:
     return size * (2.0 * unit(*key) - 1.0)
 
 
-def normal(*key: str | int) -> float:
-    """A standard normal number."""
-    return _NORMAL.inv_cdf(unit(*key))
+def normals(count: int, *key: str | int) -> list[float]:
+    """Independent standard normal numbers, 8 of them at most: one hash serves them all."""
+    digest = _digest(8 * count, key)
+    return [_NORMAL.inv_cdf(_unit(digest[start : start + 8])) for start in range(0, len(digest), 8)]
+
+
+def _digest(size: int, key: tuple[str | int, ...]) -> bytes:
+    return hashlib.blake2b("\x1f".join(map(str, key)).encode(), digest_size=size).digest()
+
+
+def _unit(digest: bytes) -> float:
+    """The first 53 of 64 bits as a number in (0, 1), centred in its cell.
+
+    The centre of the last cell rounds to 1, which is no number below 1: there it is the largest one."""
+    return min(((int.from_bytes(digest, "big") >> 11) + 0.5) / 2**53, 1.0 - 2.0**-53)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -186,7 +187,12 @@ class Trial:
         return {}, {}, "the goal holds after settling" if self.solved_after_rest else ""
 
     def _idle(self) -> "Finding":
-        episode = self._run(_nothing)
+        """Nobody acts until the time limit, or until everything has been at rest for longer than `rest` watches."""
+
+        def wait(world: World) -> Plan:
+            yield from repeat(world.idle, round(self.settings.rest.seconds / Loop.PERIOD))
+
+        episode = run(self.scenario, self.world, wait, self.horizon, self.settings.settle, until_settled=True)
         settings = {"horizon": self.horizon}
         return settings, _outcome(episode), "doing nothing reaches the goal" if episode.solved else ""
 
@@ -327,10 +333,6 @@ def no_ablations(scenario: Scenario) -> str:
 def lower_bound(successes: int, runs: int) -> float:
     """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
     return float(beta.ppf(1 - CONFIDENCE, successes, runs - successes + 1)) if successes else 0.0
-
-
-def _nothing(world: World) -> Plan:
-    yield from ()
 
 
 def _outcome(episode: Rollout) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..control.loop import ACTION, Loop
 from ..control.teleop import MOTION, unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import GaveUp
-from ..samplers.keyed import normal, spread
+from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
 from ..sim.world import World
 
@@ -99,10 +99,10 @@ class Jitter:
 
     def shaken(self, action: Action, period: int) -> Action:
         """The action with noise on the six motion channels of each arm."""
-        shake = np.zeros(len(action))
-        for channel in (c for c in range(len(action)) if c % ACTION < MOTION):
-            shake[channel] = self.noise * normal(self.key, "action", period, channel)
-        return np.clip(action + shake, -1.0, 1.0)
+        shake = np.zeros((len(action) // ACTION, ACTION))
+        for arm, channels in enumerate(shake):
+            channels[:MOTION] = normals(MOTION, self.key, "action", period, arm)
+        return np.clip(action + self.noise * shake.ravel(), -1.0, 1.0)
 
 
 def run(

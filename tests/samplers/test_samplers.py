@@ -12,7 +12,7 @@ from scengen import config
 from scengen.errors import BadConfig, Infeasible
 from scengen.params import values
 from scengen.samplers.dists import Choice, Fixed, Integer, LogUniform, Uniform, parse
-from scengen.samplers.keyed import normal, unit
+from scengen.samplers.keyed import normals, unit
 from scengen.samplers.split import ID
 from scengen.samplers.task import load
 
@@ -30,7 +30,9 @@ def test_a_number_depends_on_its_key_alone():
 
 def test_the_keyed_numbers_are_uniform_and_normal():
     assert stats.kstest([unit("u", i) for i in range(4000)], "uniform").pvalue > 1e-3
-    assert stats.kstest([normal("n", i) for i in range(4000)], "norm").pvalue > 1e-3
+    drawn = np.array([normals(6, "n", i) for i in range(2000)])
+    assert stats.kstest(drawn.ravel(), "norm").pvalue > 1e-3
+    assert np.abs(np.corrcoef(drawn.T) - np.eye(6)).max() < 0.1, "numbers of one key are independent"
 
 
 def test_neighbouring_keys_are_uncorrelated():

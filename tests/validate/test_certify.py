@@ -14,7 +14,7 @@ from scengen.sim.world import ROBOT, World
 from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
 from scengen.validate.certify import certify, lower_bound
-from scengen.validate.rollout import Jitter, replay, run
+from scengen.validate.rollout import AT_REST, Jitter, replay, run
 from scengen.validate.settings import CertifySettings, Robust
 
 HORIZON = 12.0
@@ -148,8 +148,17 @@ def test_a_scene_that_solves_itself_is_refuted():
         def success(self, world):
             return world.time > 6.0
 
+        def pending(self, world):
+            return world.time <= 6.0
+
     certificate = certify(TooEasy(), HORIZON, CertifySettings()).certificate
     assert certificate.verdict == "refuted" and certificate.reason == "idle: doing nothing reaches the goal"
+
+
+def test_idling_ends_once_everything_rests_and_not_before_rest_was_watched():
+    certificate = certify(DominoSingle(), HORIZON, CertifySettings(), last="idle").certificate
+    numbers = certificate["idle"].numbers
+    assert numbers["reason"] == AT_REST and CertifySettings().rest.seconds < numbers["seconds"] < HORIZON / 2
 
 
 def test_a_shortcut_that_works_refutes_the_scene():
