@@ -39,7 +39,7 @@ class Limits:
 
 
 SHOWN = Limits(300.0, 4000)
-"""Of one scenario of a pool that is shown, exported or recorded: it comes from a stranger. Seconds would do."""
+"""Of one scenario of a pool that is shown, exported or recorded: it is not trusted. Seconds would do."""
 
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")

@@ -1,4 +1,4 @@
-"""Parquet files of a pool: what their columns are, how they are written, and how one from a stranger is read."""
+"""Parquet files of a pool: what their columns are, how they are written, and how an untrusted one is read."""
 
 import hashlib
 import os

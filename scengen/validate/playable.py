@@ -1,4 +1,4 @@
-"""Whether what a stranger's pool holds can be played at all: tried where it can be ended, before it is looked at."""
+"""Whether what an untrusted pool holds can be played at all: tried where it can be ended, before it is looked at."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress

@@ -348,7 +348,7 @@ def gap_in_a_certificate(columns):
     ],
 )
 def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says):
-    """With hashes that match, as from a stranger."""
+    """With hashes that match, as of an untrusted pool."""
     path = mine / "scenarios-00000.parquet"
     columns = pq.read_table(path).to_pydict()
     damage(columns)
