@@ -127,8 +127,11 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:
     _check_platform()
+    from . import config
     from .commands import out, say
+    from .completion import BASH, completions
     from .control import native
+    from .usage import usage
 
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     if not argv or argv[0] in ("-h", "--help", "help"):
@@ -140,13 +143,27 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
 
         say(" ".join(f"{k} {v}" for k, v in versions().items()))
         return OK
+    if verb == "--completion":
+        if arguments != ["bash"]:
+            raise BadConfig(f"{cut(' '.join(argv))}; expected --completion bash: no other shell is known")
+        out.print(BASH, end="", soft_wrap=True)
+        return OK
+    if verb == "--complete":
+        out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
+        return OK
     if verb not in VERBS:
         raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
+    if verb == "generate":  # several values are a sweep there, with Hydra's option or without it
+        arguments = [a for a in arguments if a not in ("-m", "--multirun")]
     if {"-h", "--help"} & set(arguments):
-        out.print(_settings(verb), end="")
+        out.print(usage(verb, [a for a in arguments if not a.startswith("-")]), end="")
         return OK
-    if flags := [a for a in arguments if a.startswith("-")]:
-        raise BadConfig(f"{cut(repr(flags[0]))} is no option; settings are key=value, see scengen {verb} --help")
+    flags = [a for a in arguments if a.startswith("-")]
+    if flags and flags[0].partition("=")[0] in SHOWING:
+        return _show(verb, arguments)
+    if flags:
+        known = "settings are key=value, options --help, --cfg job and --info " + "|".join(config.ORIGINS)
+        raise BadConfig(f"{cut(repr(flags[0]))} is no option; {known}; see scengen {verb} --help")
     command = import_module(f".commands.{verb}", __package__).command
     if signals:
         signals.working = True
@@ -157,6 +174,31 @@ def _check_platform() -> None:
     """Raise `BadConfig` where scengen cannot run, before modules are imported that fail there in many lines."""
     if sys.platform != "linux":  # the control loop is compiled against the libmujoco.so of MuJoCo's Linux wheel
         raise BadConfig(f"scengen runs on Linux, this is {sys.platform}; use its Dockerfile, or WSL on Windows")
+
+
+SHOWING = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--info"}
+"""Hydra's options that show a configuration, by how they may be written."""
+
+
+def _show(verb: str, arguments: Sequence[str]) -> int:
+    """Show what a command would work with, or where it comes from: `--cfg job`, `--info defaults`."""
+    from . import config
+    from .commands import out
+
+    words = list(arguments)
+    place = next(i for i, word in enumerate(words) if word.startswith("-"))
+    option, _, what = words.pop(place).partition("=")
+    if not what and place < len(words):
+        what = words.pop(place)
+    if others := [word for word in words if word.startswith("-")]:
+        raise BadConfig(f"{cut(repr(others[0]))} cannot be said together with {option}; say one of them")
+    if SHOWING[option] == "--info":
+        config.show_origin(verb, words, what)
+    elif what == "job":
+        out.print(config.shown(verb, words), end="", soft_wrap=True)
+    else:
+        raise BadConfig(f"{option} {cut(repr(what))}; the configuration of a command is that of its job, say --cfg job")
+    return OK
 
 
 def _line(text: str) -> None:
@@ -192,14 +234,6 @@ def _kept(error: BaseException) -> str:
         return ""
 
 
-def _settings(verb: str) -> str:
-    """The settings of a command as its file tells them, without what only Hydra reads."""
-    from .config import conf_dir
-
-    lines = (conf_dir() / "command" / f"{verb}.yaml").read_text().splitlines(keepends=True)
-    return "".join(line for line in lines if not line.startswith("# @package") and "optional /limits" not in line)
-
-
 def _help() -> str:
     told = {verb: inspect.getdoc(import_module(f".commands.{verb}", __package__)) for verb in VERBS}
     return "\n".join(
@@ -211,5 +245,6 @@ def _help() -> str:
             *(f"  {verb:<10}{what}" for verb, what in told.items()),
             "",
             "example: scengen generate task=domino_single split=diagonal n=100 workers=2 pool=generated/diagonal",
+            'completion in bash: eval "$(scengen --completion bash)"',
         ]
     )

@@ -1,9 +1,12 @@
 """From the command line to checked settings: Hydra composes, this module types and explains."""
 
+import itertools
+import logging
+import math
 import re
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -21,6 +24,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .parallel import cores
+from .samplers.split import ID
 from .samplers.task import Task, load
 from .validate.settings import CertifySettings
 
@@ -87,6 +91,111 @@ def chosen(verb: str, overrides: Sequence[str]) -> str | None:
         ScengenError: one line that says what is wrong.
     """
     return _composed(verb, overrides)[1].get("task")
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One of the command lines that a sweep stands for."""
+
+    overrides: tuple[str, ...]
+    swept: Mapping[str, str]
+    """The settings that name several values, and the one that each has here; empty where nothing is swept."""
+
+    def __str__(self) -> str:
+        return " ".join(f"{key}={value}" for key, value in self.swept.items())
+
+
+def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
+    """What a command line stands for in which settings name several values: `n=1,2`, or Hydra's choice, range, glob.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
+        parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
+        try:
+            choices = [_values(parser, _listed(text)) for text in overrides]
+        except HydraException as error:
+            raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
+    if (count := math.prod(len(values) for _, values in choices)) > MOST_COMBINATIONS:
+        raise BadConfig(f"{count} combinations of settings; give at most {MOST_COMBINATIONS} at once")
+    found = []
+    for picked in itertools.product(*(values for _, values in choices)):
+        swept = {key: v for (key, values), v in zip(choices, picked, strict=True) if key and len(values) > 1}
+        line = (f"{key}={value}" if key else value for (key, _), value in zip(choices, picked, strict=True))
+        found.append(Combination(tuple(line), swept))
+    return found
+
+
+MOST_COMBINATIONS = 1000
+"""How many runs one command line may ask for."""
+
+
+def _values(parser: OverridesParser, text: str) -> tuple[str, list[str]]:
+    """Key and values of an override that names several; else nothing, and the override as it is."""
+    override = _parsed(text, parser)
+    if override is None or not override.is_sweep_override():
+        return "", [text]
+    values = list(itertools.islice(override.sweep_string_iterator(), MOST_COMBINATIONS + 1))
+    if not values:
+        raise BadConfig(f"{cut(repr(text))} names no value; give at least one")
+    return override.get_key_element(), values
+
+
+def shown(verb: str, overrides: Sequence[str]) -> str:
+    """The composed configuration of a command as YAML: `--cfg job`.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    plain, choices = _composed(verb, overrides)
+    if "certify" in plain:
+        plain["certify"] = _settled(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
+    lines = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
+    told = {"sort_keys": False, "allow_unicode": True, "width": 120}
+    return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **told) for key, flow in lines.items())
+
+
+def show_origin(verb: str, overrides: Sequence[str], what: str) -> None:
+    """Print what Hydra tells of where a configuration comes from: `--info defaults`, for instance.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    if what not in ORIGINS:
+        raise UnknownName("information of --info", what, ORIGINS)
+    _composed(verb, overrides)
+    with _logging_kept(), initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
+        asked = [_listed(o) for o in overrides]
+        asked = _with_packages(asked) if groups(verb) else asked
+        GlobalHydra.instance().hydra.show_info(what, file(verb), asked)  # type: ignore[union-attr]
+
+
+@contextmanager
+def _logging_kept() -> Iterator[None]:
+    """Hydra prints through the root logger, which it sets up for that and leaves so."""
+    root_logger = logging.getLogger()
+    handlers, level = list(root_logger.handlers), root_logger.level
+    try:
+        yield
+    finally:
+        root_logger.handlers[:] = handlers
+        root_logger.setLevel(level)
+
+
+ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
+"""What Hydra's --info tells here: which file gives what, in order or as a tree; the folders; and all of it."""
+
+
+@cache
+def splits(name: str, search: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """The splits that the file of a task names, without a look at its family.
+
+    Raises:
+        ScengenError: there is no such file, or it is no YAML.
+    """
+    plain, _ = _composed("one_task", [f"task={name}", *search])
+    return (ID, *(plain["task"].get("axes") or ()))
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
@@ -204,13 +313,13 @@ def _value(where: str, kind: Any, value: Any) -> Any:
 
 def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
     """The whole configuration as plain data, and which file was chosen in each group."""
-    with initialize_config_dir(str(_root(verb)), version_base="1.3", job_name="scengen"):
+    with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
         try:
             asked = [_listed(o) for o in overrides]
             for override in asked:
                 _check_override(verb, override)
-            asked = _with_packages(asked) if _groups(verb) else asked
-            node = compose(_file(verb), overrides=asked, return_hydra_config=True)
+            asked = _with_packages(asked) if groups(verb) else asked
+            node = compose(file(verb), overrides=asked, return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
             del node["hydra"]
@@ -224,17 +333,17 @@ def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict
             raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
 
 
-def _root(verb: str) -> Path:
+def root(verb: str) -> Path:
     """The folder in which Hydra finds the file of a command, and the groups from which it chooses files.
 
     One that chooses none sees none: Hydra would take its setting `task` for a choice among the files of conf/task.
     """
-    return conf_dir() if _groups(verb) else conf_dir() / "command"
+    return conf_dir() if groups(verb) else conf_dir() / "command"
 
 
-def _file(verb: str) -> str:
+def file(verb: str) -> str:
     """The file of a command, as it is called in its `_root`."""
-    return f"command/{verb}" if _groups(verb) else verb
+    return f"command/{verb}" if groups(verb) else verb
 
 
 DEEPEST = 20
@@ -268,16 +377,16 @@ def _check_override(verb: str, text: str) -> None:
             if not re.match(r"(file|pkg)://.", str(folder)):
                 raise BadConfig(f"{told}: give a folder of configuration as file:///folder or pkg://package")
     if key in ("task", "certify") and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
-        names = _groups(verb)
+        names = groups(verb)
         if key in names:
             raise BadConfig(f"{told}: expected the name of a file of conf/{key} without .yaml; see scengen tasks")
     if key in ("task", "certify") and override.value() is None:
         raise BadConfig(f"{told}: leave it out, or name a file of conf/{key}")
 
 
-def _parsed(text: str) -> Override | None:
+def _parsed(text: str, parser: OverridesParser | None = None) -> Override | None:
     try:
-        return OverridesParser.create().parse_overrides([text])[0]
+        return (parser or OverridesParser.create()).parse_overrides([text])[0]
     except (HydraException, RecursionError, ValueError, TypeError):  # numbers of 5000 digits are a ValueError
         return None
 
@@ -293,7 +402,7 @@ def _depth(text: str) -> int:
 
 def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
     """Everything but what is chosen from files, such as task and certify."""
-    settings = {key: value for key, value in plain.items() if key not in _groups(verb)}
+    settings = {key: value for key, value in plain.items() if key not in groups(verb)}
     for key, value in settings.items():
         if value == "???":
             raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
@@ -351,9 +460,9 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
     """Name the key at which the path of an override leaves the configuration."""
-    groups = _with_packages([o for o in overrides if re.match(r"(task|certify|hydra\.searchpath)=", o)])
+    files = _with_packages([o for o in overrides if re.match(r"(task|certify|hydra\.searchpath)=", o)])
     try:
-        node: Any = compose(_file(verb), overrides=groups if _groups(verb) else [])
+        node: Any = compose(file(verb), overrides=files if groups(verb) else [])
     except HydraException:
         return None
     seen: list[str] = []
@@ -361,7 +470,7 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
         if not isinstance(node, DictConfig):
             return None
         if part not in node:
-            known = {*map(str, node), *([] if seen else _groups(verb))}
+            known = {*map(str, node), *([] if seen else groups(verb))}
             unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
             if seen[:2] == ["task", "id"]:  # what a task file does not list stays at its nominal value: it can be added
                 return BadConfig(f"{unknown}; +{path}=... adds one")
@@ -371,7 +480,7 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     return None
 
 
-def _groups(verb: str) -> list[str]:
+def groups(verb: str) -> list[str]:
     """Groups from which a command line may choose a file, such as `task`."""
     return re.findall(r"^ +- /(\w+):", (conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
 

@@ -32,7 +32,7 @@ LAYERS = (
     ("ood", "frames"),
     ("conformance", "bench"),
     ("pytest_plugin",),
-    ("commands",),
+    ("commands", "completion", "usage"),
     ("cli",),
     ("__init__", "__main__"),
 )

@@ -1,0 +1,172 @@
+"""What people who know Hydra try: lists of values, --cfg and --info, completion, examples in every help."""
+
+import re
+import shlex
+import shutil
+import subprocess
+
+import pytest
+import yaml
+from helpers import REFERENCE
+from pools import QUICKLY
+
+from scengen import cli, config
+from scengen.commands import generate
+from scengen.completion import BASH, completions
+from scengen.errors import BadConfig
+from scengen.pool import Pool
+from scengen.usage import usage
+
+DOMINO = "task=domino_single"
+
+
+def said(capsys, *argv):
+    status = cli.run(argv)
+    return status, capsys.readouterr()
+
+
+# --- several values -------------------------------------------------------------------------
+
+
+def test_lists_and_hydras_own_words_are_combined():
+    found = config.combinations("generate", ["task=glob(balance_*)", "split=id,turned", "n=3", "seed=range(0,2)"])
+    assert len(found) == 8 and len({one.overrides for one in found}) == 8
+    assert found[0].swept == {"task": "balance_hard", "split": "id", "seed": "0"} and "n=3" in found[0].overrides
+    mass = config.combinations("generate", [DOMINO, "task.id.tile.mass=[uniform,0.03,0.04],0.05"])
+    assert [one.swept["task.id.tile.mass"] for one in mass] == ["[uniform,0.03,0.04]", "0.05"]
+    (alone,) = config.combinations("generate", [DOMINO, "keep=refuted,unknown", "task.id.tile.mass=[uniform,1,2]"])
+    assert not alone.swept, "these are lists, and no sweeps"
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        (("task=domino_single,packing", "split=id,tight"), "task=domino_single split=tight: no split of domino_single"),
+        ((DOMINO, "split=id,diagonl"), "split=diagonl: no split of domino_single named 'diagonl' (did you mean 'diag"),
+        (("task=packing,nothing",), "task=nothing: no task named 'nothing'"),
+        ((DOMINO, "n=1,0"), "n=0: n = 0; it must be at least 1"),
+        ((DOMINO, "seed=1,1"), "2 of the combinations would be written to"),
+        ((DOMINO, "seed=range(0,100000)"), "combinations of settings; give at most 1000 at once"),
+        ((DOMINO, "task.id.x=interval(0,1)"), "Can only enumerate"),
+        (("task=glob(none_*)",), "names no value; give at least one"),
+    ],
+)
+def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(capsys, tmp_path, asked, says):
+    status, shown = said(capsys, "generate", *asked, f"pool={tmp_path / 'many'}")
+    assert status == 2 and says in shown.err and shown.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_path, monkeypatch):
+    asked = ("generate", "-m", DOMINO, "split=id,wide_gaps", "n=1", *QUICKLY, f"pool={tmp_path}")
+    assert said(capsys, *asked)[0] == 0
+    pools = {name: Pool.open(tmp_path / f"domino_single-{name}") for name in ("id", "wide_gaps")}
+    assert {name: pool.split for name, pool in pools.items()} == {"id": "id", "wide_gaps": "wide_gaps"}
+    hashes = [pool.sha256 for pool in pools.values()]
+    shutil.rmtree(pools["wide_gaps"].folder)
+    monkeypatch.setattr("scengen.runs.generate.certify", None)  # nothing needs to be certified again
+    status, shown = said(capsys, *asked)
+    assert status == 0 and "1 of 1" in shown.out.split("2 pools")[-1]
+    assert [Pool.open(pool.folder).sha256 for pool in pools.values()] == hashes
+
+
+def test_other_commands_say_that_they_take_one_value(capsys):
+    status, shown = said(capsys, "shrink", DOMINO, "index=0,1")
+    assert status == 2 and "names several values; give one" in shown.err
+    assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is no option")
+
+
+# --- what a command would work with ----------------------------------------------------------
+
+
+def test_cfg_job_is_what_the_command_works_with(capsys):
+    asked = ("task=seesaw_balance", "n=3", "certify.robust.runs=5", "task.id.x=0.01")
+    status, shown = said(capsys, "generate", *asked, "--cfg", "job")
+    plain = yaml.safe_load(shown.out)
+    settings, task, certify_settings = config.read_task("generate", asked, generate.Settings)
+    assert status == 0 and plain["n"] == settings.n == 3 and plain["task"]["id"]["x"] == 0.01
+    assert plain["certify"]["robust"]["runs"] == certify_settings.robust.runs == 5
+    assert plain["certify"]["rest"] == vars(certify_settings.rest), "with what the task's file changes"
+    assert plain["task"]["horizon"] == task.horizon
+
+
+def test_info_tells_where_it_comes_from(capsys):
+    assert "limits/packing" in said(capsys, "generate", "task=packing", "--info", "defaults")[1].out
+    assert (
+        "command/generate:\n    task: packing"
+        in said(capsys, "generate", "--info=defaults-tree", "task=packing")[1].out
+    )
+    assert f"file://{config.conf_dir()}" in said(capsys, "generate", "task=packing", "-i", "searchpath")[1].out
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        (("--cfg", "all"), "say --cfg job"),
+        (("--cfg",), "say --cfg job"),
+        (("--info", "default"), "did you mean 'defaults'?"),
+        (("--cfg", "job", "--info", "defaults"), "say one of them"),
+        (("--nope",), "'--nope' is no option"),
+        (("workrs=2", "--cfg", "job"), "did you mean 'workers'?"),
+    ],
+)
+def test_options_that_do_not_exist_are_one_line(capsys, asked, says):
+    status, shown = said(capsys, "generate", DOMINO, *asked)
+    assert status == 2 and says in shown.err and shown.err.count("\n") == 1
+
+
+# --- help and completion ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_help_has_an_example_that_can_be_composed(verb):
+    text = usage(verb, [DOMINO])
+    (example,) = re.findall(r"^# Example: (scengen .*)$", text, re.M)
+    program, given, *overrides = shlex.split(example)
+    assert (program, given) == ("scengen", verb)
+    for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
+        config.shown(verb, getattr(one, "overrides", one))
+    takes_task = "task" in config.groups(verb)
+    assert takes_task == ("stout_starter turned_slab" in text) == ("+task.axes.NAME" in text)
+    assert ("certify.robust.runs=4" in text) == ("certify" in config.groups(verb))
+    assert ("hydra.searchpath=" in text) == (takes_task or bool(re.search("^(pool|hits):", text, re.M)))
+
+
+def test_the_help_of_a_chosen_task_tells_its_splits_alone():
+    text = usage("generate", ["task=packing"])
+    assert "four_pieces tight" in text and "turned_slab" not in text
+    with pytest.raises(BadConfig, match="no task named 'packin'"):
+        usage("generate", ["task=packin"])
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("scengen gen", ["generate"]),
+        ("scengen generate task=dom", ["task=domino_select", "task=domino_single"]),
+        ("scengen generate task=domino_single,pac", ["task=domino_single,packing"]),
+        ("scengen generate task=packing split=t", ["split=tight", "split=turned_bin", "split=thin_heavy"]),
+        ("scengen generate task=packing split=tight+l", ["split=tight+large_turns"]),
+        ("scengen axis task=packing axis=i", []),
+        ("scengen generate wor", ["workers="]),
+        ("scengen generate task=packing certify=", ["certify=full", "certify=quick"]),
+        ("scengen generate task=packing certify.robust.r", ["certify.robust.runs="]),
+        (f"scengen show pool={REFERENCE} id=8e", ["id=8ed4a4577fe0"]),
+        (f"scengen show pool={REFERENCE} id=domino_single/id@0", ["id=domino_single/id@0/8ed4a4577fe0"]),
+        ("scengen show pool=nowhere id=8e", []),
+        ("scengen verify hyd", []),
+        ("scengen nothing x", []),
+    ],
+)
+def test_completion_knows_commands_settings_tasks_splits_and_ids(line, found):
+    assert completions(line, cli.VERBS) == found
+
+
+def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
+    (tmp_path / "scengen").write_text("#!/bin/sh\nprintf 'task=domino_select\\ntask=domino_single\\n'\n")
+    (tmp_path / "scengen").chmod(0o755)
+    line = "scengen generate task=dom"
+    typed = f"{BASH}\nCOMP_LINE='{line}'; COMP_POINT={len(line)}; _scengen; echo ${{COMPREPLY[@]}}"
+    path = f"{tmp_path}:/usr/bin:/bin"
+    done = subprocess.run(["bash", "-c", typed], capture_output=True, text=True, env={"PATH": path})
+    assert done.stdout.split() == ["domino_select", "domino_single"] and not done.stderr
