@@ -1,4 +1,4 @@
-"""Boxes that stand on the middle of their foot: dominoes, blocks with an unknown filling, cubes."""
+"""Boxes that stand on the middle of their foot: dominoes, blocks with an unknown filling, cubes, lids."""
 
 import abc
 import math
@@ -91,6 +91,24 @@ class Cube(Box):
         return np.array([self.edge] * 3)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Lid(Box):
+    """A flat square lid without knob, twice as wide as the jaw opens, that lies on whatever it covers.
+
+    The paper gives no numbers and calls it lightweight (App. B, T26): this one is as dense as balsa wood, 260 kg/m^3.
+    """
+
+    width: float = param(0.160, "m", 0.08, 0.30)
+    thickness: float = param(0.006, "m", 0.003, 0.02)
+    mass: float = param(0.040, "kg", 0.005, 0.5)
+    friction: float = param(0.3, "1", 0.05, 1.5)
+    rgba: Rgba = (0.72, 0.70, 0.66, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.width, self.width, self.thickness])
+
+
 if __name__ == "__main__":
-    for box in (Domino(), Block(), Cube()):
+    for box in (Domino(), Block(), Cube(), Lid()):
         show(box)

@@ -8,7 +8,7 @@ import pytest
 from helpers import anywhere
 from hypothesis import given, settings
 
-from scengen.assets.box import Block, Cube, Domino
+from scengen.assets.box import Block, Cube, Domino, Lid
 from scengen.assets.prop import TABLE_TOP, place, table
 
 GRAVITY = 9.81
@@ -30,7 +30,7 @@ def lean(data, about_x, angle):
     data.qpos[3:7] = math.cos(angle / 2), 0, math.sin(angle / 2), 0
 
 
-@pytest.mark.parametrize("box", [Domino(), Block(), Cube()], ids=lambda box: type(box).__name__)
+@pytest.mark.parametrize("box", [Domino(), Block(), Cube(), Lid()], ids=lambda box: type(box).__name__)
 def test_a_box_weighs_what_it_should_and_stands_on_the_middle_of_its_foot(box):
     model, data = alone(box)
     mujoco.mj_forward(model, data)
@@ -77,3 +77,30 @@ def test_a_cube_that_cannot_slide_tips_at_45_degrees(slope, tips):
     model, data = alone(Cube(friction=1.5), math.radians(slope))
     mujoco.mj_step(model, data, 500)
     assert (data.body("box").xmat[8] < math.cos(math.radians(30))) == tips
+
+
+@pytest.mark.parametrize(("beyond", "tips"), [(-0.001, False), (0.001, True)])
+def test_a_lid_tips_off_a_cube_once_its_centre_has_passed_the_edge(beyond, tips):
+    scene, cube, lid = table(), Cube(edge=0.025, mass=0.1), Lid()
+    place(scene, cube, "cube", [0, 0, TABLE_TOP])
+    place(scene, lid, "lid", [cube.edge / 2 + beyond, 0, TABLE_TOP + cube.edge])
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 500)
+    assert (math.acos(min(1.0, data.body("lid").xmat[8])) > math.radians(5)) == tips
+
+
+@pytest.mark.parametrize(("factor", "goes_along"), [(0.93, False), (1.07, True)])
+def test_a_cube_goes_along_with_a_lid_whose_friction_on_it_exceeds_what_holds_both(factor, goes_along):
+    """Coulomb: the lid drags with mu M g, mu being the larger of the two, the table holds with mu_cube (m + M) g."""
+    cube = Cube(edge=0.025, mass=0.03, friction=0.4)
+    lid = Lid(mass=0.04, friction=factor * 0.4 * (0.03 + 0.04) / 0.04)
+    scene = table()
+    place(scene, cube, "cube", [0, 0, TABLE_TOP])
+    place(scene, lid, "lid", [0, 0, TABLE_TOP + cube.edge])
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    while data.body("lid").xpos[0] < 0.008 and data.time < 3.0:
+        data.body("lid").xfrc_applied[0] = 0.2 * data.time  # [N], far more slowly than anything swings
+        mujoco.mj_step(model, data)
+    assert data.time < 3.0 and (data.body("cube").xpos[0] > 0.004) == goes_along
