@@ -250,9 +250,9 @@ class OccluderPush(Scenario):
         yield within_reach("a cube or the patch", *(at + LOW * UP for at in (*starts, *ends, self.goal)))
 
     def features(self) -> Mapping[str, float]:
-        """How many lids there are, how far they stand out [m], their drag over g [kg], the way most askew [rad]."""
+        """How high lids lie on a cube and how far they stand out [m], their drag over g [kg], the way most askew [rad]."""
         return {
-            "lids": float(self.lids),
+            "pile": self.lids * self.lid.thickness,
             "overhang": (self.lid.width - self.cube.edge) / 2,
             "drag": self.lids * self.lid.mass * self.lid.friction,
             "most_turned_way": max((abs(math.atan2(way[1], way[0])) for way in self.ways), default=0.0),
