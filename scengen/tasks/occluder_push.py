@@ -250,7 +250,7 @@ class OccluderPush(Scenario):
         yield within_reach("a cube or the patch", *(at + LOW * UP for at in (*starts, *ends, self.goal)))
 
     def features(self) -> Mapping[str, float]:
-        """How high lids lie on a cube and how far they stand out [m], their drag over g [kg], the way most askew [rad]."""
+        """How high lids lie and how far they stand out [m], their drag over g [kg], the way most askew [rad]."""
         return {
             "pile": self.lids * self.lid.thickness,
             "overhang": (self.lid.width - self.cube.edge) / 2,
