@@ -27,6 +27,7 @@ VERBS = (
     "view",
     "export",
     "record",
+    "card",
     "tasks",
     "new",
     "asset",

@@ -1,6 +1,7 @@
 """check what a pool claims: rebuild, draw again, replay, and repeat its checks"""
 
 import secrets
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -21,11 +22,12 @@ from ..targets import try_file
 from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
-from ..validate.verify import Options, Report, verify
+from ..validate.verify import LIMITS, Options, Report, verify
 from . import BAD_INPUT, FAILED, OK, Arguments, err, one, out, say, warn, write, write_json
 
 SHOWN = 20
 """Differences and faults that are told; the files hold all."""
+EXPIRED = ("fail", "report")
 STATUS = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
 
 
@@ -48,7 +50,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("verify", arguments, Settings)
-    for name, known in (("expired", ("fail", "report")), ("level", LEVELS)):
+    for name, known in (("expired", EXPIRED), ("level", LEVELS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
@@ -59,7 +61,6 @@ def command(arguments: Arguments) -> int:
     if settings.hits is not None:
         return _hits(settings.hits, arguments)
     pool = Pool.open(one(settings.pool))
-    task = config.task(pool.task, search_path(arguments))
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     options = Options(
         settings.level,
@@ -71,8 +72,7 @@ def command(arguments: Arguments) -> int:
         attacked,
     )
     with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        report = verify(pool, task, config.levels(task), options, progress_bar.show)
-    report = _with_hits(report, pool, task, limits)
+        report = verified(pool, options, search_path(arguments), progress_bar.show)
     if settings.json:
         plain = {key: value for key, value in asdict(report).items() if key != "names"}
         write_json(settings.json, {"pool_sha256": pool.sha256, **plain})
@@ -80,6 +80,17 @@ def command(arguments: Arguments) -> int:
         write(Path(settings.junit), junit(str(pool.folder), report))
     _tell(pool, report)
     return STATUS[report.verdict]
+
+
+def verified(pool: Pool, options: Options, search: Sequence[str], progress: Callable[[int], None]) -> Report:
+    """Check every claim of a pool, those about attacks on it included.
+
+    Args:
+        search: overrides that add folders of other packages, see `config.search_path`.
+        progress: told how many scenarios have been checked.
+    """
+    task = config.task(pool.task, search)
+    return _with_hits(verify(pool, task, config.levels(task), options, progress), pool, task, options.limits or LIMITS)
 
 
 def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report:

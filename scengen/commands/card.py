@@ -1,0 +1,69 @@
+"""write a folder for the Hugging Face Hub: pools that verify, and a README.md that tells what is in them"""
+
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..attack.check import attacked
+from ..config import read, search_path
+from ..errors import BadConfig, PoolError, at_least, cut
+from ..export.hub import Part, check_parts, check_target, own_license, publish
+from ..pool import Pool
+from ..runs.progress import ProgressBar
+from ..validate.recheck import LEVELS
+from ..validate.verify import LIMITS, Options, Report
+from . import OK, Arguments, err, say, several
+from .verify import EXPIRED, verified
+
+LONGEST = 300
+"""Letters of a fault that are told."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen card`; meanings stand in conf/command/card.yaml."""
+
+    pool: str | list[str]
+    to: str
+    title: str | None
+    license: str | None
+    level: str
+    sample: int | None
+    expired: str
+    workers: int
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("card", arguments, Settings)
+    for name, known in (("expired", EXPIRED), ("level", LEVELS)):
+        if getattr(settings, name) not in known:
+            raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    at_least(settings, workers=1, sample=1)
+    check_target(settings.to)
+    pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+    check_parts(pools)
+    strict, seed = settings.expired == "fail", secrets.randbelow(2**32)
+    options = Options(settings.level, settings.sample, seed, settings.workers, LIMITS, strict, attacked)
+    parts = []
+    for pool in pools:
+        with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
+            report = verified(pool, options, search_path(arguments), progress_bar.show)
+        if not report.holds:
+            fault = report.failed[0]
+            why = f"{report.names.get(fault['id'], fault['id'])}: {cut(fault['reason'], LONGEST)}"
+            told = f"{pool.folder} is {report.verdict} at level {report.level}: {why}"
+            raise PoolError(f"{told}; a card is for pools that verify, see scengen verify pool={pool.folder}")
+        parts.append(Part(pool, report.settings, _told(report)))
+    tasks = dict.fromkeys(pool.task for pool in pools)
+    title = settings.title or f"scengen: {', '.join(tasks)}"
+    publish(parts, Path(settings.to), title, settings.license or own_license())
+    names = ", ".join(part.name for part in parts)
+    say(f"wrote {settings.to}: README.md and {sum(map(len, pools))} scenarios as {names}")
+    say(f"datasets.load_dataset({settings.to!r}, {parts[0].name!r}) opens one; upload the folder as it is")
+    return OK
+
+
+def _told(report: Report) -> str:
+    """What verification came to, in words."""
+    sample = f", {report.sample['size']} simulated" if report.sample else ""
+    return f"level {report.level}{sample}{', certificates expired' if report.expired else ''}"
