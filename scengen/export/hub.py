@@ -31,7 +31,7 @@ BIGGEST = "n>1M"
 HOLDS = {
     "feasible": "no analytic refutation: out of reach, gap too wide",
     "compiles": "the scene on disk loads in plain MuJoCo without a warning",
-    "overlap": "no contact deeper than 1 mm at the start",
+    "overlap": "bodies do not overlap at the start",
     "rest": "everything stays where it is if nobody acts",
     "unsolved": "the goal does not hold at the start",
     "idle": "doing nothing does not reach the goal",
