@@ -59,11 +59,12 @@ class Path:
     parts: tuple[Part, ...]
 
     def follow(self, arm: Arm) -> Plan:
-        """The path again, each part relative to its body as it now is."""
+        """The path again, each part relative to its body as it now is; one whose body is not there, where it was."""
         world, ends = arm.world, [*(part.first for part in self.parts[1:]), len(self.actions)]
+        here = _bodies(world)
         for part, end in zip(self.parts, ends, strict=True):
             turn, origin = np.eye(3), part.pos
-            if part.body is not None:
+            if part.body in here:
                 turn, origin = _upright(world.rot(part.body) @ part.rot.T), world.pos(part.body)
             aims = origin + (self.hands[part.first : end] - part.pos) @ turn.T
             rots = turn @ self.rots[part.first : end]
