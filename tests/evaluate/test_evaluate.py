@@ -36,6 +36,13 @@ def test_a_goal_has_to_last_as_in_a_certificate(tmp_path, monkeypatch):
     assert not episode["success"] and "did not last" in episode["reason"]
 
 
+def test_actions_can_be_held(tmp_path, monkeypatch):
+    """A goal that is reached between two steps of a policy ends the episode then and there."""
+    monkeypatch.setattr(DominoSingle, "success", lambda self, world: world.time > 0.215)
+    (episode,) = run(tmp_path, "idle", seeds=1, action_repeat=4)
+    assert episode["success"] and episode["seconds"] == pytest.approx(1.22)
+
+
 def test_random_actions_are_the_same_for_the_same_rollout_only(tmp_path):
     first = run(tmp_path / "a", "random", seeds=1, rollouts=2)
     again = run(tmp_path / "b", "random", seeds=1, rollouts=2, workers=2)
@@ -127,6 +134,8 @@ def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkey
         (("policy=math:sinus",), "math has no function or class named 'sinus'"),
         (("policy=idle", "seeds=7"), "holds 6 scenarios; say seeds=6"),
         (("policy=idle", "rollouts=0"), "rollouts = 0; it must be at least 1"),
+        (("policy=idle", "action_repeat=0"), "action_repeat = 0; it must be a whole number of control periods"),
+        (("policy=oracle", "action_repeat=4"), "action_repeat = 4; oracle acts at 100 Hz: leave it out"),
         (("policy=idle", "observations=[rgb_cam]"), "no observation named 'rgb_cam'"),
     ],
 )
