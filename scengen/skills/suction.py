@@ -103,12 +103,24 @@ def carry(
     yield from carry_to(arm, body, target, about_z(yaw), pace, slack)
 
 
-def carry_to(arm: Arm, body: str, target: Vec3, rot: Mat3, pace: Pace = STEADY, slack: float = math.inf) -> Plan:
-    """Bring a body that hangs on the hand to `target` [m], turned to `rot`, looking at the body.
+def carry_to(
+    arm: Arm,
+    body: str,
+    target: Vec3,
+    rot: Mat3,
+    pace: Pace = STEADY,
+    slack: float = math.inf,
+    near: float = NEAR,
+) -> Plan:
+    """Bring a body that hangs on the hand, or is held by a jaw, to `target` [m], turned to `rot`, looking at the body.
 
     The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
     against the weight and the friction of the joints. It waits where it lags on its way by `slack` [m], as something is
     in the way. Ends when the mean error of every point of the body is within that of the pace.
+
+    Args:
+        near: distance from which on errors add up [m]; a body that turns in a jaw comes to hang farther off than one on
+            a cup.
 
     Raises:
         GaveUp: that took too long.
@@ -125,8 +137,8 @@ def carry_to(arm: Arm, body: str, target: Vec3, rot: Mat3, pace: Pace = STEADY, 
         if arm.world.time > end:
             off, turn = 1000 * math.sqrt(left @ left), math.degrees(math.sqrt(askew @ askew))
             raise GaveUp(f"{body} stayed {off:.1f} mm and {turn:.1f} deg off for {pace.give_up:g} s")
-        across = left if left @ left < NEAR**2 else left - (left @ way) * way
-        if max(across @ across, LEVER**2 * (askew @ askew)) < NEAR**2:
+        across = left if left @ left < near**2 else left - (left @ way) * way
+        if max(across @ across, LEVER**2 * (askew @ askew)) < near**2:
             shift, aim_rot = INTEGRAL * Loop.PERIOD * across, rotation(INTEGRAL * Loop.PERIOD * askew) @ aim_rot
             aim, setpoint = aim + shift, setpoint + shift
         lag = max(0.0, float((setpoint - arm.hand) @ way))

@@ -76,6 +76,10 @@ GENTLY, LIFTING = Pace(0.05, 0.005), Pace(0.15, 0.01)
 """How the box is lifted off the table, where a jerk peels it off the cup; how it is lifted further."""
 TIPPING = 0.8
 """How fast the box is turned flat [rad/s]."""
+ROOM = -0.08
+"""How far out along x a hand is turned down at least [m]: at -0.18 joint 4 comes to its limit."""
+ABOUT = 0.1
+"""How exactly it is turned [rad]: under a load the wrist stays a few degrees short; what follows looks at the box."""
 OVER = 0.02
 """How far over the slot's walls the box is brought [m]."""
 AIMING, LOWERING, SLACK = Pace(0.05, 0.001), Pace(0.06, 0.0, 4.0), 0.002
@@ -152,7 +156,9 @@ class CrackerBoxSuction(Scenario):
         """Bring the cup, level, in front of the broad face that looks at the robot's middle; take hold, and lift."""
         face, out = self.broad_face(arm.world)
         level = facing(math.atan2(out[1], out[0]), 0.0)
-        yield from turn_to(arm, level, TURNING, grip=OPEN)  # up here: a hand that turns fast swings out by 15 cm
+        yield from turn_to(
+            arm, level, TURNING, grip=OPEN, within=ABOUT
+        )  # up here: a hand that turns fast swings out by 15 cm
         yield from go_to(arm, face - 5 * STAND_OFF * out, level, Pace(0.25, 0.02), OPEN)
         yield from suck_upright(arm, face, level)
         yield from retreat(arm, 0.02, GENTLY)
@@ -166,8 +172,9 @@ class CrackerBoxSuction(Scenario):
         return world.pos("box") + AT * height * UP - thickness / 2 * out, out
 
     def tip(self, arm: Arm) -> Plan:
-        """Turn the level hand down, and the box with it."""
-        yield from turn_to(arm, axes(arm.hand_rot[:, 0], -UP), TIPPING)
+        """Turn the level hand down, and the box with it, where the arm has room for that."""
+        yield from go_to(arm, [max(arm.hand[0], ROOM), *arm.hand[1:]], pace=LIFTING)
+        yield from turn_to(arm, axes(arm.hand_rot[:, 0], -UP), TIPPING, within=ABOUT)
 
     def bring(self, arm: Arm, rot: Mat3, over: float = OVER) -> Plan:
         """Bring the box over the slot, `over` its walls [m], turned to `rot`."""
