@@ -146,6 +146,8 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
     tasks = {name: config.task(name, search) for name in sorted({n for pool in pools for (n,) in pool.columns("task")})}
+    if settings.format == ROBOMIMIC and len(tasks) > 1:
+        raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
     streams = streams_of(robot)
     if settings.privileged:
         scenes = {name: {x for p in pools for n, x in p.columns("task", "scene_xml") if n == name} for name in tasks}
@@ -156,7 +158,7 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
     _begin(settings)
     try:
         lost = dict(unplayable(_rows(pools, count)))
-        with _writer(settings, robot, streams, list(tasks), tuple(search)) as writer:
+        with _writer(settings, robot, streams, next(iter(tasks)), tuple(search)) as writer:
             for row in _rows(pools, count):
                 if row.id in lost:
                     continue
@@ -232,16 +234,14 @@ class Writer(Protocol):
 
 
 def _writer(
-    settings: Settings, robot: str, streams: Mapping[str, Stream], tasks: Sequence[str], search: tuple[str, ...]
+    settings: Settings, robot: str, streams: Mapping[str, Stream], task: str, search: tuple[str, ...]
 ) -> Writer:
     if settings.format == LEROBOT:
         return _LeRobot(settings, robot, streams)
     from . import robomimic
 
-    if len(tasks) > 1:
-        raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
     size = (settings.width, settings.height)
-    env, arguments = robomimic.environment(tasks[0], settings.folders, settings.eyes, size, search)
+    env, arguments = robomimic.environment(task, settings.folders, settings.eyes, size, search)
     return robomimic.Demonstrations(settings.unfinished, robomimic.streams_of(streams, robot), env, arguments)
 
 

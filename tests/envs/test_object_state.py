@@ -51,12 +51,10 @@ def test_scenarios_that_differ_in_what_is_hidden_look_alike(name):
     task = config.task(name)
     hidden = [p.name for p in task.known.values() if p.hidden]
     one, state = task.draw(ID, 0, 0).scenario, state_of(task)
-    told = [values(task.draw(ID, 0, index).scenario) for index in (1, 2)]
-    others = [with_values(one, {p: other[p] for p in hidden}) for other in told]
-    assert {other.id for other in others} != {one.id}, "the negative control: something hidden does differ"
-    seen = state.read(world_of(one, task.embodiment))
-    for other in others:
-        assert (state.read(world_of(other, task.embodiment)) == seen).all()
+    told = (values(task.draw(ID, 0, index).scenario) for index in range(1, 20))
+    others = (with_values(one, {p: other[p] for p in hidden}) for other in told)
+    other = next(other for other in others if other.id != one.id)
+    assert (state.read(world_of(other, task.embodiment)) == state.read(world_of(one, task.embodiment))).all()
 
 
 def test_what_is_not_hidden_shows():
