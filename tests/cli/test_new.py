@@ -60,9 +60,9 @@ def test_a_new_name_that_contains_an_old_one_is_not_replaced_twice():
     ("argv", "says"),
     [
         (("task=push_off",), "new needs package=..."),
-        (("task=push_off", "package=numpy"), "package = numpy; a package of that name is installed already"),
-        (("task=push_off", "package=json"), "package = json; a package of that name is installed already"),
-        (("task=push_off", "package=tests"), "package = tests; give a word of 60 letters at most, in snake_case"),
+        (("task=x", "package=numpy"), "package = numpy; a package of that name is installed already"),
+        (("task=x", "package=json"), "package = json; a package of that name is installed already"),
+        (("task=x", "package=tests"), "package = tests; give a word of 60 letters at most, in snake_case"),
         (("task=domino_single", "package=x"), "there is a task of that name already, see scengen tasks"),
         (("task=Push-Off", "package=x"), "task = Push-Off; give a word of 60 letters at most, in snake_case"),
         (("task=../up", "package=x"), "task = ../up; give a word"),
