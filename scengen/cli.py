@@ -1,6 +1,6 @@
 """The command line: a verb, then Hydra overrides. `scengen generate task=domino_single split=diagonal n=100`."""
 
-import inspect
+import ast
 import os
 import re
 import signal
@@ -45,6 +45,8 @@ VERBS = (
     "bench",
 )
 
+COMPLETING = ("--completion", "--complete")
+"""What shells ask for."""
 GRACE = 1.5
 """How long an interrupted command may take to put things in order before it is ended [s]."""
 LONGEST = 3000
@@ -128,22 +130,26 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:
     _check_platform()
+    if not argv or argv[0] in ("-h", "--help", "help"):
+        print(_help())
+        return OK
+    verb, *arguments = argv
+    if verb == "--version":
+        from .versions import versions
+
+        print(" ".join(f"{k} {v}" for k, v in versions().items()))
+        return OK
+    if verb not in (*VERBS, *COMPLETING):
+        raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
+
+    # What follows takes seconds to import on a busy machine; nothing above needs it.
     from . import config
-    from .commands import out, say
+    from .commands import out
     from .completion import BASH, completions
     from .control import native
     from .usage import usage
 
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
-    if not argv or argv[0] in ("-h", "--help", "help"):
-        out.print(_help())
-        return OK
-    verb, *arguments = argv
-    if verb == "--version":
-        from .validate.identity import versions
-
-        say(" ".join(f"{k} {v}" for k, v in versions().items()))
-        return OK
     if verb == "--completion":
         if arguments != ["bash"]:
             raise BadConfig(f"{cut(' '.join(argv))}; expected --completion bash: no other shell is known")
@@ -152,8 +158,6 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if verb == "--complete":
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
-    if verb not in VERBS:
-        raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
     if verb == "generate":  # several values are a sweep there, with Hydra's option or without it
         arguments = [a for a in arguments if a not in ("-m", "--multirun")]
     if {"-h", "--help"} & set(arguments):
@@ -236,7 +240,8 @@ def _kept(error: BaseException) -> str:
 
 
 def _help() -> str:
-    told = {verb: inspect.getdoc(import_module(f".commands.{verb}", __package__)) for verb in VERBS}
+    folder = Path(__file__).with_name("commands")
+    told = {verb: ast.get_docstring(ast.parse((folder / f"{verb}.py").read_text())) for verb in VERBS}
     return "\n".join(
         [
             "scengen: physical puzzles for robot manipulation, each proved solvable",

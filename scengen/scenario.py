@@ -141,8 +141,8 @@ class Scenario(abc.ABC):
         """
 
     def pending(self, world: World) -> bool:
-        """Whether something is still going to happen by itself, although everything is at rest and nobody acts: an event,
-        or a goal that time alone brings.
+        """Whether something is still going to happen by itself, although everything is at rest and nobody acts: an
+        event, or a goal that time alone brings.
 
         As long as it is, no episode ends because everything is at rest, and the rest check ends with it. A family whose
         events answer what the robot does should say when they are over; of one that does not, nothing is known.

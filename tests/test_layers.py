@@ -10,7 +10,7 @@ import pytest
 import scengen
 
 LAYERS = (
-    ("errors", "statistics", "geometry", "certificate", "printed"),
+    ("errors", "statistics", "geometry", "certificate", "printed", "versions"),
     ("names", "orientation", "params", "symmetry", "targets"),
     ("robots",),
     ("control",),

@@ -30,8 +30,9 @@ from ..pictures.video import check_size
 from ..pool import Pool, PoolRow
 from ..sim.world import World, hands
 from ..targets import refused, try_file, try_folder
-from ..validate.identity import check_versions, versions
+from ..validate.identity import check_versions
 from ..validate.playable import unplayable
+from ..versions import versions
 from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DataSet, Feature

@@ -29,7 +29,7 @@ from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
 from ..robots.panda import Names
 from ..sim.world import World, hands
-from ..validate.identity import versions
+from ..versions import versions
 from .play import Replay, View
 
 ROBOSUITE_TYPE = 1

@@ -20,8 +20,9 @@ from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..targets import refused
 from ..validate.certify import Certified, certify
-from ..validate.identity import fingerprint, source_sha256, versions
+from ..validate.identity import fingerprint, source_sha256
 from ..validate.settings import CertifySettings
+from ..versions import versions
 from .journal import Journal, Record
 
 

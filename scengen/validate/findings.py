@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..versions import versions
 from .claims import Claims
 from .examine import Examination, Verdict
-from .identity import fingerprint, source_sha256, versions
+from .identity import fingerprint, source_sha256
 from .settings import CertifySettings
 
 

@@ -5,7 +5,6 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import inspect
-import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,13 +19,7 @@ from ..errors import PoolError
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import World
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Versions of everything that the physics depends on."""
-    packages = {p: importlib.metadata.version(p) for p in ("scengen", "mujoco", "robosuite", "numpy")}
-    return {**packages, "platform": f"{platform.system()}-{platform.machine()}"}
+from ..versions import versions
 
 
 def check_versions(made: Mapping[str, str], where: str) -> None:

@@ -29,7 +29,7 @@ from scengen.runs.generate import row_of
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import Certified
-from scengen.validate.identity import versions
+from scengen.versions import versions
 
 # isort: split
 import robosuite
