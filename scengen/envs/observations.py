@@ -2,6 +2,8 @@
 
 Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top. The
 table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name.
+`robot0_eef_quat` is the orientation of the grip site, robosuite's `robot0_eef_quat_site`; what robosuite calls
+`robot0_eef_quat` is that of the body `right_hand`.
 
 Where a scenario is seen turned or mirrored (`Scenario.orientation`), its pictures are, and no other stream: poses stay
 in the axes in which actions are meant. `seen_<body>_pos` tells what such a picture suggests, to policies without eyes.

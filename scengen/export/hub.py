@@ -86,6 +86,8 @@ def check_target(to: str) -> None:
         raise BadConfig(f"{to} is not empty; delete it, or name another folder")
     if not path.name:
         raise BadConfig(f"to = {to}; name a folder of its own for the data set")
+    if (unfinished := Path(f"{path}.unfinished")).exists():
+        raise BadConfig(f"{unfinished} is left from a card that was killed, or one is under way; delete it")
     try_folder(to)
 
 
