@@ -18,8 +18,6 @@ BEAD = 0.012
 """Height of the bead [m]."""
 RIM = 0.001
 """Height of the uppermost part of the wall [m], whose end face a cup upside down stands on."""
-BAR = 0.012
-"""Thickness of the handle [m]."""
 SHORTEST_HANDLE = 0.020
 """A handle that stands out less is none [m]."""
 LOWEST, HIGHEST = 0.26, 0.84
@@ -49,6 +47,8 @@ class Cup(Turned):
     """Thickness of the last 12 mm of the wall, thicker towards the inside; as thick as the wall where that is more."""
     handle: float = param(0.0, "m", 0.0, 0.06)
     """How far it stands out from the wall; below 20 mm, where nothing fits behind it, there is none."""
+    bar: float = param(0.012, "m", 0.008, 0.020)
+    """Thickness of the handle: the jaw presses harder on a thicker one, and the more of its pads holds it."""
     curve: float = param(0.0, "1", 0.0, 1.0)
     """From 0, a handle of three straight bars, to 1, its outer half a half ring."""
     mass: float = param(0.050, "kg", 0.01, 0.5)
@@ -101,14 +101,14 @@ class Cup(Turned):
     @property
     def _reach(self) -> float:
         """Distance of the upright's middle line from the cup's axis [m]."""
-        return self.outer((LOWEST + HIGHEST) / 2 * self.height) + self.handle - BAR / 2
+        return self.outer((LOWEST + HIGHEST) / 2 * self.height) + self.handle - self.bar / 2
 
     def _bars(self) -> list[tuple[mujoco.mjtGeom, Vec3, Vec3]]:
         """The handle: kind of geom and both ends of its middle line for each straight part [m]."""
         if not self.has_handle:
             return []
-        low, high = LOWEST * self.height + BAR / 2, HIGHEST * self.height - BAR / 2
-        bend = self.curve * min((high - low) / 2, self.handle - BAR)
+        low, high = LOWEST * self.height + self.bar / 2, HIGHEST * self.height - self.bar / 2
+        bend = self.curve * min((high - low) / 2, self.handle - self.bar)
         parts = []
         path = []
         for z, side in ((low, 1.0), (high, -1.0)):
@@ -120,7 +120,7 @@ class Cup(Turned):
             parts += [(CAPSULE, start, end) for start, end in itertools.pairwise(arc)]
             path.append(arc[-1])
         lower, upper = path
-        more = np.array([0.0, 0.0, max(0.0, BAR / 2 - bend)])
+        more = np.array([0.0, 0.0, max(0.0, self.bar / 2 - bend)])
         if upper[2] - lower[2] > SHORTEST:
             parts.append((BOX, lower - more, upper + more))
         return parts
@@ -129,7 +129,7 @@ class Cup(Turned):
         """Centre of mass [m] and inertia about it [kg m^2], of one density; each bar of the handle as a thin rod."""
         bodies = [self.round_body()]
         for kind, start, end in self._bars():
-            along, area = end - start, BAR**2 * (1.0 if kind == BOX else math.pi / 4)
+            along, area = end - start, self.bar**2 * (1.0 if kind == BOX else math.pi / 4)
             volume = area * float(np.linalg.norm(along))
             own = volume * (along @ along * np.eye(3) - np.outer(along, along)) / 12
             bodies.append((volume, (start + end) / 2, own))
@@ -146,7 +146,7 @@ class Cup(Turned):
         for i, (kind, start, end) in enumerate(self._bars()):
             along = end - start
             half = float(np.linalg.norm(along)) / 2
-            size = [BAR / 2, BAR / 2, half] if kind == BOX else [BAR / 2, half]
+            size = [self.bar / 2, self.bar / 2, half] if kind == BOX else [self.bar / 2, half]
             turn = quat("y", math.atan2(along[0], along[2]))
             middle = (start + end) / 2
             name, rub = f"handle_{i}", self.handle_friction
