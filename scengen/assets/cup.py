@@ -143,6 +143,10 @@ class Cup(Turned):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         super().fill(body, spec)
+        # A box on the floor's mesh would stand on one point and rock: MuJoCo gives two boxes four.
+        flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - PROUD) / 2
+        size, pos = [flat, flat, half], [0.0, 0.0, self.floor - half]
+        solid(body, "floor", size, pos, friction=self.friction, mass=0.0, rgba=self.rgba)
         for i, (kind, start, end) in enumerate(self._bars()):
             along = end - start
             half = float(np.linalg.norm(along)) / 2

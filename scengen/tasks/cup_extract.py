@@ -1,0 +1,286 @@
+"""T24 cup-extract: get a block out of a cup that is deeper than the fingers are long.
+
+        |    |___            hand          The palm, wider than the cup, stops at its rim, and the fingers end above
+        |    |   |        ____|____        the block. The cup is taken by its handle and turned until its mouth
+        | __ |   |   ->  |  __     |       points down by more than the angle at which the block slides.
+        ||  ||---         __|__|___
+        |____|             -.  []
+    --------------        ----------
+
+Bottleneck: the block is out of reach in whatever way the hand comes. It leaves the cup only if that is turned beyond
+level, by the friction angle of its wall, and the cup can be turned only by its handle:
+
+* Its thin wall lets the fingers close so far that the jaw's springs hardly press (`pinch`): friction there bears less
+  than the weight of cup and block. The handle is thick.
+* Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
+* Pushed it slides, since its friction on the table is less than its radius over its height.
+
+Decisions, where the paper (App. B, T24) is silent:
+
+* It gives no lengths. The block is as thick as the fingers are long: a palm over the mouth, "blocking the object from
+  exiting" as in the paper's failures (App. J), does block it.
+* In the region means: out of the cup, upright or upside down, touching the table alone, at rest, for 0.3 s, 30 steps
+  as in the paper's T12 and T13. Where the cup is then does not matter, but on the table it must be. Pouring the block
+  straight into the region would count, and so would shaking it out of a cup held level by its handle: the same insight.
+* How slippery the wall is nobody can see; a cup that is turned slowly tells. There is no `answer` to guess: whoever
+  turns it farther than needed has not failed.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from ..assets.box import Block
+from ..assets.cup import Cup
+from ..assets.patch import Patch
+from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
+from ..geometry import UP, Vec3, about_y, about_z, heading, polar
+from ..params import param
+from ..predicates import fallen, over, rests_on, still
+from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP, TIPS_CLOSED, pinch
+from ..robots.panda import BASE
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.world import World
+from ..skills.grip import take
+from ..skills.jaw import grasp, pick, put
+from ..skills.motion import (
+    CLOSED,
+    COARSE,
+    FINE,
+    OPEN,
+    STEADY,
+    closing_along,
+    go_to,
+    push,
+    retreat,
+    turn_to,
+    until,
+    wait,
+)
+
+MUG = Cup(
+    base=0.041, rim=0.041, wall=0.002, bead=0.0, handle=0.046, bar=0.018, mass=0.09, friction=0.13, handle_friction=0.9
+)
+"""82 mm wide, more than the jaw opens, and smooth as glazed china or polished metal; the handle is rubber."""
+AIR = 0.005
+"""Least space between hand and things [m]: jitter takes 2 mm, moves are exact to 3 mm."""
+TAPER = 0.35
+"""Slope of the fingers' outer sides, which come nearer to each other towards the tips: measured in a cup."""
+GRAVITY = 9.81
+"""[m/s^2]"""
+POUR_AT, POUR_HEIGHT = 0.41, 0.22
+"""Where the hand is that pours: how far from the robot's first axis, since it cannot point back at the robot from
+farther out, and how high over the table [m]."""
+LEVEL, STEEPEST = math.radians(85.0), math.radians(130.0)
+"""Tilt of the cup up to which it is turned fast, and the farthest to which a hand at `POUR_AT` turns it [rad]."""
+FAST, SLOW = 1.2, 0.3
+"""How fast the cup is turned [rad/s]."""
+ASIDE: Vec3 = np.array([-0.13, 0.25, 0.0])
+"""Where the empty cup is put down if the square is on the right [m]."""
+CALM = 0.02
+"""Speed below which the block counts as at rest [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CupExtract(Scenario):
+    """A block in a cup with a handle, and a green square on the table."""
+
+    HOLD = 0.3
+
+    x: float = param(0.0, "m", -0.4, 0.4)
+    y: float = param(0.0, "m", -0.4, 0.4)
+    handle: float = param(180.0, "deg", 0.0, 360.0, period=360.0)
+    """Where the handle points; 180: towards the robot."""
+    goal_x: float = param(-0.10, "m", -0.4, 0.4)
+    goal_y: float = param(-0.25, "m", -0.4, 0.4)
+    cup: Cup = MUG
+    block: Block = Block(width=0.040, height=0.044, mass=0.035, friction=0.5)
+    patch: Patch = Patch(size=0.11)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        return self._scene(self.cup)
+
+    def _scene(self, cup: Cup) -> mujoco.MjSpec:
+        scene, turn = table(), math.radians(self.handle)
+        place(scene, cup, "cup", self.foot, turn)
+        place(scene, self.block, "block", self.foot + cup.floor * UP, turn)
+        place(scene, self.patch, "patch", self.goal, free=False)
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        placed = over(world, "block", self.goal, self.patch.size / 2) and rests_on(world, "block", "table")
+        return placed and still(world, "block", CALM) and not self.within(world)
+
+    def within(self, world: World) -> bool:
+        """Whether the middle of the block is inside the cup, however that is turned."""
+        x, y, z = world.rot("cup").T @ (world.com("block") - world.pos("cup"))
+        return math.hypot(x, y) <= self.cup.rim and 0.0 <= z <= self.cup.height
+
+    def failure(self, world: World) -> str | None:
+        lost = fallen(world, "block", "cup")
+        return f"the {lost} fell off the table" if lost else None
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Take the cup by its handle, pour, put it aside, place the block."""
+        yield from self.take_cup(world)
+        yield from self.pour(world)
+        yield from self.put_down(world, self.aside)
+        yield from self.place_block(world)
+
+    def take_cup(self, world: World) -> Plan:
+        """Grasp the upright of the handle and lift the cup clear of the table."""
+        rot = world.rot("cup")
+        yield from pick(world.arm, world.pos("cup") + rot @ self.cup.grip, rot[:, 1], lift=0.06)
+
+    def pour(self, world: World, tilt: float = STEEPEST) -> Plan:
+        """Turn the handle to the robot, then the mouth away and down, until the block is out or at a tilt [rad]."""
+        arm, bearing = world.arm, polar(world.arm.hand - BASE)[0]
+        spot = BASE * [1.0, 1.0, 0.0] + POUR_AT * heading(math.degrees(bearing)) + (TABLE_TOP + POUR_HEIGHT) * UP
+        upright = about_z(math.remainder(bearing - polar(-world.rot("cup")[:, 0])[0], math.tau)) @ arm.hand_rot
+        yield from go_to(arm, spot, upright, STEADY)
+        for angle, rate in ((LEVEL, FAST), (tilt, SLOW)):
+            over = about_z(bearing) @ about_y(angle) @ about_z(-bearing) @ upright
+            turned = turn_to(arm, over, rate)
+            yield from until(turned, lambda a=angle: world.tilt("cup") >= a or not self.within(world))
+        yield from turn_to(arm, upright, FAST, within=0.1)
+
+    def put_down(self, world: World, spot: Vec3) -> Plan:
+        """Put the held cup down upright [m] and let go."""
+        com = world.com("cup") - world.pos("cup")
+        yield from put(world.arm, "cup", spot + com, "table", hover=0.06)
+        yield from retreat(world.arm)
+
+    def place_block(self, world: World) -> Plan:
+        """Once the block is at rest take it, put it in the middle of the square, let go."""
+        yield from wait(world.arm, lambda: still(world, "block", CALM), 2.0)
+        stands = world.com("block")[2]
+        yield from take(world.arm, "block")
+        yield from put(world.arm, "block", [self.goal_x, self.goal_y, stands], "table", hover=0.06)
+        yield from retreat(world.arm, 0.06)
+
+    # --- shortcuts and ablations ------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "reach_in": Shortcut(self._reach_in),
+            "pour_by_the_rim": Shortcut(self._by_the_rim),
+            "tip_it_level": Shortcut(self._level),
+            "bring_the_cup": Shortcut(self._bring, to_rest=True),
+            "knock_it_over": Shortcut(self._knock, to_rest=True),
+        }
+
+    def _reach_in(self, world: World) -> Plan:
+        """Fingers as far apart as the mouth allows, down until something stops the hand, close, lift, to the square."""
+        arm, across = world.arm, world.rot("cup")[:, 1]
+        mouth = world.pos("cup") + (self.cup.height + TIP + 0.02) * UP
+        yield from go_to(arm, mouth, closing_along(arm, across), STEADY, OPEN)
+        narrow = 2 * (self.cup.rim - self.cup.wall - AIR) - TIPS_CLOSED
+        yield from until(grasp(arm, 1.0), lambda: arm.gap <= narrow)
+        lowest = arm.hand[2] - 0.02 - self.cup.height
+        yield from push(arm, -0.1 * UP, lambda: arm.hand[2] < lowest or arm.load()[2] > 10.0, 0.0)
+        yield from grasp(arm)
+        yield from retreat(arm, 0.15)
+        yield from go_to(arm, self.goal + 0.08 * UP)
+
+    def _by_the_rim(self, world: World) -> Plan:
+        """Pinch the wall where the handle is, as deep as the palm allows, lift, pour."""
+        arm, out = world.arm, -world.rot("cup")[:, 0]
+        at = world.pos("cup") + (self.cup.rim - self.cup.wall / 2) * out
+        yield from pick(arm, at + (self.cup.height - PALM_ABOVE + AIR) * UP, out, lift=0.06)
+        yield from self.pour(world)
+
+    def _level(self, world: World) -> Plan:
+        """Turn the cup until it lies in the air over the square, and back."""
+        yield from self.take_cup(world)
+        yield from self.pour(world, math.radians(90.0))
+        yield from self.put_down(world, self.aside)
+
+    def _bring(self, world: World) -> Plan:
+        """Put the cup down in the square with the block in it."""
+        yield from self.take_cup(world)
+        yield from self.put_down(world, self.goal)
+
+    def _knock(self, world: World) -> Plan:
+        """Push the cup at its rim with closed fingers, away from its handle's side, as fast as the hand goes."""
+        arm, along = world.arm, world.rot("cup")[:, 1] * math.copysign(1.0, self.goal_y)
+        beside = world.pos("cup") - (self.cup.rim + 0.03) * along + (self.cup.height - 0.005) * UP
+        yield from go_to(arm, beside + 0.05 * UP, closing_along(arm, world.rot("cup")[:, 0]), COARSE, CLOSED)
+        yield from go_to(arm, beside, pace=FINE)
+        yield from push(arm, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.12)
+        yield from retreat(arm)
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        """Without a handle nothing lifts the cup; covered, nothing leaves it."""
+        covered = self.build()
+        lid = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "mass": 0.0, "priority": PRIORITY + 1}
+        solid(covered.body("cup"), "lid", [self.cup.rim, 0.001], [0.0, 0.0, self.cup.height + 0.001], **lid)
+        return {"no_handle": self._scene(replace(self.cup, handle=0.0)), "covered": covered}
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        cup, block = self.cup, self.block
+        yield require(cup.has_handle, "the cup has no handle", handle=cup.handle)
+        beside = cup.grip[0] - cup.rim - PALM_ACROSS
+        yield require(beside >= AIR, "the palm does not fit between handle and cup", room=beside)
+        narrowest = 2 * min(cup.base, cup.rim)
+        yield require(narrowest > OPENING, "the jaw can span the cup", width=narrowest, jaw=OPENING)
+        room = cup.height - cup.floor - block.height - PALM_ABOVE - TIP
+        yield require(room >= AIR, "the fingers come down to the block", room=room)
+        air = min(cup.base, cup.rim) - max(cup.wall, cup.bead) - block.width / math.sqrt(2)
+        yield require(air >= AIR, "the block sticks in the cup", room=air)
+        weight, bears = GRAVITY * (cup.mass + block.mass), pinch(max(cup.wall, cup.bead)) * cup.friction
+        yield require(bears < 0.9 * weight, "the jaw can carry the cup by its wall", bears=bears, weight=weight)
+        yield require(
+            cup.friction < TAPER, "fingers opened in the cup can carry it", friction=cup.friction, taper=TAPER
+        )
+        slides = cup.base / cup.height
+        yield require(cup.friction < 0.9 * slides, "a push tips the cup", friction=cup.friction, most=slides)
+        turn = about_z(math.radians(self.handle))
+        ends = [self.foot + turn @ [cup.grip[0] + cup.bar / 2, 0.0, 0.0], self.foot + turn @ [-cup.rim, 0.0, 0.0]]
+        yield on_table("the cup", ends)
+        yield on_table("the square", self.goal, margin=self.patch.size / 2)
+        apart = math.dist(self.foot, self.goal) - cup.grip[0] - self.patch.size
+        yield require(apart >= 0.0, "the cup stands on the square", room=apart)
+        yield within_reach("the handle or the square", self.foot + turn @ cup.grip, self.goal + 0.1 * UP)
+
+    def features(self) -> Mapping[str, float]:
+        """Where the handle is seen from the robot's first axis, tilt at which the block slides, depth in lengths of the
+        fingers, shape of the handle, torque of the cup's weight about the jaw over what the pads press [m]."""
+        com, _ = self.cup.inertial()
+        moment = GRAVITY * (self.cup.mass * (self.cup.grip - com)[0] + self.block.mass * self.cup.grip[0])
+        towards, _ = polar(self.foot - BASE)
+        return {
+            "handle_to_robot": math.remainder(math.radians(self.handle) - math.pi - towards, math.tau),
+            "sliding_tilt": math.pi / 2 + math.atan(self.cup.friction),
+            "depth_over_fingers": self.cup.height / (PALM_ABOVE + TIP),
+            "curve": self.cup.curve,
+            "moment_over_pinch": moment / pinch(self.cup.bar),
+            "goal_bearing": polar(self.goal - BASE)[0],
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the cup stands [m]."""
+        return np.array([self.x, self.y, TABLE_TOP])
+
+    @property
+    def goal(self) -> Vec3:
+        """Middle of the square [m]."""
+        return np.array([self.goal_x, self.goal_y, TABLE_TOP])
+
+    @property
+    def aside(self) -> Vec3:
+        """Where the empty cup is put down: on the side that the square is not on [m]."""
+        return np.array([ASIDE[0], math.copysign(ASIDE[1], -self.goal_y), TABLE_TOP])
