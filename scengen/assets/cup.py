@@ -42,7 +42,7 @@ class Cup(Turned):
     wall: float = param(0.003, "m", 0.0015, 0.006)
     """Its thickness, level."""
     floor: float = param(0.004, "m", 0.002, 0.008)
-    """Height of the floor inside."""
+    """Height of the floor inside, whose middle is the top of a box."""
     bead: float = param(0.005, "m", 0.0, 0.008)
     """Thickness of the last 12 mm of the wall, thicker towards the inside; as thick as the wall where that is more."""
     handle: float = param(0.0, "m", 0.0, 0.06)
@@ -70,11 +70,12 @@ class Cup(Turned):
     @property
     def sections(self) -> list[Section]:
         top, end = self.height - RIM, self.height
+        flat = self.floor - PROUD
         below = top if self.bead <= self.wall + SHORTEST else end - BEAD
         edge = max(self.wall, self.bead)
         parts = [
-            self._ring("bottom", PROUD, self.floor, None, self.friction, PRIORITY),
-            self._ring("wall", self.floor, below, self.wall, self.friction, PRIORITY + 1),
+            self._ring("bottom", PROUD, flat, None, self.friction, PRIORITY),
+            self._ring("wall", flat, below, self.wall, self.friction, PRIORITY + 1),
             self._ring("rim", top, end, edge, self.rim_friction, PRIORITY),
         ]
         if below < top:
@@ -143,7 +144,8 @@ class Cup(Turned):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         super().fill(body, spec)
-        # A box on the floor's mesh would stand on one point and rock: MuJoCo gives two boxes four.
+        # On the mesh of the floor a box would stand on one point and rock; MuJoCo gives two boxes four. This one's top
+        # is the floor, and the mesh lies a little lower.
         flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - PROUD) / 2
         size, pos = [flat, flat, half], [0.0, 0.0, self.floor - half]
         solid(body, "floor", size, pos, friction=self.friction, mass=0.0, rgba=self.rgba)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold
 
 from scengen.assets.bowl import BEAD, Bowl
+from scengen.assets.box import Block
 from scengen.assets.cup import RIM, SHORTEST_HANDLE, Cup
 from scengen.assets.plate import Plate
 from scengen.assets.prop import TABLE_TOP, place, table
@@ -167,6 +168,19 @@ def test_a_ball_fits_into_a_cup_by_size_alone_and_feels_no_handle(cup):
         assert probed(cup, [(0, 0, middle)], 1.01 * radius) == 1
 
 
+@pytest.mark.parametrize("tilt", [0.0, 0.02], ids=["put down", "dropped askew"])
+def test_a_box_stands_in_a_cup_on_its_floor_and_does_not_rock(tilt):
+    cup, scene = Cup(), table()
+    place(scene, cup, "cup", [0, 0, TABLE_TOP])
+    place(scene, Block(width=0.040), "block", [0.002, 0.001, TABLE_TOP + cup.floor + tilt * 0.02])
+    model = mujoco.MjSpec.from_string(emit(scene)[0]).compile()
+    data = mujoco.MjData(model)
+    data.joint("block_free").qpos[3:] = [math.cos(tilt / 2), math.sin(tilt / 2), 0, 0]
+    mujoco.mj_step(model, data, 2000)
+    assert data.body("block").xpos[2] - TABLE_TOP == pytest.approx(cup.floor, abs=1e-4)
+    assert np.abs(data.qvel).max() < 1e-3
+
+
 @given(bowl=anywhere(Bowl), turn=st.floats(0, 2 * math.pi), tilt=st.floats(0.0, 1.0))
 @settings(max_examples=25, deadline=None)
 def test_a_ball_may_lie_anywhere_against_the_inner_sphere_of_a_bowl(bowl, turn, tilt):
@@ -190,10 +204,10 @@ def test_a_ball_may_lie_anywhere_against_the_inner_sphere_of_a_bowl(bowl, turn, 
 def test_a_straight_cup_has_the_inertia_of_a_tube_and_a_disc(mass, radius, height, wall):
     """Tube: m (R^2 + r^2) / 2 and m (3 (R^2 + r^2) + h^2) / 12; disc: m R^2 / 2 and m (3 R^2 + h^2) / 12."""
     cup = Cup(mass=mass, base=radius, rim=radius, height=height, wall=wall, bead=0.0)
-    tall, flat, inner = height - cup.floor, cup.floor - PROUD, radius - wall
+    tall, flat, inner = height - cup.floor + PROUD, cup.floor - 2 * PROUD, radius - wall
     areas = np.array([radius**2 - inner**2, radius**2])
     m = mass * areas * [tall, flat] / (areas @ [tall, flat])
-    z = np.array([cup.floor + tall / 2, PROUD + flat / 2])
+    z = np.array([height - tall / 2, PROUD + flat / 2])
     squares = np.array([radius**2 + inner**2, radius**2])
     com, inertia = cup.inertial()
     assert com == pytest.approx([0, 0, m @ z / mass])
