@@ -14,7 +14,6 @@ from controls import (
     not_certified,
     play,
     play_shortcut,
-    spared,
 )
 from helpers import anywhere
 from hypothesis import given, settings
@@ -176,7 +175,6 @@ def test_what_falls_off_the_table_is_lost(solved, body):
     [
         (replace(NOMINAL, goal_x=0.0, goal_y=-0.05), "feasible", "the cup stands on the square"),
         (mistaken(CupExtract, "tip_it_level")(), "solved", "the oracle failed"),
-        (spared(CupExtract)(), "ablations", "the witness succeeds with 'less_light'"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, CupExtract) else str(value),
 )
