@@ -8,7 +8,7 @@
     --------------        ----------
 
 Bottleneck: the block is out of reach in whatever way the hand comes. It leaves the cup only if that is turned beyond
-level, by the friction angle of its wall, and the cup can be turned only by its handle:
+level, by the angle of friction on its wall, and what turns it is its handle:
 
 * Its thin wall lets the fingers close so far that the jaw's springs hardly press (`pinch`): friction there bears less
   than the weight of cup and block. The handle is thick.
@@ -260,7 +260,7 @@ class CupExtract(Scenario):
         """Where the handle is seen from the robot's first axis, tilt at which the block slides, depth in lengths of the
         fingers, shape of the handle, torque of the cup's weight about the jaw over what the pads press [m]."""
         com, _ = self.cup.inertial()
-        moment = GRAVITY * (self.cup.mass * (self.cup.grip - com)[0] + self.block.mass * self.cup.grip[0])
+        moment = GRAVITY * float(self.cup.mass * (self.cup.grip - com)[0] + self.block.mass * self.cup.grip[0])
         towards, _ = polar(self.foot - BASE)
         return {
             "handle_to_robot": math.remainder(math.radians(self.handle) - math.pi - towards, math.tau),
