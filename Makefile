@@ -42,6 +42,11 @@ wheel:
 slow: setup
 	$(BIN)/python -m pytest -n 2 -m slow
 
+# The commands of the README as they are written, but for the long ones; ALL=all runs those too: hours.
+ALL ?=
+readme: setup
+	$(BIN)/python tests/readme/run.py $(ALL)
+
 # Mangled command lines: each must end with exit 0, 1 or 2 and one line with a remedy. FUZZ of them, from SEED.
 FUZZ ?= 2000
 SEED ?= 0

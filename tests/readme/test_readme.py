@@ -1,0 +1,38 @@
+"""Every command of the README is one that scengen takes; `make readme` runs them."""
+
+import shlex
+
+import pytest
+from helpers import REFERENCE
+
+from readme.commands import APART, ROOT, commands, why_apart
+from readme.run import run
+from scengen import cli, config
+
+PAGES = (ROOT / "README.md", ROOT / "example" / "README.md")
+LINES = [line for page in PAGES for line in commands(page) if line.startswith("scengen ")]
+
+
+def test_what_is_left_out_is_there():
+    """A reason that outlives its command would hide the next one that begins so."""
+    assert all(any(command.startswith(start) for command in commands()) for start in APART)
+    assert sum(not why_apart(command) for command in commands()) > 15, "most of what is cheap is run"
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_setting_of_a_command_exists(line):
+    _, verb, *words = shlex.split(line, comments=True)
+    assert verb in cli.VERBS or verb == "--completion"
+    if verb in cli.VERBS:
+        overrides = [word for word in words if not word.startswith("-")]
+        overrides = [word for word in overrides if word not in ("job", "defaults-tree")]
+        if "task=push_off" in overrides and verb != "new":  # the task of the example, which is not installed
+            overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
+        for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
+            config.shown(verb, getattr(one, "overrides", one))
+
+
+def test_a_command_that_fails_is_seen(tmp_path):
+    assert run("scengen show pool=nowhere", tmp_path)[0] == 2
+    status, said, _ = run(f"scengen show pool={REFERENCE} id=8ed4", tmp_path)
+    assert status == 0 and "domino_single/id@0/8ed4a4577fe0" in said
