@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test wheel slow fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo test wheel slow readme fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 

@@ -4,9 +4,9 @@ import shlex
 
 import pytest
 from helpers import REFERENCE
-
 from readme.commands import APART, ROOT, commands, why_apart
 from readme.run import run
+
 from scengen import cli, config
 
 PAGES = (ROOT / "README.md", ROOT / "example" / "README.md")
@@ -20,13 +20,14 @@ def test_what_is_left_out_is_there():
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_every_setting_of_a_command_exists(line):
+def test_every_setting_of_a_command_exists(line, monkeypatch):
     _, verb, *words = shlex.split(line, comments=True)
     assert verb in cli.VERBS or verb == "--completion"
     if verb in cli.VERBS:
         overrides = [word for word in words if not word.startswith("-")]
         overrides = [word for word in overrides if word not in ("job", "defaults-tree")]
         if "task=push_off" in overrides and verb != "new":  # the task of the example, which is not installed
+            monkeypatch.syspath_prepend(ROOT / "example")
             overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
         for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
             config.shown(verb, getattr(one, "overrides", one))
