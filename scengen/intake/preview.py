@@ -8,7 +8,7 @@ import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, heading
-from ..pictures.render import AZIMUTH, ELEVATION, Picture, camera
+from ..pictures.render import VIEWS, Picture, camera
 from ..sim.scene_text import emit
 from ..sim.world import JAW
 from .prop import MeshProp
@@ -32,8 +32,9 @@ def _picture(prop: MeshProp) -> Picture:
     scene = table()
     place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP], free=False)
     low, high = prop.vertices.min(axis=0), prop.vertices.max(axis=0)
-    dip = math.radians(ELEVATION)
-    ahead = math.cos(dip) * heading(AZIMUTH) + math.sin(dip) * UP
+    azimuth, elevation = VIEWS[0]
+    dip = math.radians(elevation)
+    ahead = math.cos(dip) * heading(azimuth) + math.sin(dip) * UP
     right = np.cross(ahead, UP) / math.cos(dip)
     axes, turn = np.column_stack([right, np.cross(right, ahead), -ahead]), np.empty(4)
     mujoco.mju_mat2Quat(turn, axes.ravel())
