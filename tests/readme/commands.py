@@ -21,6 +21,7 @@ APART = {
     "scengen verify hits=": "the hits are those of scengen attack",
     "scengen record": "scenarios before four cameras: a quarter of an hour without a graphics card",
     "scengen robosuite": "10 episodes under robosuite's own controller: 2 minutes",
+    "pytest --scengen-task": "wants the package of scengen new to be installed",
     "scengen axis": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
