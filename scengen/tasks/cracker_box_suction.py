@@ -43,6 +43,7 @@ from ..sim.world import Arm, World
 from ..skills.jaw import poke
 from ..skills.motion import (
     CLOSED,
+    COARSE,
     OPEN,
     STEADY,
     Pace,
@@ -70,8 +71,9 @@ GRIPS = 1.4
 """How many times its weight the friction of a box that is carried by a side must hold: at 1.2 half of them slip off."""
 PEELS = 1.5
 """How many times its torque about the face the cup must hold: at 1.4 most boxes are peeled off by the lift."""
-TURNING = 1.2
-"""How fast an empty hand turns [rad/s]."""
+TURNING, AWAY = 1.2, np.array([0.0, -0.09, 0.06])
+"""How fast an empty hand turns [rad/s], and how far it draws back from the box before, and up [m]: it swings out by
+8 cm."""
 GENTLY, LIFTING = Pace(0.05, 0.005), Pace(0.15, 0.01)
 """How the box is lifted off the table, where a jerk peels it off the cup; how it is lifted further."""
 TIPPING = 0.8
@@ -156,9 +158,9 @@ class CrackerBoxSuction(Scenario):
         """Bring the cup, level, in front of the broad face that looks at the robot's middle; take hold, and lift."""
         face, out = self.broad_face(arm.world)
         level = facing(math.atan2(out[1], out[0]), 0.0)
-        yield from turn_to(
-            arm, level, TURNING, grip=OPEN, within=ABOUT
-        )  # up here: a hand that turns fast swings out by 15 cm
+        away = AWAY * [1.0, math.copysign(1.0, self.box_y), 1.0]
+        yield from go_to(arm, arm.hand + away, pace=COARSE, grip=OPEN)
+        yield from turn_to(arm, level, TURNING, grip=OPEN, within=ABOUT)
         yield from go_to(arm, face - 5 * STAND_OFF * out, level, Pace(0.25, 0.02), OPEN)
         yield from suck_upright(arm, face, level)
         yield from retreat(arm, 0.02, GENTLY)
