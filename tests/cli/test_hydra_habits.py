@@ -57,6 +57,7 @@ def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(c
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_path, monkeypatch):
     asked = ("generate", "-m", DOMINO, "split=id,wide_gaps", "n=1", *QUICKLY, f"pool={tmp_path}")
     assert said(capsys, *asked)[0] == 0
