@@ -1,0 +1,333 @@
+"""T20 indirect-push: push a red block into a zone, where the arm reaches neither.
+
+                                                           zone
+      base                     block  block     target    .---.      seen from above, along the target's bearing
+       (o)  - - - -  hand >>    [ ]    [ ]  - - - [#] - - |   | -    from the robot's first axis
+                                                          '---'
+                 [ ]       [ ]      [ ]   blocks lie scattered
+
+Bottleneck: the push has to be made longer. No part of the hand comes to the target, but a block does that is pushed by
+a block that is pushed by the hand; they have to be fetched and put in line first, as many as the distance asks for.
+
+Decisions, where the paper (App. B, T20) is silent or cannot be meant as it is written:
+
+* The paper's chain connects "the target to the goal zone": there it would stand in the target's way. Here it stands
+  between hand and target, in line with the zone.
+* Out of reach. The arm swings about a shoulder 0.445 m above the table, and a band before the far edge is beyond it.
+  It is deep enough for a target, a way to go and a zone only towards the corners: hence the bearing near 20 deg.
+  Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.TOUCH`).
+* One block must not do either, be it pushed by an arm at full stretch or struck and let slide: the zone begins where
+  such a block ends. Two are needed in training, three where the zone is farther or the blocks are smaller.
+* In the zone is a target whose middle is over it, on the table and at rest, for 0.3 s, 30 steps as in the paper's T12
+  and T13. Touching the target loses the episode: nothing but a block may come to it.
+* What else is done with the blocks is free. A block that is held in the jaw reaches less far than one that is pushed.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..assets.box import Cube
+from ..assets.patch import Patch
+from ..assets.prop import TABLE_TOP, Rgba, place, table
+from ..control.loop import Loop
+from ..errors import GaveUp
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading
+from ..params import check_bounds, param
+from ..predicates import fallen, inside, still
+from ..robots import ik
+from ..robots.jaw import TIP
+from ..robots.panda import BASE
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
+from ..sim.world import ROBOT, World
+from ..skills.grip import WIDEST
+from ..skills.jaw import carry, pick, release
+from ..skills.motion import CLOSED, COARSE, STEADY, Condition, Pace, go_to, push, retreat, steer
+
+COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (0.90, 0.72, 0.20, 1.0))
+"""Of the blocks; the target is red."""
+ZONE = 0.036
+"""Length of a side of the zone [m]."""
+FRONT = 0.825
+"""How far from the robot's first axis the tips of a hand come that leans outwards, at the height of a block's middle
+[m]. Measured: 0.829 without trouble; beyond it the arm is nearly straight."""
+FARTHEST = 0.849
+"""How far they come in any posture that inverse kinematics finds [m]: the grip site 0.840, the tips 9 mm more."""
+SLIDES = 0.008
+"""How far a block slides on that such an arm lets go [m]: v^2 / (2 mu g) of 0.25 m/s at a friction of 0.4."""
+HAND = (0.36, 0.72)
+"""Nearest and farthest distance from the robot's first axis at which a hand that points down takes a block [m]."""
+PLACED, APART = 0.690, 0.004
+"""How far out the first block of the chain is put down, and the space between two of them [m]."""
+LANE = (0.48, 0.73, 0.040)
+"""Where the chain is put together: from which distance to which one, and how much wider on either side than a block it
+must be free for open fingers [m]."""
+LEANS, OVER = (math.radians(20.0), math.radians(35.0)), (0.62, 0.76)
+"""By how much the hand leans outwards as it begins to push and at the end [rad], and between which distances that
+changes [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
+PUSHING, BEHIND, PATIENCE = 0.08, 0.03, 2.0
+"""How fast the chain is pushed [m/s], how far behind it the hand comes down [m], and how long it stays at full stretch
+before the push is given up [s]."""
+LEVELLING = 4.0
+"""How fast an error in the height of the pushing hand adds up to a correction [1/s]."""
+INSIDE = 0.004
+"""How far inside the zone the push ends [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """Where a block lies."""
+
+    x: float = param(-0.12, "m", -0.4, 0.4)
+    y: float = param(0.0, "m", -0.4, 0.4)
+    yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+    @property
+    def pos(self) -> Vec3:
+        """Of the middle of its foot [m]."""
+        return np.array([self.x, self.y, TABLE_TOP])
+
+
+@dataclass(frozen=True, kw_only=True)
+class IndirectPush(Scenario):
+    """A red block and a zone at the far end of the table, and three blocks at its near end."""
+
+    HOLD = 0.3
+
+    bearing: float = param(20.0, "deg", -45.0, 45.0)
+    """Of target and zone, from the robot's first axis; 0 is straight ahead."""
+    distance: float = param(0.925, "m", 0.5, 1.1)
+    """Of the target's middle from that axis."""
+    way: float = param(0.042, "m", 0.01, 0.15)
+    """Of the zone's middle from the target's."""
+    target_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
+    """Against the bearing."""
+    edge: float = param(0.055, "m", 0.03, 0.07)
+    """Of the blocks and the target."""
+    mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
+    """Of a block."""
+    target_mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
+    friction: float = param(0.4, "1", 0.1, 1.2, hidden=True)
+    block_0: Spot = Spot(y=-0.25)
+    block_1: Spot = Spot(y=-0.11)
+    block_2: Spot = Spot(y=0.03)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, Patch(size=ZONE), "zone", self.at(self.distance + self.way), self.angle, free=False)
+        target = Cube(edge=self.edge, mass=self.target_mass, friction=self.friction)
+        place(scene, target, "target", self.at(self.distance), self.turn)
+        for i, (spot, rgba) in enumerate(zip(self.spots, COLOURS, strict=True)):
+            block = Cube(edge=self.edge, mass=self.mass, friction=self.friction, rgba=rgba)
+            place(scene, block, f"block_{i}", spot.pos, math.radians(spot.yaw))
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        low, high = np.array([-ZONE / 2, -ZONE / 2, -0.005]), np.array([ZONE / 2, ZONE / 2, 0.005])
+        return inside(world, "target", "zone", low, high) and still(world, "target", 0.02)
+
+    def failure(self, world: World) -> str | None:
+        if world.touched(ROBOT, "target"):
+            return "the robot touched the target"
+        return "the target fell off the table" if fallen(world, "target") else None
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Put as many blocks in line as are needed, the nearest ones, and push the last of them."""
+        yield from self._chain_and_push(world, self.chosen)
+
+    def _chain_and_push(self, world: World, blocks: list[str], aside: float = 0.0, speed: float = PUSHING) -> Plan:
+        """The same with other blocks, `aside` of the line [m], or at another speed [m/s]."""
+        for i, block in enumerate(blocks):
+            yield from self.put_in_line(world, block, self.at(PLACED - i * self.pitch) + aside * self.side)
+        yield from self.push_out(world, blocks[-1], speed)
+
+    def put_in_line(self, world: World, block: str, spot: Vec3) -> Plan:
+        """Take a block, put it down on a spot [m] with its faces square to the bearing."""
+        arm, held = world.arm, self.edge / 2 * UP
+        faces = [sign * axis for axis in world.rot(block)[:, :2].T for sign in (1.0, -1.0)]
+        closing = max(faces, key=lambda normal: float(normal @ self.side))
+        yield from pick(arm, world.com(block), closing)
+        turn = about_z(math.atan2(float(np.cross(closing, self.side)[2]), float(closing @ self.side)))
+        rot = turn @ world.rot(block)
+        yield from carry(arm, block, spot + held + 0.08 * UP, rot, COARSE)
+        yield from carry(arm, block, spot + held + 0.008 * UP, rot, Pace(0.20, 0.003))
+        yield from push(arm, -0.04 * UP, until=lambda: world.touching(block, "table"))
+        yield from release(arm)
+        yield from retreat(arm)
+
+    def push_out(self, world: World, block: str, speed: float = PUSHING) -> Plan:
+        """Push a block outwards with the leaning hand until the target is in the zone, step back.
+
+        Raises:
+            GaveUp: the arm is stretched out, and the target not in the zone.
+        """
+        start = self.out(world.com(block)) - self.edge / 2 - BEHIND
+        aside = float((world.com(block) - BASE) @ self.side)
+        yield from self._come_down(world, self.at(start) + aside * self.side, self.leaning(start))
+        entered = self.distance + self.way - ZONE / 2 + INSIDE
+        yield from self._out_until(world, lambda: self.out(world.com("target")) >= entered, speed)
+        yield from go_to(world.arm, world.arm.hand - 0.04 * self.u, pace=STEADY)
+
+    def _come_down(self, world: World, at: Vec3, rot: Mat3) -> Plan:
+        """Bring the closed fingers down to the height at which they push."""
+        yield from go_to(world.arm, [*at[:2], self.height + 0.12], rot, COARSE, CLOSED)
+        yield from go_to(world.arm, [*at[:2], self.height], rot, STEADY)
+
+    def _out_until(self, world: World, ends: Condition, speed: float) -> Plan:
+        """Push outwards, at one height, leaning more and more."""
+        arm, setpoint = world.arm, world.arm.hand
+        end = world.time + (FRONT - self.out(setpoint)) / speed + PATIENCE
+        while not ends():
+            if world.time > end:
+                raise GaveUp(f"the arm was stretched out for {PATIENCE:g} s and the target not in the zone")
+            ahead = self.out(setpoint)
+            velocity = (speed if ahead < FRONT + 0.01 else 0.0) * self.u + LEVELLING * (self.height - arm.hand[2]) * UP
+            setpoint = setpoint + velocity * Loop.PERIOD
+            yield steer(arm, setpoint, velocity, between(arm.hand_rot, self.leaning(ahead)), CLOSED)
+
+    def leaning(self, distance: float) -> Mat3:
+        """Orientation of the hand that pushes: it leans outwards, its fingers side by side across the push."""
+        share = float(np.clip((distance - OVER[0]) / (OVER[1] - OVER[0]), 0.0, 1.0))
+        lean = LEANS[0] + share * (LEANS[1] - LEANS[0])
+        along = math.sin(lean) * self.u - math.cos(lean) * UP
+        return np.stack([self.side, np.cross(along, self.side), along], axis=1)
+
+    # --- shortcuts and ablations ------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        chosen, short = self.chosen, self.chosen[: self.needed - 1]
+        return {
+            "reach_for_the_target": Shortcut(self._reach),
+            "one_block_short": Shortcut(lambda world: self._chain_and_push(world, short)),
+            "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, chosen[:1], speed=0.28)),
+            "push_where_it_lies": Shortcut(lambda world: self.push_out(world, chosen[0])),
+            "chain_beside_the_line": Shortcut(lambda world: self._chain_and_push(world, chosen, 1.3 * self.edge)),
+        }
+
+    def _reach(self, world: World) -> Plan:
+        """Stretch out for the target itself."""
+        yield from self._come_down(world, self.at(PLACED), self.leaning(PLACED))
+        yield from self._out_until(world, lambda: world.touched(ROBOT, "target"), PUSHING)
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        """Without the block at the head of the chain the others come too short by its length."""
+        scene = self.build()
+        scene.delete(scene.body(self.chosen[0]))
+        return {"one_block_less": scene}
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        outlines = [corners(spot.pos, math.radians(spot.yaw), [self.edge] * 3) for spot in self.spots]
+        yield on_table("a block", outlines)
+        yield on_table("the target or the zone", [self.outline, self.zone_outline])
+        yield require(self.edge <= WIDEST, "the jaw cannot take the blocks", edge=self.edge, widest=WIDEST)
+        yield require(self.out_of_touch > 0, "the hand may touch the target without a block", gap=self.out_of_touch)
+        entered = self.distance + self.way - ZONE / 2
+        one = FARTHEST + SLIDES + 1.5 * self.edge
+        yield require(one < entered, "one block would do", reaches=one, zone=entered)
+        yield require(self.needed <= len(self.spots), "no chain is long enough", needed=self.needed)
+        near = PLACED - (self.needed - 1) * self.pitch - self.edge / 2 - BEHIND
+        yield require(near >= LANE[0], "there is no room behind the chain", start=near, nearest=LANE[0])
+        away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
+        yield require(HAND[0] <= min(away) and max(away) <= HAND[1], "a block is out of reach", away=max(away))
+        apart = min(gap(one, other) for one, other in itertools.combinations(outlines, 2))
+        yield require(apart > 0.03, "there is no room for the fingers between two blocks", apart=apart)
+        beside = min(gap(one, self.lane) for one in outlines)
+        yield require(beside > 0.0, "a block lies where the chain is to stand", beside=beside)
+
+    def features(self) -> Mapping[str, float]:
+        """How many edges are missing, how many blocks that makes, and where the line of the push runs."""
+        missing = (self.distance + self.way - ZONE / 2 - FRONT) / self.edge - 0.5
+        return {"edges_missing": missing, "needed": float(self.needed), "bearing": self.angle}
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def needed(self) -> int:
+        """How many blocks a chain needs with which the hand brings the target into the zone."""
+        return max(1, math.ceil((self.distance + self.way - ZONE / 2 + INSIDE - FRONT) / self.edge - 0.5))
+
+    @property
+    def chosen(self) -> list[str]:
+        """The blocks that the chain is made of, its head first: those nearest to where it is to stand."""
+        order = sorted(range(len(self.spots)), key=lambda i: math.dist(self.spots[i].pos, self.at(PLACED)))
+        return [f"block_{i}" for i in order[: self.needed]]
+
+    @property
+    def spots(self) -> tuple[Spot, ...]:
+        """Where the blocks lie."""
+        return self.block_0, self.block_1, self.block_2
+
+    @property
+    def angle(self) -> float:
+        """The bearing [rad]."""
+        return math.radians(self.bearing)
+
+    @property
+    def turn(self) -> float:
+        """Of the target about the vertical [rad]."""
+        return self.angle + math.radians(self.target_yaw)
+
+    @property
+    def u(self) -> Vec3:
+        """Level unit vector outwards along the bearing, shape (3,)."""
+        return heading(self.bearing)
+
+    @property
+    def side(self) -> Vec3:
+        """Level unit vector to the left of `u`, shape (3,)."""
+        return heading(self.bearing + 90.0)
+
+    @property
+    def pitch(self) -> float:
+        """From one block of the chain to the next [m]."""
+        return self.edge + APART
+
+    @property
+    def height(self) -> float:
+        """Of the grip site when it pushes [m]: below the middle of a block, the tips 8 mm above the table."""
+        return TABLE_TOP + max(0.4 * self.edge, TIP + 0.008)
+
+    def at(self, distance: float) -> Vec3:
+        """A place on the table along the bearing, by its distance from the robot's first axis [m]."""
+        return np.array([BASE[0], BASE[1], TABLE_TOP]) + distance * self.u
+
+    def out(self, point: Vec3) -> float:
+        """How far out along the bearing a point is [m]."""
+        return float((point - BASE) @ self.u)
+
+    @property
+    def outline(self) -> Outline:
+        """Of the target."""
+        return corners(self.at(self.distance), self.turn, [self.edge] * 3)
+
+    @property
+    def zone_outline(self) -> Outline:
+        """Of the zone."""
+        return corners(self.at(self.distance + self.way), self.angle, [ZONE] * 3)
+
+    @property
+    def lane(self) -> Outline:
+        """Where the chain is put together."""
+        near, far, beside = LANE
+        return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * beside, 0.0])
+
+    @property
+    def out_of_touch(self) -> float:
+        """How far at least any point of the gripper stays away from the target [m]; not positive if it may touch."""
+        middle = self.at(self.distance) + self.edge / 2 * UP
+        return ik.box_shortfall(middle, about_z(self.turn), self.edge / 2, ik.TOUCH)
