@@ -63,13 +63,13 @@ HAND = (0.36, 0.72)
 """Nearest and farthest distance from the robot's first axis at which a hand that points down takes a block [m]."""
 PLACED, APART = 0.690, 0.004
 """How far out the first block of the chain is put down, and the space between two of them [m]."""
-LANE = (0.48, 0.73, 0.040)
-"""Where the chain is put together: from which distance to which one, and how much wider on either side than a block it
-must be free for open fingers [m]."""
-LEANS, OVER = (math.radians(20.0), math.radians(35.0)), (0.62, 0.76)
-"""By how much the hand leans outwards as it begins to push and at the end [rad], and between which distances that
-changes [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
-PUSHING, BEHIND, PATIENCE = 0.08, 0.03, 2.0
+LANE = (0.48, 0.040)
+"""Nearest distance from the robot's first axis at which the hand comes down behind the chain, and how far on either
+side the table must be free beside it for open fingers [m]."""
+LEAN, OVER = math.radians(35.0), (0.45, 0.76)
+"""By how much the hand leans outwards at the end of a push [rad], and between which distances it goes over to that from
+pointing down [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
+PUSHING, BEHIND, PATIENCE = 0.12, 0.03, 1.0
 """How fast the chain is pushed [m/s], how far behind it the hand comes down [m], and how long it stays at full stretch
 before the push is given up [s]."""
 LEVELLING = 4.0
@@ -148,10 +148,10 @@ class IndirectPush(Scenario):
         """Put as many blocks in line as are needed, the nearest ones, and push the last of them."""
         yield from self._chain_and_push(world, self.chosen)
 
-    def _chain_and_push(self, world: World, blocks: list[str], aside: float = 0.0, speed: float = PUSHING) -> Plan:
-        """The same with other blocks, `aside` of the line [m], or at another speed [m/s]."""
+    def _chain_and_push(self, world: World, blocks: list[str], speed: float = PUSHING) -> Plan:
+        """The same with other blocks, or at another speed [m/s]."""
         for i, block in enumerate(blocks):
-            yield from self.put_in_line(world, block, self.at(PLACED - i * self.pitch) + aside * self.side)
+            yield from self.put_in_line(world, block, self.at(PLACED - i * self.pitch))
         yield from self.push_out(world, blocks[-1], speed)
 
     def put_in_line(self, world: World, block: str, spot: Vec3) -> Plan:
@@ -159,14 +159,14 @@ class IndirectPush(Scenario):
         arm, held = world.arm, self.edge / 2 * UP
         faces = [sign * axis for axis in world.rot(block)[:, :2].T for sign in (1.0, -1.0)]
         closing = max(faces, key=lambda normal: float(normal @ self.side))
-        yield from pick(arm, world.com(block), closing)
+        yield from pick(arm, world.com(block), closing, above=0.09, lift=0.09, pace=Pace(0.20, 0.004))
         turn = about_z(math.atan2(float(np.cross(closing, self.side)[2]), float(closing @ self.side)))
         rot = turn @ world.rot(block)
-        yield from carry(arm, block, spot + held + 0.08 * UP, rot, COARSE)
+        yield from carry(arm, block, spot + held + 0.07 * UP, rot, COARSE)
         yield from carry(arm, block, spot + held + 0.008 * UP, rot, Pace(0.20, 0.003))
         yield from push(arm, -0.04 * UP, until=lambda: world.touching(block, "table"))
         yield from release(arm)
-        yield from retreat(arm)
+        yield from retreat(arm, 0.09)
 
     def push_out(self, world: World, block: str, speed: float = PUSHING) -> Plan:
         """Push a block outwards with the leaning hand until the target is in the zone, step back.
@@ -192,7 +192,7 @@ class IndirectPush(Scenario):
         end = world.time + (FRONT - self.out(setpoint)) / speed + PATIENCE
         while not ends():
             if world.time > end:
-                raise GaveUp(f"the arm was stretched out for {PATIENCE:g} s and the target not in the zone")
+                raise GaveUp("the arm was stretched out, and the target not in the zone")
             ahead = self.out(setpoint)
             velocity = (speed if ahead < FRONT + 0.01 else 0.0) * self.u + LEVELLING * (self.height - arm.hand[2]) * UP
             setpoint = setpoint + velocity * Loop.PERIOD
@@ -200,8 +200,7 @@ class IndirectPush(Scenario):
 
     def leaning(self, distance: float) -> Mat3:
         """Orientation of the hand that pushes: it leans outwards, its fingers side by side across the push."""
-        share = float(np.clip((distance - OVER[0]) / (OVER[1] - OVER[0]), 0.0, 1.0))
-        lean = LEANS[0] + share * (LEANS[1] - LEANS[0])
+        lean = LEAN * float(np.clip((distance - OVER[0]) / (OVER[1] - OVER[0]), 0.0, 1.0))
         along = math.sin(lean) * self.u - math.cos(lean) * UP
         return np.stack([self.side, np.cross(along, self.side), along], axis=1)
 
@@ -214,7 +213,6 @@ class IndirectPush(Scenario):
             "one_block_short": Shortcut(lambda world: self._chain_and_push(world, short)),
             "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, chosen[:1], speed=0.28)),
             "push_where_it_lies": Shortcut(lambda world: self.push_out(world, chosen[0])),
-            "chain_beside_the_line": Shortcut(lambda world: self._chain_and_push(world, chosen, 1.3 * self.edge)),
         }
 
     def _reach(self, world: World) -> Plan:
@@ -240,8 +238,8 @@ class IndirectPush(Scenario):
         one = FARTHEST + SLIDES + 1.5 * self.edge
         yield require(one < entered, "one block would do", reaches=one, zone=entered)
         yield require(self.needed <= len(self.spots), "no chain is long enough", needed=self.needed)
-        near = PLACED - (self.needed - 1) * self.pitch - self.edge / 2 - BEHIND
-        yield require(near >= LANE[0], "there is no room behind the chain", start=near, nearest=LANE[0])
+        behind, nearest = self.behind, LANE[0]
+        yield require(behind >= nearest, "there is no room behind the chain", behind=behind, nearest=nearest)
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
         yield require(HAND[0] <= min(away) and max(away) <= HAND[1], "a block is out of reach", away=max(away))
         apart = min(gap(one, other) for one, other in itertools.combinations(outlines, 2))
@@ -322,9 +320,14 @@ class IndirectPush(Scenario):
 
     @property
     def lane(self) -> Outline:
-        """Where the chain is put together."""
-        near, far, beside = LANE
-        return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * beside, 0.0])
+        """Where the chain is put together and the hand comes down behind it."""
+        near, far = self.behind, PLACED + self.edge / 2
+        return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * LANE[1]])
+
+    @property
+    def behind(self) -> float:
+        """How far out the hand comes down behind the chain [m]."""
+        return PLACED - (self.needed - 1) * self.pitch - self.edge / 2 - BEHIND
 
     @property
     def out_of_touch(self) -> float:
