@@ -16,8 +16,11 @@ Decisions, where the paper (App. B, T20) is silent or cannot be meant as it is w
 * Out of reach. The arm swings about a shoulder 0.445 m above the table, and a band before the far edge is beyond it.
   It is deep enough for a target, a way to go and a zone only towards the corners: hence the bearing near 20 deg.
   Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.TOUCH`).
-* One block must not do either, be it pushed by an arm at full stretch or struck and let slide: the zone begins where
-  such a block ends. Two are needed in training, three where the zone is farther or the blocks are smaller.
+* One block must not do: the zone begins beyond what the arm at full stretch reaches with one, by the triangle
+  inequality and no search. Two do in training; three do, without stretching the arm to its limit, where the zone is
+  farther or the blocks are smaller.
+* A push, not a blow: a target that moves faster than 0.25 m/s is lost. An arm that is driven through its full stretch
+  jumps, and the block before it flies at 0.6 m/s: so one block, shot at the target, brought it anywhere.
 * In the zone is a target whose middle is over it, on the table and at rest, for 0.3 s, 30 steps as in the paper's T12
   and T13. Touching the target loses the episode: nothing but a block may come to it.
 * What else is done with the blocks is free. A block that is held in the jaw reaches less far than one that is pushed.
@@ -41,10 +44,9 @@ from ..params import check_bounds, param
 from ..predicates import fallen, inside, still
 from ..robots import ik
 from ..robots.jaw import TIP
-from ..robots.panda import BASE
+from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.world import ROBOT, World
-from ..skills.grip import WIDEST
 from ..skills.jaw import carry, pick, release
 from ..skills.motion import CLOSED, COARSE, STEADY, Condition, Pace, go_to, push, retreat, steer
 
@@ -52,20 +54,17 @@ COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (
 """Of the blocks; the target is red."""
 ZONE = 0.036
 """Length of a side of the zone [m]."""
-FRONT = 0.825
-"""How far from the robot's first axis the tips of a hand come that leans outwards, at the height of a block's middle
-[m]. Measured: 0.829 without trouble; beyond it the arm is nearly straight."""
-FARTHEST = 0.849
-"""How far they come in any posture that inverse kinematics finds [m]: the grip site 0.840, the tips 9 mm more."""
-SLIDES = 0.008
-"""How far a block slides on that such an arm lets go [m]: v^2 / (2 mu g) of 0.25 m/s at a friction of 0.4."""
+FRONT = 0.829
+"""How far from the robot's first axis the tips of a hand come that leans outwards, at the height of a block's middle,
+without trouble [m]. Measured; up to 25 mm farther the arm is nearly straight and jumps."""
+STRUCK = 0.25
+"""Speed of the target at which it has been struck and not pushed [m/s]: twice that of the chain."""
 HAND = (0.36, 0.72)
 """Nearest and farthest distance from the robot's first axis at which a hand that points down takes a block [m]."""
 PLACED, APART = 0.690, 0.004
 """How far out the first block of the chain is put down, and the space between two of them [m]."""
-LANE = (0.48, 0.040)
-"""Nearest distance from the robot's first axis at which the hand comes down behind the chain, and how far on either
-side the table must be free beside it for open fingers [m]."""
+BESIDE = 0.040
+"""How far on either side of the chain the table must be free for open fingers [m]."""
 LEAN, OVER = math.radians(35.0), (0.45, 0.76)
 """By how much the hand leans outwards at the end of a push [rad], and between which distances it goes over to that from
 pointing down [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
@@ -103,9 +102,9 @@ class IndirectPush(Scenario):
 
     bearing: float = param(20.0, "deg", -45.0, 45.0)
     """Of target and zone, from the robot's first axis; 0 is straight ahead."""
-    distance: float = param(0.925, "m", 0.5, 1.1)
+    distance: float = param(0.924, "m", 0.5, 1.1)
     """Of the target's middle from that axis."""
-    way: float = param(0.042, "m", 0.01, 0.15)
+    way: float = param(0.050, "m", 0.01, 0.15)
     """Of the zone's middle from the target's."""
     target_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
     """Against the bearing."""
@@ -114,7 +113,7 @@ class IndirectPush(Scenario):
     mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
     """Of a block."""
     target_mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
-    friction: float = param(0.4, "1", 0.1, 1.2, hidden=True)
+    friction: float = param(0.65, "1", 0.1, 1.2, hidden=True)
     block_0: Spot = Spot(y=-0.25)
     block_1: Spot = Spot(y=-0.11)
     block_2: Spot = Spot(y=0.03)
@@ -140,6 +139,8 @@ class IndirectPush(Scenario):
     def failure(self, world: World) -> str | None:
         if world.touched(ROBOT, "target"):
             return "the robot touched the target"
+        if not still(world, "target", STRUCK):
+            return "the target was struck"
         return "the target fell off the table" if fallen(world, "target") else None
 
     # --- oracle ---------------------------------------------------------------------------
@@ -207,12 +208,12 @@ class IndirectPush(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        chosen, short = self.chosen, self.chosen[: self.needed - 1]
+        one = self.chosen[:1]
         return {
             "reach_for_the_target": Shortcut(self._reach),
-            "one_block_short": Shortcut(lambda world: self._chain_and_push(world, short)),
-            "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, chosen[:1], speed=0.28)),
-            "push_where_it_lies": Shortcut(lambda world: self.push_out(world, chosen[0])),
+            "push_one_block": Shortcut(lambda world: self._chain_and_push(world, one)),
+            "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, one, 0.28)),
+            "push_where_it_lies": Shortcut(lambda world: self.push_out(world, one[0])),
         }
 
     def _reach(self, world: World) -> Plan:
@@ -232,14 +233,11 @@ class IndirectPush(Scenario):
         outlines = [corners(spot.pos, math.radians(spot.yaw), [self.edge] * 3) for spot in self.spots]
         yield on_table("a block", outlines)
         yield on_table("the target or the zone", [self.outline, self.zone_outline])
-        yield require(self.edge <= WIDEST, "the jaw cannot take the blocks", edge=self.edge, widest=WIDEST)
         yield require(self.out_of_touch > 0, "the hand may touch the target without a block", gap=self.out_of_touch)
         entered = self.distance + self.way - ZONE / 2
-        one = FARTHEST + SLIDES + 1.5 * self.edge
-        yield require(one < entered, "one block would do", reaches=one, zone=entered)
+        reaches = self.stretch + 1.5 * self.edge + STRUCK**2 / (2 * 9.81 * self.friction)
+        yield require(reaches < entered, "one block would do", reaches=reaches, zone=entered)
         yield require(self.needed <= len(self.spots), "no chain is long enough", needed=self.needed)
-        behind, nearest = self.behind, LANE[0]
-        yield require(behind >= nearest, "there is no room behind the chain", behind=behind, nearest=nearest)
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
         yield require(HAND[0] <= min(away) and max(away) <= HAND[1], "a block is out of reach", away=max(away))
         apart = min(gap(one, other) for one, other in itertools.combinations(outlines, 2))
@@ -256,8 +254,14 @@ class IndirectPush(Scenario):
 
     @property
     def needed(self) -> int:
-        """How many blocks a chain needs with which the hand brings the target into the zone."""
+        """How many blocks a chain needs with which a hand that comes to `FRONT` brings the target into the zone."""
         return max(1, math.ceil((self.distance + self.way - ZONE / 2 + INSIDE - FRONT) / self.edge - 0.5))
+
+    @property
+    def stretch(self) -> float:
+        """How far the tips come in any posture, up to the height of a block's upper edge [m]: `panda.REACH`."""
+        drop = SHOULDER[2] - TABLE_TOP - self.edge
+        return math.sqrt(REACH**2 - drop**2) + TIP
 
     @property
     def chosen(self) -> list[str]:
@@ -322,7 +326,7 @@ class IndirectPush(Scenario):
     def lane(self) -> Outline:
         """Where the chain is put together and the hand comes down behind it."""
         near, far = self.behind, PLACED + self.edge / 2
-        return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * LANE[1]])
+        return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * BESIDE])
 
     @property
     def behind(self) -> float:

@@ -1,0 +1,173 @@
+"""The chain is as long as what the arm lacks, one block less comes too short, and nothing else reaches the target."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from controls import (
+    ablated,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    mistaken,
+    not_certified,
+    play,
+    play_shortcut,
+    replayed,
+    spared,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.prop import TABLE_TOP
+from scengen.geometry import UP
+from scengen.robots import ik
+from scengen.robots.panda import BASE
+from scengen.sim.world import ROBOT
+from scengen.tasks.indirect_push import FARTHEST, FRONT, ZONE, IndirectPush, Spot
+
+TASK = config.task("indirect_push")
+NOMINAL = IndirectPush()
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """The world after the oracle has solved the nominal scenario."""
+    w = load(TASK, NOMINAL)
+    rollout = play(TASK, NOMINAL, NOMINAL.oracle, w)
+    assert rollout.solved, rollout.reason
+    return w
+
+
+# --- how far a chain reaches ---------------------------------------------------------------
+
+
+def test_a_chain_brings_the_target_as_far_as_its_blocks_are_long():
+    """The tips at FRONT, n blocks, and half of the target: the least n that brings that into the zone is needed."""
+    for split in ("id", "far_zone", "small_blocks"):
+        for index in range(5):
+            s = TASK.draw(split, 0, index).scenario
+            entered = s.distance + s.way - ZONE / 2
+            assert FRONT + (s.needed + 0.5) * s.edge > entered > FRONT + (s.needed - 0.5) * s.edge
+            assert s.needed == (2 if split == "id" else 3)
+
+
+def test_the_chain_stands_in_contact_between_hand_and_target_when_the_push_ends(solved):
+    first, second = NOMINAL.chosen
+    places = [NOMINAL.out(solved.com(body)) for body in (second, first, "target")]
+    assert np.diff(places) == pytest.approx(NOMINAL.edge, abs=0.003)
+    assert all(abs((solved.com(body) - BASE) @ NOMINAL.side) < 0.010 for body in (first, second, "target"))
+    assert not solved.touched(ROBOT, "target")
+
+
+def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do():
+    site = FARTHEST - 0.009  # the tips are 9 mm beyond the grip site
+    for beyond, reached in ((-0.010, True), (0.004, False)):
+        away = NOMINAL.at(site + beyond) + (NOMINAL.height - TABLE_TOP) * UP
+        assert (ik.reach(away).residual < 0.001) == reached
+
+
+@pytest.mark.parametrize("name", ["one_block_short", "strike_with_one_block"])
+def test_one_block_comes_too_short_pushed_or_struck(name):
+    w = load(TASK, NOMINAL)
+    assert not play_shortcut(TASK, NOMINAL, name, w).solved
+    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2 - 0.01
+
+
+def test_the_arm_stretched_out_for_the_target_never_touches_it():
+    w = load(TASK, NOMINAL)
+    play_shortcut(TASK, NOMINAL, "reach_for_the_target", w)
+    assert not w.touched(ROBOT, "target") and w.com("target") == pytest.approx(
+        NOMINAL.at(NOMINAL.distance) + NOMINAL.edge / 2 * UP, abs=0.001
+    )
+
+
+def test_without_the_head_of_the_chain_the_same_motion_leaves_the_target_before_the_zone():
+    ended, w = ablated(TASK, NOMINAL)["one_block_less"]
+    assert not ended.solved
+    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2
+
+
+@pytest.mark.parametrize("split", ["far_zone", "other_side"])
+def test_a_memorised_motion_serves_no_other_distance_and_no_other_line(split):
+    trained, moved = (TASK.draw(name, 0, 1).scenario for name in ("id", split))
+    assert not replayed(TASK, trained, moved).solved
+
+
+# --- goal and failure -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("beyond", "counts"), [(-0.001, True), (0.001, False)])
+@pytest.mark.parametrize("along", [True, False])
+def test_the_targets_middle_must_be_over_the_zone(solved, along, beyond, counts):
+    state, direction = solved.state(), NOMINAL.u if along else NOMINAL.side
+    pose = solved.data.joint("target_free").qpos
+    pose[:2] = (NOMINAL.at(NOMINAL.distance + NOMINAL.way) + (ZONE / 2 + beyond) * direction)[:2]
+    mujoco.mj_kinematics(solved.model, solved.data)
+    assert NOMINAL.success(solved) == counts
+    solved.restore(state)
+
+
+@pytest.mark.parametrize(("what", "index", "value"), [("in the air", 2, 0.02), ("moving", None, 0.05)])
+def test_it_must_be_on_the_table_and_at_rest(solved, what, index, value):
+    state = solved.state()
+    assert NOMINAL.success(solved)
+    if index is None:
+        solved.data.joint("target_free").qvel[0] = value
+    else:
+        solved.data.joint("target_free").qpos[index] += value
+    mujoco.mj_forward(solved.model, solved.data)
+    assert not NOMINAL.success(solved), what
+    solved.restore(state)
+
+
+def test_touching_the_target_or_dropping_it_from_the_table_loses(solved):
+    state, touched = solved.state(), solved.loop.touched.copy()
+    assert NOMINAL.failure(solved) is None
+    solved.loop.touched[-1, solved.body("target")] = solved.loop.touched[solved.body("target"), -1] = True
+    assert NOMINAL.failure(solved) == "the robot touched the target"
+    solved.loop.touched[:] = touched
+    solved.data.joint("target_free").qpos[2] = 0.6
+    mujoco.mj_kinematics(solved.model, solved.data)
+    mujoco.mj_comPos(solved.model, solved.data)
+    assert NOMINAL.failure(solved) == "the target fell off the table"
+    solved.restore(state)
+
+
+# --- scenes that must not be certified ---------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scenario", "check", "says"),
+    [
+        (IndirectPush(distance=0.80), "feasible", "without a block"),
+        (mistaken(IndirectPush, "push_where_it_lies")(), "solved", "the oracle failed"),
+        (spared(IndirectPush)(), "ablations", "the witness succeeds with 'less_light'"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, IndirectPush) else str(value),
+)
+def test_an_invalid_scenario_is_not_certified(scenario, check, says):
+    not_certified(TASK, scenario, check, says)
+
+
+def test_every_refutation_has_its_own_reason():
+    each_refuted_for_its_own_reason(
+        [
+            replace(NOMINAL, block_0=Spot(x=-0.38, y=-0.25)),
+            replace(NOMINAL, bearing=5.0),
+            replace(NOMINAL, distance=0.80),
+            replace(NOMINAL, way=0.030),
+            replace(NOMINAL, edge=0.030),
+            replace(NOMINAL, block_0=Spot(x=0.3, y=-0.3)),
+            replace(NOMINAL, block_0=Spot(y=-0.17)),
+            replace(NOMINAL, block_2=Spot(x=0.0, y=0.19)),
+        ]
+    )
+
+
+@given(scenario=anywhere(IndirectPush))
+@settings(max_examples=60, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
