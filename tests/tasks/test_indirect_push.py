@@ -21,12 +21,12 @@ from helpers import anywhere
 from hypothesis import given, settings
 
 from scengen import config
-from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.robots import ik
+from scengen.robots.jaw import TIP
 from scengen.robots.panda import BASE
 from scengen.sim.world import ROBOT
-from scengen.tasks.indirect_push import FARTHEST, FRONT, ZONE, IndirectPush, Spot
+from scengen.tasks.indirect_push import FRONT, INSIDE, STRUCK, ZONE, IndirectPush, Spot
 
 TASK = config.task("indirect_push")
 NOMINAL = IndirectPush()
@@ -46,12 +46,12 @@ def solved():
 
 def test_a_chain_brings_the_target_as_far_as_its_blocks_are_long():
     """The tips at FRONT, n blocks, and half of the target: the least n that brings that into the zone is needed."""
-    for split in ("id", "far_zone", "small_blocks"):
+    for split, blocks in (("id", 2), ("far_zone", 3), ("small_blocks", 3)):
         for index in range(5):
             s = TASK.draw(split, 0, index).scenario
-            entered = s.distance + s.way - ZONE / 2
-            assert FRONT + (s.needed + 0.5) * s.edge > entered > FRONT + (s.needed - 0.5) * s.edge
-            assert s.needed == (2 if split == "id" else 3)
+            inside = s.distance + s.way - ZONE / 2 + INSIDE
+            assert s.needed == blocks
+            assert FRONT + (blocks + 0.5) * s.edge >= inside > FRONT + (blocks - 0.5) * s.edge
 
 
 def test_the_chain_stands_in_contact_between_hand_and_target_when_the_push_ends(solved):
@@ -62,18 +62,30 @@ def test_the_chain_stands_in_contact_between_hand_and_target_when_the_push_ends(
     assert not solved.touched(ROBOT, "target")
 
 
-def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do():
-    site = FARTHEST - 0.009  # the tips are 9 mm beyond the grip site
-    for beyond, reached in ((-0.010, True), (0.004, False)):
-        away = NOMINAL.at(site + beyond) + (NOMINAL.height - TABLE_TOP) * UP
-        assert (ik.reach(away).residual < 0.001) == reached
+@pytest.mark.parametrize(("beyond", "reached"), [(-0.010, True), (0.004, False)])
+def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do(beyond, reached):
+    top = NOMINAL.at(NOMINAL.stretch - TIP + beyond) + NOMINAL.edge * UP
+    assert (ik.reach(top).residual < 0.001) == reached
 
 
-@pytest.mark.parametrize("name", ["one_block_short", "strike_with_one_block"])
-def test_one_block_comes_too_short_pushed_or_struck(name):
+def test_one_block_pushed_to_full_stretch_comes_too_short():
     w = load(TASK, NOMINAL)
-    assert not play_shortcut(TASK, NOMINAL, name, w).solved
-    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2 - 0.01
+    assert not play_shortcut(TASK, NOMINAL, "push_one_block", w).solved
+    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2 - 0.005
+
+
+def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
+    """It must slide at least as far as from where one block leaves it: v^2 = 2 mu g s."""
+    for friction in (0.35, 0.65):
+        s = replace(NOMINAL, friction=friction)
+        short = s.distance + s.way - ZONE / 2 - s.stretch - 1.5 * s.edge
+        assert (s.infeasible() is None) == (short > STRUCK**2 / (2 * 9.81 * friction))
+    w = load(TASK, NOMINAL)
+    mujoco.mj_forward(w.model, w.data)
+    for speed, struck in ((0.24, False), (0.26, True)):
+        w.data.joint("target_free").qvel[:3] = speed * NOMINAL.u
+        mujoco.mj_forward(w.model, w.data)
+        assert (NOMINAL.failure(w) == "the target was struck") == struck
 
 
 def test_the_arm_stretched_out_for_the_target_never_touches_it():
@@ -158,7 +170,7 @@ def test_every_refutation_has_its_own_reason():
             replace(NOMINAL, block_0=Spot(x=-0.38, y=-0.25)),
             replace(NOMINAL, bearing=5.0),
             replace(NOMINAL, distance=0.80),
-            replace(NOMINAL, way=0.030),
+            replace(NOMINAL, way=0.040),
             replace(NOMINAL, edge=0.030),
             replace(NOMINAL, block_0=Spot(x=0.3, y=-0.3)),
             replace(NOMINAL, block_0=Spot(y=-0.17)),
