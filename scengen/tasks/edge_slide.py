@@ -252,8 +252,9 @@ class EdgeSlide(Scenario):
 
     @property
     def aim(self) -> float:
-        """Overhang at which the oracle ends its push [m]: the middle of what is possible."""
-        return (LIP + self.plate.tipping_overhang - SPARE) / 2
+        """Overhang at which the oracle ends its push [m]: two thirds of the way from the least to the most."""
+        longest = self.plate.tipping_overhang - SPARE
+        return LIP + 2 / 3 * (longest - LIP)
 
     @property
     def out(self) -> Vec3:

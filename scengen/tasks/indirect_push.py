@@ -28,7 +28,7 @@ Decisions, where the paper (App. B, T20) is silent or cannot be meant as it is w
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -38,7 +38,6 @@ from ..assets.box import Cube
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
-from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading
 from ..params import check_bounds, param
 from ..predicates import fallen, inside, still
@@ -48,7 +47,7 @@ from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, pick, release
-from ..skills.motion import CLOSED, COARSE, STEADY, Condition, Pace, go_to, push, retreat, steer
+from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, retreat, steer
 
 COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (0.90, 0.72, 0.20, 1.0))
 """Of the blocks; the target is red."""
@@ -68,9 +67,10 @@ BESIDE = 0.040
 LEAN, OVER = math.radians(35.0), (0.45, 0.76)
 """By how much the hand leans outwards at the end of a push [rad], and between which distances it goes over to that from
 pointing down [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
-PUSHING, BEHIND, PATIENCE = 0.12, 0.03, 1.0
-"""How fast the chain is pushed [m/s], how far behind it the hand comes down [m], and how long it stays at full stretch
-before the push is given up [s]."""
+PUSHING, SLOWLY, LAST = 0.12, 0.05, 0.02
+"""How fast the chain is pushed, how fast at the end [m/s], and over what distance that is [m]."""
+BEHIND, PATIENCE = 0.03, 1.0
+"""How far behind the chain the hand comes down [m], and how long it stays at full stretch before a push ends [s]."""
 LEVELLING = 4.0
 """How fast an error in the height of the pushing hand adds up to a correction [1/s]."""
 INSIDE = 0.004
@@ -149,11 +149,11 @@ class IndirectPush(Scenario):
         """Put as many blocks in line as are needed, the nearest ones, and push the last of them."""
         yield from self._chain_and_push(world, self.chosen)
 
-    def _chain_and_push(self, world: World, blocks: list[str], speed: float = PUSHING) -> Plan:
-        """The same with other blocks, or at another speed [m/s]."""
+    def _chain_and_push(self, world: World, blocks: list[str], speed: float = PUSHING, last: float = SLOWLY) -> Plan:
+        """The same with other blocks, or at other speeds [m/s]."""
         for i, block in enumerate(blocks):
             yield from self.put_in_line(world, block, self.at(PLACED - i * self.pitch))
-        yield from self.push_out(world, blocks[-1], speed)
+        yield from self.push_out(world, blocks[-1], speed, last)
 
     def put_in_line(self, world: World, block: str, spot: Vec3) -> Plan:
         """Take a block, put it down on a spot [m] with its faces square to the bearing."""
@@ -169,17 +169,16 @@ class IndirectPush(Scenario):
         yield from release(arm)
         yield from retreat(arm, 0.09)
 
-    def push_out(self, world: World, block: str, speed: float = PUSHING) -> Plan:
-        """Push a block outwards with the leaning hand until the target is in the zone, step back.
+    def push_out(self, world: World, block: str, speed: float = PUSHING, last: float = SLOWLY) -> Plan:
+        """Push a block outwards with the leaning hand until the target is in the zone or the arm is stretched out.
 
-        Raises:
-            GaveUp: the arm is stretched out, and the target not in the zone.
+        Then step back.
         """
         start = self.out(world.com(block)) - self.edge / 2 - BEHIND
         aside = float((world.com(block) - BASE) @ self.side)
         yield from self._come_down(world, self.at(start) + aside * self.side, self.leaning(start))
         entered = self.distance + self.way - ZONE / 2 + INSIDE
-        yield from self._out_until(world, lambda: self.out(world.com("target")) >= entered, speed)
+        yield from self._push(world, lambda: entered - self.out(world.com("target")), speed, last)
         yield from go_to(world.arm, world.arm.hand - 0.04 * self.u, pace=STEADY)
 
     def _come_down(self, world: World, at: Vec3, rot: Mat3) -> Plan:
@@ -187,15 +186,14 @@ class IndirectPush(Scenario):
         yield from go_to(world.arm, [*at[:2], self.height + 0.12], rot, COARSE, CLOSED)
         yield from go_to(world.arm, [*at[:2], self.height], rot, STEADY)
 
-    def _out_until(self, world: World, ends: Condition, speed: float) -> Plan:
-        """Push outwards, at one height, leaning more and more."""
+    def _push(self, world: World, left: Callable[[], float], speed: float, last: float) -> Plan:
+        """Push outwards at one height, leaning more and more, until nothing is `left` [m] or the arm is stretched."""
         arm, setpoint = world.arm, world.arm.hand
-        end = world.time + (FRONT - self.out(setpoint)) / speed + PATIENCE
-        while not ends():
-            if world.time > end:
-                raise GaveUp("the arm was stretched out, and the target not in the zone")
-            ahead = self.out(setpoint)
-            velocity = (speed if ahead < FRONT + 0.01 else 0.0) * self.u + LEVELLING * (self.height - arm.hand[2]) * UP
+        end = world.time + (FRONT - self.out(setpoint)) / speed + LAST / last + PATIENCE
+        while left() > 0.0 and world.time < end:
+            ahead, rise = self.out(setpoint), LEVELLING * (self.height - arm.hand[2])
+            pace = speed if left() > LAST else last
+            velocity = (pace if ahead < FRONT + 0.01 else 0.0) * self.u + rise * UP
             setpoint = setpoint + velocity * Loop.PERIOD
             yield steer(arm, setpoint, velocity, between(arm.hand_rot, self.leaning(ahead)), CLOSED)
 
@@ -212,14 +210,14 @@ class IndirectPush(Scenario):
         return {
             "reach_for_the_target": Shortcut(self._reach),
             "push_one_block": Shortcut(lambda world: self._chain_and_push(world, one)),
-            "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, one, 0.28)),
+            "strike_with_one_block": Shortcut(lambda world: self._chain_and_push(world, one, 0.28, 0.28)),
             "push_where_it_lies": Shortcut(lambda world: self.push_out(world, one[0])),
         }
 
     def _reach(self, world: World) -> Plan:
         """Stretch out for the target itself."""
         yield from self._come_down(world, self.at(PLACED), self.leaning(PLACED))
-        yield from self._out_until(world, lambda: world.touched(ROBOT, "target"), PUSHING)
+        yield from self._push(world, lambda: self.distance - self.out(world.arm.hand), PUSHING, PUSHING)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the block at the head of the chain the others come too short by its length."""
@@ -248,7 +246,7 @@ class IndirectPush(Scenario):
     def features(self) -> Mapping[str, float]:
         """How many edges are missing, how many blocks that makes, and where the line of the push runs."""
         missing = (self.distance + self.way - ZONE / 2 - FRONT) / self.edge - 0.5
-        return {"edges_missing": missing, "needed": float(self.needed), "bearing": self.angle}
+        return {"edges_missing": missing, "needed": float(self.needed), "direction": self.angle}
 
     # --- geometry -------------------------------------------------------------------------
 

@@ -44,9 +44,9 @@ def solved():
 # --- the push -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("split", ["id", "turned"])
-def test_pushed_beside_its_middle_the_plate_arrives_square_where_the_push_was_to_end(split):
-    s = TASK.draw(split, 0, 0).scenario
+@pytest.mark.parametrize("yaw", [12.0, -27.0])
+def test_pushed_beside_its_middle_the_plate_arrives_square_where_the_push_was_to_end(yaw):
+    s = EdgeSlide(yaw=yaw)
     w = load(TASK, s)
     play(TASK, s, lambda world: s.slide_out(world, s.aim), w)
     assert s.overhang(w) == pytest.approx(s.aim, abs=0.004)
