@@ -35,15 +35,30 @@ from ..assets.ball import Ball
 from ..assets.gap_wall import GapWall, Kerb
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
-from ..geometry import UP, Vec3, heading
+from ..control.loop import Loop
+from ..geometry import UP, Vec3, between, heading
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER, OPENED, PALM_ACROSS, PALM_ALONG, TIP
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import carry, pick, poke, release
-from ..skills.motion import STEADY, Pace, hold, retreat, wait
+from ..skills.jaw import carry, pick, release
+from ..skills.motion import (
+    CLOSED,
+    COARSE,
+    STEADY,
+    Condition,
+    Pace,
+    closing_along,
+    go_to,
+    hold,
+    retreat,
+    stay,
+    steer,
+    until,
+    wait,
+)
 
 GRAVITY = 9.81
 """[m/s^2]: MuJoCo's default."""
@@ -63,6 +78,10 @@ OVER = 0.09
 """How far the hand rises over the ball [m]."""
 MORE, FASTEST = 1.2, 0.27
 """Speed of a push, of what the way needs, where a kerb stops the ball; and the hand's along one axis [m/s]."""
+SOFTLY, FASTER = 0.04, 0.6
+"""Speed at which the hand comes up to the ball [m/s], and how much faster it gets behind it [m/s^2]."""
+EXACT = 0.001
+"""How near the hand is to where it starts to push [m]: what is left it makes up on the way, and drags the ball aside."""
 DRAG = Pace(0.15, 0.002)
 """Of the ball in the jaw, over the table."""
 
@@ -124,7 +143,7 @@ class GapFunnel(Scenario):
     def oracle(self, world: World) -> Plan:
         """Draw the ball before the gap, let it lie, and push it through."""
         yield from self.align(world, self.gap_at - self.before * self.n)
-        yield from self.send(world, self.n, self.speed)
+        yield from self.send(world, self.gap_at, self.speed)
         yield from wait(world.arm, lambda: self.success(world), give_up=6.0)
 
     def align(self, world: World, spot: Vec3) -> Plan:
@@ -136,37 +155,46 @@ class GapFunnel(Scenario):
         yield from release(arm, 0.3)
         yield from retreat(arm, OVER)
 
-    def send(self, world: World, along: Vec3, speed: float) -> Plan:
-        """Push the ball from where it is, until the hand is before the wall."""
+    def send(self, world: World, spot: Vec3, speed: float) -> Plan:
+        """Push the ball from where it is towards a spot, until the hand is before the wall.
+
+        Slowly up to the ball, and then evenly faster: a blow makes it roll ahead, at a speed that nobody chose.
+        """
+        arm, way = world.arm, (spot - world.com("ball")) * [1.0, 1.0, 0.0]
+        along = way / np.linalg.norm(way)
         start = world.com("ball") - (self.ball.radius + FINGER + BEHIND) * along
         start[2] = TABLE_TOP + LOW
-        skew = abs(float(along @ self.t))
-        stop = self.stop + PALM_ALONG * skew
+        rot = closing_along(arm, [-along[1], along[0], 0.0])
+        yield from go_to(arm, start + OVER * UP, rot, COARSE, CLOSED)
+        yield from go_to(arm, start, rot)
+        yield from until(stay(arm, start, rot, lambda: math.dist(arm.hand, start) < EXACT), self._late(world))
+        stop, setpoint, pace = self.stop + PALM_ALONG * abs(float(along @ self.t)), arm.hand, SOFTLY
+        while (arm.hand - self.gap_at) @ self.n < -stop:
+            pace = min(speed, pace + FASTER * Loop.PERIOD) if pace > SOFTLY or world.touching(ROBOT, "ball") else pace
+            setpoint = setpoint + pace * Loop.PERIOD * along
+            yield steer(arm, setpoint, pace * along, between(arm.hand_rot, rot), CLOSED)
+        yield from go_to(arm, arm.hand + BEHIND * (UP - along), pace=COARSE)
 
-        def there() -> bool:
-            return bool((world.arm.hand - self.gap_at) @ self.n >= -stop)
-
-        yield from poke(world.arm, start, speed * along, until=there, above=OVER)
+    def _late(self, world: World) -> Condition:
+        """Whether a second has passed from now on."""
+        end = world.time + 1.0
+        return lambda: world.time > end
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "straight_ahead": Shortcut(lambda world: self.send(world, self.n, self.speed)),
-            "straight_at_the_zone": Shortcut(lambda world: self._send_to(world, self.zone_at)),
-            "aslant_through_the_gap": Shortcut(lambda world: self._send_to(world, self.gap_at)),
+            "straight_ahead": Shortcut(lambda world: self.send(world, world.com("ball") + self.n, self.speed)),
+            "straight_at_the_zone": Shortcut(lambda world: self.send(world, self.zone_at, FASTEST)),
+            "aslant_through_the_gap": Shortcut(lambda world: self.send(world, self.gap_at, FASTEST)),
             "too_slow": Shortcut(self._too_slow, to_rest=True),
             "over_the_wall": Shortcut(self._over),
         }
 
-    def _send_to(self, world: World, spot: Vec3) -> Plan:
-        way = (spot - world.com("ball")) * [1.0, 1.0, 0.0]
-        yield from self.send(world, way / np.linalg.norm(way), FASTEST)
-
     def _too_slow(self, world: World) -> Plan:
         """At a speed with which it gets half as far as the zone's middle, behind the gap."""
         yield from self.align(world, self.gap_at - self.before * self.n)
-        yield from self.send(world, self.n, self.needed / math.sqrt(2))
+        yield from self.send(world, self.gap_at, self.needed / math.sqrt(2))
 
     def _over(self, world: World) -> Plan:
         """Carry it over the wall, as far as the arm gets, and let it fall there."""
@@ -179,7 +207,7 @@ class GapFunnel(Scenario):
 
         def act(world: World, place: float) -> Plan:
             yield from self.align(world, self.gap_at - self.before * self.n + (place - self.gap_y) * self.t)
-            yield from self.send(world, self.n, self.speed)
+            yield from self.send(world, world.com("ball") + self.n, self.speed)
 
         def right(place: float) -> bool:
             return abs(place - self.gap_y) * math.cos(math.radians(self.yaw)) < self.wall.gap / 2 - self.ball.radius
