@@ -77,11 +77,13 @@ LOW = TIP + 0.010
 OVER = 0.09
 """How far the hand rises over the ball [m]."""
 MORE, FASTEST = 1.2, 0.27
-"""Speed of a push, of what the way needs, where a kerb stops the ball; and the hand's along one axis [m/s]."""
-SOFTLY, FASTER = 0.04, 0.6
+"""Speed of a push, of what the way needs, where a kerb stops the ball; and of the hand, at most [m/s]."""
+BACK = 3.0
+"""How far the hand moves aside for each length that the ball is off its way: it drags the ball along with it."""
+SOFTLY, FASTER = 0.04, 0.25
 """Speed at which the hand comes up to the ball [m/s], and how much faster it gets behind it [m/s^2]."""
 EXACT = 0.001
-"""How near the hand is to where it starts to push [m]: what is left it makes up on the way, and drags the ball aside."""
+"""How near the hand is to where it starts to push [m]: what is left it makes up on the way."""
 DRAG = Pace(0.15, 0.002)
 """Of the ball in the jaw, over the table."""
 
@@ -108,7 +110,7 @@ class GapFunnel(Scenario):
     kerbed: int = param(1, "", 0, 1)
     """Whether there is a kerb behind the zone."""
     wall: GapWall = GapWall()
-    ball: Ball = Ball(radius=0.025, density=600.0, friction=0.6, rgba=(0.90, 0.45, 0.10, 1.0))
+    ball: Ball = Ball(radius=0.025, density=600.0, friction=0.3, rgba=(0.90, 0.45, 0.10, 1.0))
     zone: Patch = Patch(size=0.08)
     kerb: Kerb = Kerb()
 
@@ -143,7 +145,7 @@ class GapFunnel(Scenario):
     def oracle(self, world: World) -> Plan:
         """Draw the ball before the gap, let it lie, and push it through."""
         yield from self.align(world, self.gap_at - self.before * self.n)
-        yield from self.send(world, self.gap_at, self.speed)
+        yield from self.send(world, self.gap_at, self.share)
         yield from wait(world.arm, lambda: self.success(world), give_up=6.0)
 
     def align(self, world: World, spot: Vec3) -> Plan:
@@ -155,24 +157,31 @@ class GapFunnel(Scenario):
         yield from release(arm, 0.3)
         yield from retreat(arm, OVER)
 
-    def send(self, world: World, spot: Vec3, speed: float) -> Plan:
+    def send(self, world: World, spot: Vec3, share: float) -> Plan:
         """Push the ball from where it is towards a spot, until the hand is before the wall.
 
         Slowly up to the ball, and then evenly faster: a blow makes it roll ahead, at a speed that nobody chose.
+
+        Args:
+            share: of the speed with which it comes to rest in the zone, wherever it leaves the hand.
         """
         arm, way = world.arm, (spot - world.com("ball")) * [1.0, 1.0, 0.0]
         along = way / np.linalg.norm(way)
         start = world.com("ball") - (self.ball.radius + FINGER + BEHIND) * along
         start[2] = TABLE_TOP + LOW
-        rot = closing_along(arm, [-along[1], along[0], 0.0])
+        side = np.array([-along[1], along[0], 0.0])
+        rot = closing_along(arm, side)
         yield from go_to(arm, start + OVER * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot)
         yield from until(stay(arm, start, rot, lambda: math.dist(arm.hand, start) < EXACT), self._late(world))
         stop, setpoint, pace = self.stop + PALM_ALONG * abs(float(along @ self.t)), arm.hand, SOFTLY
         while (arm.hand - self.gap_at) @ self.n < -stop:
-            pace = min(speed, pace + FASTER * Loop.PERIOD) if pace > SOFTLY or world.touching(ROBOT, "ball") else pace
+            if pace > SOFTLY or world.touching(ROBOT, "ball"):
+                goal = share * self.speed_for(float((self.zone_at - world.com("ball")) @ self.n))
+                pace = min(goal, FASTEST, pace + FASTER * Loop.PERIOD)
             setpoint = setpoint + pace * Loop.PERIOD * along
-            yield steer(arm, setpoint, pace * along, between(arm.hand_rot, rot), CLOSED)
+            off = float((world.com("ball") - spot) @ side)
+            yield steer(arm, setpoint - BACK * off * side, pace * along, between(arm.hand_rot, rot), CLOSED)
         yield from go_to(arm, arm.hand + BEHIND * (UP - along), pace=COARSE)
 
     def _late(self, world: World) -> Condition:
@@ -184,9 +193,9 @@ class GapFunnel(Scenario):
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "straight_ahead": Shortcut(lambda world: self.send(world, world.com("ball") + self.n, self.speed)),
-            "straight_at_the_zone": Shortcut(lambda world: self.send(world, self.zone_at, FASTEST)),
-            "aslant_through_the_gap": Shortcut(lambda world: self.send(world, self.gap_at, FASTEST)),
+            "straight_ahead": Shortcut(lambda world: self.send(world, world.com("ball") + self.n, self.share)),
+            "straight_at_the_zone": Shortcut(lambda world: self.send(world, self.zone_at, self.share)),
+            "aslant_through_the_gap": Shortcut(lambda world: self.send(world, self.gap_at, self.share)),
             "too_slow": Shortcut(self._too_slow, to_rest=True),
             "over_the_wall": Shortcut(self._over),
         }
@@ -194,7 +203,7 @@ class GapFunnel(Scenario):
     def _too_slow(self, world: World) -> Plan:
         """At a speed with which it gets half as far as the zone's middle, behind the gap."""
         yield from self.align(world, self.gap_at - self.before * self.n)
-        yield from self.send(world, self.gap_at, self.needed / math.sqrt(2))
+        yield from self.send(world, self.gap_at, math.sqrt(0.5))
 
     def _over(self, world: World) -> Plan:
         """Carry it over the wall, as far as the arm gets, and let it fall there."""
@@ -207,7 +216,7 @@ class GapFunnel(Scenario):
 
         def act(world: World, place: float) -> Plan:
             yield from self.align(world, self.gap_at - self.before * self.n + (place - self.gap_y) * self.t)
-            yield from self.send(world, world.com("ball") + self.n, self.speed)
+            yield from self.send(world, world.com("ball") + self.n, self.share)
 
         def right(place: float) -> bool:
             return abs(place - self.gap_y) * math.cos(math.radians(self.yaw)) < self.wall.gap / 2 - self.ball.radius
@@ -289,22 +298,25 @@ class GapFunnel(Scenario):
         """How far before the middle of the wall the hand stops [m]."""
         return self.wall.thickness / 2 + PALM_ACROSS + AIR
 
+    def speed_for(self, way: float) -> float:
+        """From which the ball rolls so far [m/s]."""
+        return math.sqrt(10 / 7 * self.rolling * GRAVITY * max(0.0, way))
+
     @property
     def needed(self) -> float:
         """Speed with which a ball that the hand lets go comes to rest in the middle of the zone [m/s]."""
-        way = self.run + self.stop - self.ball.radius - FINGER
-        return math.sqrt(10 / 7 * self.rolling * GRAVITY * way)
+        return self.speed_for(self.run + self.stop - self.ball.radius - FINGER)
 
     @property
-    def speed(self) -> float:
-        """With which the oracle pushes [m/s]."""
-        return min(FASTEST, MORE * self.needed) if self.kerbed else self.needed
+    def share(self) -> float:
+        """Of that speed, with which the oracle pushes."""
+        return MORE if self.kerbed else 1.0
 
     @property
     def arriving(self) -> float:
         """Of the fastest ball at the kerb [m/s]."""
         on = self.zone.size / 2 - self.ball.radius
-        return math.sqrt(max(0.0, FASTEST**2 - self.needed**2 - 10 / 7 * self.rolling * GRAVITY * on))
+        return math.sqrt(max(0.0, FASTEST**2 - self.needed**2 - self.speed_for(on) ** 2))
 
     @property
     def jumping(self) -> float:
