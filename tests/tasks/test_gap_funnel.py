@@ -1,0 +1,135 @@
+"""A ball rolls as far as a textbook says, through the gap and not round it; who aims badly has no second try."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from controls import (
+    ablated,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    mistaken,
+    not_certified,
+    play_shortcut,
+    replayed,
+    solution,
+    unguarded,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.ball import Ball
+from scengen.assets.gap_wall import GapWall, Kerb
+from scengen.attack.priors import fit
+from scengen.sim.world import IDLE
+from scengen.tasks.gap_funnel import FASTEST, GapFunnel
+
+TASK = config.task("gap_funnel")
+PLAIN = GapFunnel()
+
+
+def rolled(scenario, speed, seconds):
+    """The world after a ball in the gap has been rolling from a speed [m/s], and nobody has acted."""
+    world = load(TASK, scenario)
+    ball = world.model.body("ball")
+    at, dof = world.model.jnt_qposadr[ball.jntadr[0]], ball.dofadr[0]
+    world.data.qpos[at : at + 2] = scenario.gap_at[:2]
+    world.data.qvel[dof : dof + 6] = 0.0
+    world.data.qvel[dof], world.data.qvel[dof + 4] = speed, speed / scenario.ball.radius
+    for _ in range(round(100 * seconds)):
+        world.step(IDLE)
+    return world
+
+
+# --- the laws -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rolling", [0.008, 0.02])
+def test_a_ball_rolls_seven_tenths_of_its_speed_squared_over_the_resistance(rolling):
+    scenario = GapFunnel(rolling=rolling)
+    speed = scenario.speed_for(0.15)
+    assert speed**2 * 7 / (10 * rolling * 9.81) == pytest.approx(0.15)
+    world = rolled(scenario, speed, 3.0)
+    assert world.pos("ball")[0] - scenario.gap_at[0] == pytest.approx(0.15, rel=0.05)
+
+
+def test_the_fastest_ball_is_stopped_by_the_kerb_and_lies_in_the_zone():
+    world = rolled(PLAIN, FASTEST, 4.0)
+    assert world.touched("ball", "kerb") and PLAIN.success(world)
+
+
+# --- ways around ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("straight_ahead", "the ball struck the wall"),
+        ("straight_at_the_zone", "the ball struck the wall"),
+        ("too_slow", "everything came to rest without reaching the goal"),
+        ("over_the_wall", "the ball was lifted"),
+    ],
+)
+def test_shortcuts_end_as_they_should(name, reason):
+    assert play_shortcut(TASK, PLAIN, name).reason == reason
+
+
+def test_what_passes_the_gap_aslant_misses_the_zone_even_if_it_may_graze_the_wall():
+    for offset in (0.08, -0.15):
+        assert not play_shortcut(TASK, unguarded(GapFunnel)(offset=offset), "aslant_through_the_gap").solved
+
+
+def test_the_gap_is_what_the_ball_goes_through():
+    (rollout, world), *_ = ablated(TASK, PLAIN).values()
+    assert rollout.reason == "the ball struck the wall" and world.touched("ball", "wall")
+    solved = load(TASK, PLAIN)
+    assert replayed(TASK, PLAIN, PLAIN, solved).solved and not solved.touched("ball", "wall")
+
+
+def test_no_fixed_place_of_the_gap_is_right_in_more_than_a_tenth_of_training():
+    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(100)] for seed in (1, 2))
+    (prior,) = fit(training, fresh=fresh)
+    assert 0.0 < prior.fresh <= 0.10
+
+
+def test_memorised_actions_stop_short_where_the_ball_rolls_less_far():
+    trained, other = (TASK.draw(split, 0, 0).scenario for split in ("id", "sticky"))
+    assert not replayed(TASK, trained, other).solved
+
+
+def test_nobody_touches_the_ball_where_it_comes_to_rest():
+    assert solution(TASK, PLAIN).solved
+    assert math.dist(PLAIN.zone_at[:2], (-0.56, 0.0)) > 0.88
+
+
+# --- scenes that must not be certified --------------------------------------------------------
+
+
+def test_an_oracle_that_does_not_bring_the_ball_before_the_gap_is_not_certified():
+    not_certified(TASK, mistaken(GapFunnel, "straight_ahead")(), "solved", "the ball struck the wall")
+
+
+def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
+    each_refuted_for_its_own_reason(
+        [
+            replace(PLAIN, wall=GapWall(gap=0.05)),
+            replace(PLAIN, wall=GapWall(gap=0.09), ball=Ball(radius=0.035)),
+            replace(PLAIN, offset=0.03),
+            replace(PLAIN, gap_y=0.3, offset=0.2),
+            replace(PLAIN, gap_y=0.35, offset=-0.1),
+            replace(PLAIN, run=0.24),
+            replace(PLAIN, run=0.10),
+            replace(PLAIN, before=0.15),
+            replace(PLAIN, rolling=0.05),
+            replace(PLAIN, kerb=Kerb(height=0.002)),
+            replace(PLAIN, wall_x=0.29, run=0.05, gap_y=0.3, offset=-0.1),
+        ]
+    )
+
+
+@given(scenario=anywhere(GapFunnel))
+@settings(max_examples=25, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
