@@ -37,7 +37,7 @@ from ..assets.gap_wall import GapWall, Kerb
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, between, heading
+from ..geometry import UP, Vec3, between, heading, quat
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
@@ -122,9 +122,16 @@ class GapFunnel(Scenario):
         left, right = (self._to_edge(side) for side in (1.0, -1.0))
         place(scene, replace(self.wall, left=left, right=right), "wall", self.gap_at, yaw, free=False)
         place(scene, self.zone, "zone", self.zone_at, yaw, free=False)
-        place(scene, self.kerb, "kerb", self.kerb_at, yaw, free=False)
+        self._add_kerb(scene)
         place(scene, replace(self.ball, rolling=self.rolling), "ball", self.start)
         return scene
+
+    def _add_kerb(self, scene: mujoco.MjSpec) -> None:
+        """The kerb is part of the table: whether a ball came to it says nothing of the way that it took."""
+        top = scene.body("table")
+        self.kerb.fill(top, scene)
+        bar = top.geoms[-1]
+        bar.pos, bar.quat = bar.pos + self.kerb_at - top.pos, quat("z", math.radians(self.yaw))
 
     # --- goal -----------------------------------------------------------------------------
 
