@@ -13,7 +13,8 @@ level, by the angle of friction on its wall, and what turns it is its handle:
 * Its thin wall lets the fingers close so far that the jaw's springs hardly press (`pinch`): friction there bears less
   than the weight of cup and block. The handle is thick.
 * Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
-* Pushed it slides, since its friction on the table is less than its radius over its height.
+* Pushed it slides: its friction on the table is less than the distance of its centre of mass from the edge, over its
+  height, also towards the handle.
 
 Decisions, where the paper (App. B, T24) is silent:
 
@@ -62,9 +63,9 @@ from ..skills.motion import (
 )
 
 MUG = Cup(
-    base=0.041, rim=0.041, wall=0.002, bead=0.0, handle=0.046, bar=0.018, mass=0.09, friction=0.13, handle_friction=0.9
+    base=0.043, rim=0.043, wall=0.002, bead=0.0, handle=0.046, bar=0.014, mass=0.09, friction=0.10, handle_friction=0.9
 )
-"""82 mm wide, more than the jaw opens, and smooth as glazed china or polished metal; the handle is rubber."""
+"""86 mm wide, more than the jaw opens, and smooth as glazed china or polished metal; the handle is rubber."""
 AIR = 0.005
 """Least space between hand and things [m]: jitter takes 2 mm, moves are exact to 3 mm."""
 TAPER = 0.35
@@ -213,12 +214,12 @@ class CupExtract(Scenario):
         yield from self.put_down(world, self.goal)
 
     def _knock(self, world: World) -> Plan:
-        """Push the cup at its rim with closed fingers, away from its handle's side, as fast as the hand goes."""
-        arm, along = world.arm, world.rot("cup")[:, 1] * math.copysign(1.0, self.goal_y)
-        beside = world.pos("cup") - (self.cup.rim + 0.03) * along + (self.cup.height - 0.005) * UP
-        yield from go_to(arm, beside + 0.05 * UP, closing_along(arm, world.rot("cup")[:, 0]), COARSE, CLOSED)
+        """Push the cup at its rim with closed fingers, over its handle, as fast as the hand goes."""
+        arm, along = world.arm, world.rot("cup")[:, 0]
+        beside = world.pos("cup") - (self.cup.rim + 0.03) * along + (self.cup.height - 0.002) * UP
+        yield from go_to(arm, beside + 0.05 * UP, closing_along(arm, world.rot("cup")[:, 1]), COARSE, CLOSED)
         yield from go_to(arm, beside, pace=FINE)
-        yield from push(arm, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.12)
+        yield from push(arm, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.20)
         yield from retreat(arm)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
@@ -246,8 +247,9 @@ class CupExtract(Scenario):
         yield require(
             cup.friction < TAPER, "fingers opened in the cup can carry it", friction=cup.friction, taper=TAPER
         )
-        slides = cup.base / cup.height
-        yield require(cup.friction < 0.9 * slides, "a push tips the cup", friction=cup.friction, most=slides)
+        com = cup.mass / (cup.mass + block.mass) * float(cup.inertial()[0][0])
+        slides = (cup.base - com) / cup.height  # towards the handle, where its weight is
+        yield require(cup.friction < 0.85 * slides, "a push tips the cup", friction=cup.friction, most=slides)
         turn = about_z(math.radians(self.handle))
         ends = [self.foot + turn @ [cup.grip[0] + cup.bar / 2, 0.0, 0.0], self.foot + turn @ [-cup.rim, 0.0, 0.0]]
         yield on_table("the cup", ends)
