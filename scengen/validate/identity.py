@@ -127,14 +127,26 @@ def _dependencies() -> frozenset[str]:
 
 
 def _essence(path: Path, family: str) -> str:
-    """The code of a file without comments and docstrings, and without `oracle` and `features` of the class `family`."""
+    """The code of a file without comments and docstrings, and without `oracle` and `features` of the class `family`.
+
+    As nested lists, not as text that Python writes: that of 3.12 has other quotes in f-strings than that of 3.11."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
             spared = isinstance(node, ast.ClassDef) and node.name == family
             node.body = [s for s in body if not _ignored(s, spared)] or [ast.Pass()]  # type: ignore[attr-defined]
-    return ast.unparse(tree)
+    return repr(_plain(tree))
+
+
+def _plain(node: object) -> object:
+    """A syntax tree as lists, without what is empty: later Pythons know more kinds of what is not there."""
+    if isinstance(node, ast.JoinedStr):  # Python 3.12.1 sees empty texts in some
+        return ["JoinedStr", [_plain(v) for v in node.values if not (isinstance(v, ast.Constant) and v.value == "")]]
+    if isinstance(node, ast.AST):
+        told = [(name, _plain(value)) for name, value in ast.iter_fields(node) if value is not None and value != []]
+        return [type(node).__name__, told]
+    return [_plain(each) for each in node] if isinstance(node, list) else repr(node)
 
 
 def _ignored(statement: ast.stmt, of_family: bool) -> bool:

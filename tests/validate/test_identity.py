@@ -72,3 +72,14 @@ def test_oracle_and_features_of_the_family_alone_do_not_count(tmp_path):
     assert _essence(path, "A") == one and _essence(path, "") != whole
     path.write_text("class A:\n    def oracle(self): return 1\n    def success(self): return 4\n")
     assert _essence(path, "A") != one
+
+
+def test_the_hash_of_code_is_the_same_in_every_python(tmp_path):
+    """Pinned: Python 3.11 and 3.12 write this f-string with other quotes, and parse it alike."""
+    import hashlib
+
+    from scengen.validate.identity import _essence
+
+    path = tmp_path / "family.py"
+    path.write_text("def told(names: list[str]) -> str:\n    return f\"known: {', '.join(names):>{len(names)}}\"\n")
+    assert hashlib.sha256(_essence(path, "").encode()).hexdigest()[:16] == "2838ff990e47804c"
