@@ -1,14 +1,14 @@
 """T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot, with a two-finger jaw.
 
-      \\   hand                          The jaw holds the box by its upper end, across its thickness. A hand that holds
-       \\  /\\                            it level has its palm, which is wider than the slot is high, under the box: so
-        \\/  \\___                        the box can go in by its far end only, leaning. Let go, it falls onto the
-        |\\   \\ |                        slot's near wall, lies there at 16 deg, and is knocked home.
-    ----+-----\\-+----
+              __
+      hand __/   \__           From the side: the jaw holds the box by its upper end, across its thickness. The palm of a
+            \       \__        level hand, wider than the slot is high, meets the slot's wall or the table. So the box
+          |  \__       \ |     goes in leaning, far end first. Let go, it falls onto the near wall, lies there at
+    ------+-----\______/-+--   16 deg, and is knocked home.
 
-Bottleneck: no place of the hand lets the box down into the slot. What can be reached is a box that leans with its far
-end in the slot, as flat as the palm permits, and then touches the wall behind it only after it has been let go and
-pushed: it has to be seen where it is caught, and to be shifted until it drops in. Turned by 3 deg it does not.
+Bottleneck: no hand lets the box down into the slot. What can be reached is a box that leans with its far end in the
+slot, as flat as the palm permits. Let go, from there or from a level hand, it is caught on the near wall; it has to be
+seen there, and shifted until it drops in, for which its length leaves 3 mm of room.
 
 Decisions, where the paper (App. B, T09) says no more than "tight slot outline" and "partially insert":
 
