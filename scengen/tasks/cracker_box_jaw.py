@@ -1,9 +1,9 @@
 """T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot, with a two-finger jaw.
 
               __
-      hand __/   \__           From the side: the jaw holds the box by its upper end, across its thickness. The palm of a
-            \       \__        level hand, wider than the slot is high, meets the slot's wall or the table. So the box
-          |  \__       \ |     goes in leaning, far end first. Let go, it falls onto the near wall, lies there at
+      hand __/   \__           From the side: the jaw holds the box by its upper end, across its thickness. The palm of
+            \       \__        a level hand, wider than the slot is high, meets the slot's wall or the table. So the
+          |  \__       \ |     box goes in leaning, far end first. Let go, it falls onto the near wall, lies there at
     ------+-----\______/-+--   16 deg, and is knocked home.
 
 Bottleneck: no hand lets the box down into the slot. What can be reached is a box that leans with its far end in the
