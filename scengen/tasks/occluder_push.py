@@ -180,7 +180,7 @@ class OccluderPush(Scenario):
         return {
             "reach_through_the_lid": Shortcut(self._reach_through, to_rest=True),
             "pick_the_lid_up": Shortcut(self._pick_lid, to_rest=True),
-            "shove_hard": Shortcut(self._shove, to_rest=True),
+            "shove_hard": Shortcut(self._shove),
             "take_another": Shortcut(lambda world: self._answer(world, other)),
         }
 
