@@ -45,6 +45,14 @@ TRAINING = {
     "sort_id": "mass_sort",
     "balance_id": "balance_medium",
     "balance_hard_id": "balance_hard",
+    "edge_id": "edge_slide",
+    "box_by_cup_id": "cracker_box_suction",
+    "box_by_jaw_id": "cracker_box_jaw",
+    "push_id": "indirect_push",
+    "gap_id": "gap_funnel",
+    "extract_id": "cup_extract",
+    "lids_id": "occluder_push",
+    "stack_id": "shape_stack",
 }
 """A pool of the training split of every task but the first, by its name."""
 
