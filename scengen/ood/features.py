@@ -82,8 +82,8 @@ def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Eviden
     shifts = task.shifts(split)
     before, after = [values(t) for t, _ in twins], [values(s) for _, s in twins]
     differ = [{n for n in a if a[n] != b[n]} for a, b in zip(before, after, strict=True)]
-    here = [dict(s.features()) for _, s in twins]
-    there = [dict(t.features()) for t, _ in twins]
+    here = [{name: float(value) for name, value in s.features().items()} for _, s in twins]
+    there = [{name: float(value) for name, value in t.features().items()} for t, _ in twins]
     return Evidence(
         tuple(departure(name, [f[name] for f in there], [f[name] for f in here]) for name in here[0]),
         tuple(sorted(set[str]().union(*differ) - shifts.keys())),

@@ -1,11 +1,13 @@
 """Memories of training, played within training and out of it, and the card that tells of it."""
 
 import json
+from dataclasses import asdict
 
+import numpy as np
 import pytest
 
 from scengen import cli, config
-from scengen.ood import behaviour
+from scengen.ood import behaviour, features
 from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Rung, climb, verdict
 from scengen.ood.memory import remember
 from scengen.samplers.split import ID
@@ -120,3 +122,11 @@ def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
     status = cli.run(("axis", "task=domino_single", f"to={tmp_path}", *argv))
     told = capsys.readouterr().err
     assert status == 2 and says in told and told.count("\n") == 1
+
+
+def test_features_of_numpys_kinds_are_told_as_plain_numbers():
+    """A family's features may be numpy's numbers, whose comparisons count as numpy's integers: JSON knows neither."""
+    task = config.task("cracker_box_suction")
+    found = features.sampled(task, "slot_across", draws=5)
+    assert any(isinstance(value, np.floating) for value in task.family().features().values())
+    assert json.dumps([asdict(departure) for departure in found.departures])
