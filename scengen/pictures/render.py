@@ -15,6 +15,7 @@ from mujoco import MjvCamera, gl_context
 from numpy.typing import NDArray
 from PIL import Image
 
+from ..assets.prop import TABLE_TOP
 from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
 from ..robots.panda import arms
@@ -98,6 +99,8 @@ MARGIN = 1.12
 """How much farther away the fitted view stands than it would have to."""
 CLOSEST = 0.55
 """It does not come closer than this [m], or one could not tell where on the table things are."""
+FALLEN = 0.1
+"""What is so far below the table top is not followed [m]."""
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 """Of the corners of a box, shape (8, 3)."""
 INSIDE = 0.8
@@ -113,20 +116,27 @@ def hide_hulls(model: mujoco.MjModel) -> None:
     model.geom_rgba[hulls, 3] = 0.0
 
 
-def fitted(world: World, aspect: float, azimuth: float = VIEWS[0][0], elevation: float = VIEWS[0][1]) -> MjvCamera:
+def fitted(
+    world: World,
+    aspect: float,
+    azimuth: float = VIEWS[0][0],
+    elevation: float = VIEWS[0][1],
+    points: NDArray[np.float64] | None = None,
+) -> MjvCamera:
     """A view that just holds the scene's things and the robot's hand; the table and the floor go on beyond it.
 
     Args:
         aspect: width of the picture over its height.
         azimuth, elevation: where it looks [deg].
+        points: what it holds instead, shape (n, 3) [m].
     """
     view = MjvCamera()
     view.azimuth, view.elevation = azimuth, elevation
     ahead, right, up = _axes(view)
     axes = np.array([right, up, ahead])
-    points = _corners(world) @ axes.T
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    away = points - centre
+    seen = (_corners(world) if points is None else points) @ axes.T
+    centre = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    away = seen - centre
     half = np.tan(np.radians(world.model.vis.global_.fovy) / 2)
     room = np.abs(away[:, :2]) / [half * aspect, half]  # at this distance from the eye a point stands on the rim
     view.lookat = axes.T @ centre
@@ -135,13 +145,18 @@ def fitted(world: World, aspect: float, azimuth: float = VIEWS[0][0], elevation:
 
 
 def clearest(world: World, aspect: float, states: Sequence[State] = ()) -> MjvCamera:
-    """The fitted view of the scene as it began in which least is hidden, behind the robot or behind other things.
+    """The view in which least is hidden, behind the robot or behind other things.
+
+    It holds the hand as it is at first, and the scene's things wherever they get to, unless they fall off the table.
 
     Args:
         aspect: width of the picture over its height.
         states: of the world, at which one looks; default as it is now. The world is left in the last.
     """
-    views = [fitted(world, aspect, *where) for where in VIEWS]
+    held = [_corners(world) if number == 0 else _things(world) for number, _ in enumerate(_visited(world, states))]
+    points = np.vstack(held)
+    points = points[points[:, 2] > TABLE_TOP - FALLEN]
+    views = [fitted(world, aspect, *where, points) for where in VIEWS]
     shown = np.array([[_shown(world, view) for view in views] for _ in _visited(world, states)]).mean(axis=0)
     best = int(shown.argmax())
     return views[best if shown[best] > shown[0] + WORTH else 0]
@@ -193,8 +208,12 @@ def _sees(world: World, eye: Vec3, point: Vec3, body: int) -> bool:
 
 def _corners(world: World) -> NDArray[np.float64]:
     """Corners of the boxes around all geoms of the scene but table and floor, and the hand, shape (n, 3) [m]."""
-    boxes = [_box(world, geom) for geom in _geoms(world)]
-    return np.vstack([*boxes, *(arm.hand for arm in world.arms)])
+    return np.vstack([_things(world), *(arm.hand for arm in world.arms)])
+
+
+def _things(world: World) -> NDArray[np.float64]:
+    """The same without the hand."""
+    return np.vstack([_box(world, geom) for geom in _geoms(world)])
 
 
 def _geoms(world: World) -> list[int]:
