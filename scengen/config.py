@@ -149,7 +149,7 @@ def shown(verb: str, overrides: Sequence[str]) -> str:
         ScengenError: one line that says what is wrong.
     """
     plain, choices = _composed(verb, overrides)
-    if "certify" in plain:
+    if {"certify", "task"} <= choices.keys():
         plain["certify"] = _settled(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
     lines = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
     told = {"sort_keys": False, "allow_unicode": True, "width": 120}

@@ -1,4 +1,4 @@
-"""T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot, with a two-finger jaw.
+r"""T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot, with a two-finger jaw.
 
               __
       hand __/   \__           From the side: the jaw holds the box by its upper end, across its thickness. The palm of
