@@ -127,7 +127,7 @@ def test_a_scene_that_does_not_end_is_named_before_anybody_looks_at_it(monkeypat
     monkeypatch.setattr("scengen.validate.playable.SHOWN", Limits(2.0, 4000))
     endless = row.scene_xml.replace("<option ", '<option iterations="1000000000" tolerance="0" ')
     assert endless != row.scene_xml
-    with pytest.raises(WorkerDied, match=f"playing {row.id} took longer than 2 s"):
+    with pytest.raises(WorkerDied, match=f"playing {row.name} took longer than 2 s"):
         check_row(replace(row, scene_xml=endless.replace('timestep="', 'timestep="0.0000')))
     with pytest.raises(ScengenError):
         check_scene("<mujoco><include file='/etc/passwd'/></mujoco>", row.embodiment)
