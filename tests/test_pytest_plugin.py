@@ -17,6 +17,7 @@ CONF = str(Path(__file__).parent / "foreign" / "conf")
 def checked(capsys, tmp_path, monkeypatch):
     """Runs pytest in an empty folder, and returns its exit status and what it said."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # where scengen is installed it would be loaded twice
     (tmp_path / "test_of_the_folder.py").write_text("def test_it():\n    pass\n")
 
     def run(*argv):

@@ -15,7 +15,7 @@ import jinja2
 from markdown_it import MarkdownIt
 
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/*/*.md")
-FILES = ("docs/*.png", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff")
+FILES = ("docs/*.png", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff", "Dockerfile")
 MADE = {"Axis cards": "generated/axes/*/card.html", "Reports": "generated/*.html"}
 """Pages that commands have written, by heading."""
 TEMPLATE = """<!doctype html>

@@ -113,7 +113,9 @@ class Cup(Turned):
         parts = []
         path = []
         for z, side in ((low, 1.0), (high, -1.0)):
-            wall = np.array([self.outer(z) - self.wall / 2, 0.0, z])
+            # where the cup is wider, or else the bar's end would reach into the hollow of one with a leaning wall
+            widest = max(self.outer(z - self.bar / 2), self.outer(z + self.bar / 2))
+            wall = np.array([widest - self.wall / 2, 0.0, z])
             centre = np.array([self._reach - bend, 0.0, z + side * bend])
             turns = [math.pi / 2 * i / ARC for i in range(ARC + 1)] if bend >= SHORTEST else [0.0]
             arc = [centre + bend * np.array([math.sin(a), 0.0, -side * math.cos(a)]) for a in turns]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from helpers import anywhere
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold
 
@@ -156,6 +156,7 @@ def test_no_wedge_reaches_into_the_hollow(solid):
 
 
 @given(cup=anywhere(Cup))
+@example(cup=Cup(height=0.125, base=0.032, rim=0.054, wall=0.002, floor=0.008, bead=0.0, handle=0.031, bar=0.016))
 @settings(max_examples=25, deadline=None)
 def test_a_ball_fits_into_a_cup_by_size_alone_and_feels_no_handle(cup):
     """Where the wall leans the ball touches it at the foot of the perpendicular, half a ball's lean lower or higher."""

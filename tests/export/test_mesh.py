@@ -15,7 +15,7 @@ from scengen.export.mesh import FORMATS, encode, united
 from scengen.intake import solid
 from scengen.params import parameters
 
-APART = ("seesaw", "pendulum")
+APART = ("seesaw", "pendulum", "gap_wall")
 """What consists of two parts that touch nowhere."""
 MARKS = ("patch", "zone")
 """What is only looked at."""

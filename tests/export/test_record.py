@@ -348,7 +348,7 @@ def test_a_witness_that_fails_is_recorded_as_a_failure(tmp_path, capsys, witness
     pool.write(tmp_path / "cut", Pool.open(REFERENCE).about, [cut])
     target = tmp_path / "out"
     assert cli.run(["record", f"pool={tmp_path / 'cut'}", f"to={target}", "cameras=none", "fps=5"]) == 1
-    assert f"FAILED {cut.id}" in capsys.readouterr().err
+    assert f"FAILED {cut.name}" in capsys.readouterr().err
     (episode,) = episodes_of(target)
     assert not episode["scengen/success"] and not column(target, "reward").any() and column(target, "next.done")[-1]
 

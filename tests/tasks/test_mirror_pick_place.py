@@ -132,7 +132,7 @@ def test_recordings_turn_every_picture_bit_by_bit_and_say_so_in_the_calibration(
     monkeypatch.setattr(DataSet, "add", lambda self, values, seen: (taken.append(seen), add(self, values, seen)))
     how = {"cameras": CAMERAS[1], "width": 32, "height": 24, "fps": 2}
     for view in (PLAIN, HALF):
-        record(recording.Settings(str(pools[view]), str(tmp_path / str(view)), **how), config.task, lambda *_: None)
+        record(recording.Settings(str(pools[view]), str(tmp_path / str(view)), **how), lambda *_: None)
     plain, turned = taken[: len(taken) // 2], taken[len(taken) // 2 :]
     assert len(plain) == len(turned) == 4
     for one, other in zip(plain, turned, strict=True):
@@ -140,7 +140,7 @@ def test_recordings_turn_every_picture_bit_by_bit_and_say_so_in_the_calibration(
     assert told[1]["extrinsics"] == told[0]["extrinsics"]
     assert (told[1]["intrinsics"] == VIEWS[HALF].pixels(32, 24) @ told[0]["intrinsics"]).all()
     with pytest.raises(BadConfig, match="must be square"):
-        record(recording.Settings(str(pools[QUARTER]), str(tmp_path / "q"), **how), config.task, lambda *_: None)
+        record(recording.Settings(str(pools[QUARTER]), str(tmp_path / "q"), **how), lambda *_: None)
 
 
 # --- whom the picture misleads -----------------------------------------------------------
