@@ -2,9 +2,10 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from rich.table import Table
 
@@ -14,9 +15,12 @@ from ..pictures.report import attack_table, funnel_table, summary_lines
 from ..runs.generate import Settings, Summary, generate
 from ..runs.progress import ProgressBar
 from ..samplers.designs import SOBOL
+from ..samplers.split import Split
 from ..samplers.task import Task
 from ..validate.settings import CertifySettings
 from . import FAILED, OK, Arguments, err, out, say, warn
+
+T = TypeVar("T")
 
 GENERATED = "generated"
 """Folder of the pools of a sweep that names none."""
@@ -61,7 +65,8 @@ def command(arguments: Arguments) -> int:
     if not asked[0].swept:
         (run,) = map(_run, asked)
         return OK if run().certified == run.settings.n else FAILED
-    runs = _apart(asked, [_checked(one) for one in asked])
+    asked, found = _sensible(asked)
+    runs = _apart(asked, found)
     say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
     summaries = [run() for run in runs]
     out.print(_table(asked, runs, summaries))
@@ -74,18 +79,44 @@ def _run(asked: Combination) -> Run:
     return Run(task, certify_settings, settings)
 
 
-def _checked(asked: Combination) -> Run:
-    """One run of a sweep, found to make sense before the first begins.
+def _sensible(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
+    """The runs of a sweep, found to make sense before the first begins.
+
+    Where several tasks are named, so may be axes of each: a combination of a task with an axis that another one has is
+    left out, and told.
 
     Raises:
-        BadConfig: it does not, and which it is.
+        BadConfig: one makes no sense, and which it is.
+    """
+    runs = [_checked(one, _run) for one in asked]
+    kept, lacking = [], []
+    for one, run in zip(asked, runs, strict=True):
+        missing = _checked(one, lambda _, run=run: _missing(run))
+        if missing and any(missing <= other.task.axes.keys() for other in runs):
+            lacking.append(str(one))
+        else:
+            _checked(one, lambda _, run=run: run.settings.check(run.task))
+            kept.append((one, run))
+    if lacking:
+        warn(f"scengen: left out, since the task has no such split: {', '.join(lacking)}", "yellow")
+    return [one for one, _ in kept], [run for _, run in kept]
+
+
+def _missing(run: Run) -> set[str]:
+    """The axes of a run's split that its task does not have."""
+    return {part.axis for part in Split.parse(run.settings.split).parts} - run.task.axes.keys()
+
+
+def _checked(asked: Combination, look: Callable[[Combination], T]) -> T:
+    """What is found of a combination.
+
+    Raises:
+        BadConfig: it makes no sense, and which it is.
     """
     try:
-        run = _run(asked)
-        run.settings.check(run.task)
+        return look(asked)
     except ScengenError as error:
         raise BadConfig(f"{asked}: {error}; nothing was made, leave this combination out") from None
-    return run
 
 
 def _apart(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:

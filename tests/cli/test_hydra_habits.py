@@ -41,7 +41,7 @@ def test_lists_and_hydras_own_words_are_combined():
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        (("task=domino_single,packing", "split=id,tight"), "task=domino_single split=tight: no split of domino_single"),
+        (("task=domino_single,packing", "split=id,tigt"), "split=tigt: no split of"),
         ((DOMINO, "split=id,diagonl"), "split=diagonl: no split of domino_single named 'diagonl' (did you mean 'diag"),
         (("task=packing,nothing",), "task=nothing: no task named 'nothing'"),
         ((DOMINO, "n=1,0"), "n=0: n = 0; it must be at least 1"),
@@ -55,6 +55,19 @@ def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(c
     status, shown = said(capsys, "generate", *asked, f"pool={tmp_path / 'many'}")
     assert status == 2 and says in shown.err and shown.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_an_axis_of_another_task_of_a_sweep_is_left_out_and_told(capsys):
+    asked = config.combinations("generate", ["task=domino_single,packing", "split=id,tight"])
+    kept, runs = generate._sensible(asked)
+    assert [(run.task.name, run.settings.split) for run in runs] == [
+        ("domino_single", "id"),
+        ("packing", "id"),
+        ("packing", "tight"),
+    ]
+    assert len(kept) == 3 and "left out, since the task has no such split: task=domino_single split=tight" in (
+        capsys.readouterr().err
+    )
 
 
 @pytest.mark.slow
