@@ -57,6 +57,14 @@ def _solution(horizon: float, embodiment: str, scenario: Scenario) -> Rollout:
     return rollout
 
 
+def after_oracle(task: Task, scenario: Scenario) -> World:
+    """A world of the scenario after its oracle has solved it."""
+    world = load(task, scenario)
+    rollout = play(task, scenario, scenario.oracle, world)
+    assert rollout.solved, rollout.reason
+    return world
+
+
 def replayed(task: Task, actions_of: Scenario, scenario: Scenario, world: World | None = None) -> Rollout:
     """What the oracle's actions in one scenario do in another one, or in another world."""
     actions = solution(task, actions_of).actions

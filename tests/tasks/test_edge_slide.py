@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
+    after_oracle,
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
@@ -34,11 +35,7 @@ NOMINAL = EdgeSlide()
 
 @pytest.fixture(scope="module")
 def solved():
-    """The world after the oracle has solved the nominal scenario."""
-    w = load(TASK, NOMINAL)
-    rollout = play(TASK, NOMINAL, NOMINAL.oracle, w)
-    assert rollout.solved, rollout.reason
-    return w
+    return after_oracle(TASK, NOMINAL)
 
 
 # --- the push -----------------------------------------------------------------------------

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
+    after_oracle,
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
     not_certified,
-    play,
     play_shortcut,
     replayed,
     spared,
@@ -34,11 +34,7 @@ NOMINAL = IndirectPush()
 
 @pytest.fixture(scope="module")
 def solved():
-    """The world after the oracle has solved the nominal scenario."""
-    w = load(TASK, NOMINAL)
-    rollout = play(TASK, NOMINAL, NOMINAL.oracle, w)
-    assert rollout.solved, rollout.reason
-    return w
+    return after_oracle(TASK, NOMINAL)
 
 
 # --- how far a chain reaches ---------------------------------------------------------------

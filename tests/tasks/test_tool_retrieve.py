@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
+    after_oracle,
     builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
@@ -43,11 +44,7 @@ def away(pos):
 
 @pytest.fixture(scope="module")
 def solved():
-    """The world after the oracle has solved the nominal scenario."""
-    w = load(TASK, NOMINAL)
-    rollout = play(TASK, NOMINAL, NOMINAL.oracle, w)
-    assert rollout.solved, rollout.reason
-    return w
+    return after_oracle(TASK, NOMINAL)
 
 
 # --- what the hook is for ---------------------------------------------------------------
