@@ -28,19 +28,19 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from ..assets.bin import Bin
-from ..assets.cracker_box import CrackerBox, slot_for
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.cracker_box import CrackerBox
+from ..assets.prop import TABLE_TOP
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, axes, corners, gap
+from ..geometry import UP, Mat3, Vec3, axes, gap
 from ..params import param
 from ..predicates import fallen, seated
 from ..robots.jaw import OPENED, PALM_ABOVE, PALM_ALONG, pinch
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import carry, pick, poke, release
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from ..skills.suction import carry_to
+from .cracker_box import BoxAndSlot
 
 FLAT = math.radians(3.0)
 """Largest angle between the box' thin axis and the vertical [rad]."""
@@ -77,7 +77,7 @@ APART, PASSES = 0.01, 0.0005
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrackerBoxJaw(Scenario):
+class CrackerBoxJaw(BoxAndSlot):
     """A box of crackers that stands on the table, and a slot."""
 
     HOLD = 0.5
@@ -93,17 +93,6 @@ class CrackerBoxJaw(Scenario):
     clearance: float = param(0.005, "m", 0.0005, 0.02)
     """Between the box in the middle of the slot and each wall."""
     box: CrackerBox = CrackerBox(scale=0.85, friction=0.21)
-
-    # --- scene ----------------------------------------------------------------------------
-
-    def build(self) -> mujoco.MjSpec:
-        return self._scene(self.box, self.slot)
-
-    def _scene(self, box: CrackerBox, slot: Bin) -> mujoco.MjSpec:
-        scene = table()
-        place(scene, slot, "slot", self.foot, math.radians(self.slot_yaw), free=False)
-        place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
-        return scene
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -289,11 +278,6 @@ class CrackerBoxJaw(Scenario):
         leans = math.asin(depth / height)
         return self.slot.length - height * math.cos(leans) - depth * math.tan(leans)
 
-    @cached_property
-    def slot(self) -> Bin:
-        """The slot, made to measure."""
-        return slot_for(self.box, self.clearance)
-
     @property
     def rim(self) -> float:
         """Height of the slot's walls [m]."""
@@ -305,26 +289,3 @@ class CrackerBoxJaw(Scenario):
         side = math.copysign(1.0, self.slot_y - self.box_y)
         yaw = math.radians(self.slot_yaw)
         return side * np.array([-math.sin(yaw), math.cos(yaw), 0.0])
-
-    @property
-    def start(self) -> Vec3:
-        """Where the box stands [m]."""
-        return np.array([self.box_x, self.box_y, TABLE_TOP])
-
-    @property
-    def foot(self) -> Vec3:
-        """Where the slot stands [m]."""
-        return np.array([self.slot_x, self.slot_y, TABLE_TOP])
-
-    @cached_property
-    def seat(self) -> Vec3:
-        """The middle of a box that lies in the middle of the slot [m]."""
-        return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
-
-    @property
-    def _footprint(self) -> Outline:
-        return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
-
-    @property
-    def _outline(self) -> Outline:
-        return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)

@@ -25,20 +25,17 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import mujoco
 import numpy as np
 
-from ..assets.bin import Bin
-from ..assets.cracker_box import CrackerBox, slot_for
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.cracker_box import CrackerBox
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, axes, corners, gap, shortest
+from ..geometry import UP, Mat3, Vec3, axes, gap, shortest
 from ..params import param
 from ..predicates import fallen, seated
 from ..robots.suction import PULL, REACHES, TORQUE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import poke
 from ..skills.motion import (
@@ -55,6 +52,7 @@ from ..skills.motion import (
     until,
 )
 from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
+from .cracker_box import BoxAndSlot
 
 FLAT = math.radians(3.0)
 """Largest angle between the box' thin axis and the vertical [rad]."""
@@ -98,7 +96,7 @@ DOWN, UNDER = 0.0015, 0.003
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrackerBoxSuction(Scenario):
+class CrackerBoxSuction(BoxAndSlot):
     """A box of crackers that stands on the table, and a slot."""
 
     HOLD = 0.5
@@ -114,17 +112,6 @@ class CrackerBoxSuction(Scenario):
     clearance: float = param(0.004, "m", 0.0005, 0.02)
     """Between the box in the middle of the slot and each wall."""
     box: CrackerBox = CrackerBox(friction=0.21)
-
-    # --- scene ----------------------------------------------------------------------------
-
-    def build(self) -> mujoco.MjSpec:
-        return self._scene(self.box, self.slot)
-
-    def _scene(self, box: CrackerBox, slot: Bin) -> mujoco.MjSpec:
-        scene = table()
-        place(scene, slot, "slot", self.foot, math.radians(self.slot_yaw), free=False)
-        place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
-        return scene
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -300,35 +287,7 @@ class CrackerBoxSuction(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @cached_property
-    def slot(self) -> Bin:
-        """The slot, made to measure."""
-        return slot_for(self.box, self.clearance)
-
-    @property
-    def start(self) -> Vec3:
-        """Where the box stands [m]."""
-        return np.array([self.box_x, self.box_y, TABLE_TOP])
-
-    @property
-    def foot(self) -> Vec3:
-        """Where the slot stands [m]."""
-        return np.array([self.slot_x, self.slot_y, TABLE_TOP])
-
-    @cached_property
-    def seat(self) -> Vec3:
-        """The middle of a box that lies in the middle of the slot [m]."""
-        return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
-
     @property
     def misfit(self) -> float:
         """Angle between the long side of a box that is turned down as it comes, and that of the slot [deg]."""
         return abs(math.remainder(self.slot_yaw - self.box_yaw, 180.0))
-
-    @property
-    def _footprint(self) -> Outline:
-        return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
-
-    @property
-    def _outline(self) -> Outline:
-        return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)

@@ -1,0 +1,63 @@
+"""What the two tasks with a cracker box and a slot share (T08, T09): the scene, and where things are in it."""
+
+import math
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from ..assets.bin import Bin
+from ..assets.cracker_box import CrackerBox, slot_for
+from ..assets.prop import TABLE_TOP, place, table
+from ..geometry import UP, Outline, Vec3, corners
+from ..scenario import Scenario
+
+
+class BoxAndSlot(Scenario):
+    """A box of crackers that stands on the table, and a slot. Subclasses are dataclasses with these parameters."""
+
+    box_x: float
+    box_y: float
+    box_yaw: float
+    slot_x: float
+    slot_y: float
+    slot_yaw: float
+    clearance: float
+    box: CrackerBox
+
+    def build(self) -> mujoco.MjSpec:
+        return self._scene(self.box, self.slot)
+
+    def _scene(self, box: CrackerBox, slot: Bin) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, slot, "slot", self.foot, math.radians(self.slot_yaw), free=False)
+        place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
+        return scene
+
+    @cached_property
+    def slot(self) -> Bin:
+        """The slot, made to measure."""
+        return slot_for(self.box, self.clearance)
+
+    @property
+    def start(self) -> Vec3:
+        """Where the box stands [m]."""
+        return np.array([self.box_x, self.box_y, TABLE_TOP])
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the slot stands [m]."""
+        return np.array([self.slot_x, self.slot_y, TABLE_TOP])
+
+    @cached_property
+    def seat(self) -> Vec3:
+        """The middle of a box that lies in the middle of the slot [m]."""
+        return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
+
+    @property
+    def _footprint(self) -> Outline:
+        return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
+
+    @property
+    def _outline(self) -> Outline:
+        return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)
