@@ -25,11 +25,10 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from ..geometry import quat
 from ..params import param
+from ..physics import GRAVITY
 from .ball import STEEL
 from .prop import Prop, Rgba, show, shown, solid
 
-GRAVITY = 9.81
-"""[m/s^2]: MuJoCo's default."""
 ROD = 0.002
 """Radius of the rod [m]."""
 BEAM = 0.008

@@ -27,10 +27,9 @@ import numpy as np
 
 from ..geometry import Vec3, about_y, quat
 from ..params import param
+from ..physics import GRAVITY
 from .prop import PRIORITY, Prop, Rgba, show, solid
 
-GRAVITY = 9.81
-"""Gravitational acceleration [m/s^2], MuJoCo's own."""
 ELASTIC = (-2e5, -50.0)
 """Contact stiffness [1/s^2] and damping [1/s] of the floor, per mass. Natural frequency sqrt(2e5) = 447 /s, 3.5 time
 steps of 2 ms to half an oscillation; damping ratio 50 / (2 * 447) = 0.06: a bounce returns 84 % of the speed."""

@@ -32,6 +32,7 @@ from ..assets.ridge import MARGIN, Ridge
 from ..assets.rod import SLUG_EDGE, Rod
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, shortest
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import PAD, PALM_ACROSS, PALM_ALONG, pinch
 from ..robots.panda import WRIST_MIDDLE
@@ -174,7 +175,7 @@ class Balance(Scenario):
         """Feel the torque, and take it for that of a common rod."""
         yield from self.lift(world)
         _, torque = yield from self.feel(world)
-        yield from self.lay(world, self.held_at(world) + torque / (EXPECTED * 9.81))
+        yield from self.lay(world, self.held_at(world) + torque / (EXPECTED * GRAVITY))
 
     def answer(self) -> Answer:
         """A place along the rod, from its middle [m]. One try: a rod that tips is lost."""
@@ -199,7 +200,7 @@ class Balance(Scenario):
         yield require(off >= CLEARLY, "the rod balances on its middle", beyond_the_edge=off, needed=CLEARLY)
         drop = TIPS * math.sin(LEVEL) * (rod.length / 2 + abs(rod.com))
         yield require(ridge.height >= drop, "a rod laid wrongly does not tip", height=ridge.height, needed=drop)
-        torque = rod.mass * 9.81 * abs(rod.com)
+        torque = rod.mass * GRAVITY * abs(rod.com)
         hold = pinch(rod.width) * rod.friction * PAD / 2
         yield require(torque <= hold, "the rod turns in the grip", torque=torque, grip=hold)
         yield on_table("the rod or the stand", [*self.outline, *self.stand])

@@ -33,6 +33,7 @@ from ..assets.prop import TABLE_TOP
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, axes, gap
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPENED, PALM_ABOVE, PALM_ALONG, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
@@ -246,7 +247,7 @@ class CrackerBoxJaw(BoxAndSlot):
         yield require(apart > APART, "the box stands in the slot's place", apart=apart)
         widest = OPENED - SPARE_GAP
         yield require(thickness < widest, "the box is too thick for the jaw", thickness=thickness, most=widest)
-        grip, weight = self.box.friction * pinch(thickness), 9.81 * self.box.mass
+        grip, weight = self.box.friction * pinch(thickness), GRAVITY * self.box.mass
         yield require(grip > HOLDS * weight, "the box slips out of the jaw", grip=grip, weight=weight)
         yield require(self.passes > PASSES, "the box jams between both walls", room=self.passes, least=PASSES)
         yield within_reach("the box", self.start + (height - BELOW + LIFT) * UP)
@@ -255,7 +256,7 @@ class CrackerBoxJaw(BoxAndSlot):
     def features(self) -> Mapping[str, float]:
         """How the box is held over its weight, its size, room in the slot, how flat it gets, the slot's direction."""
         return {
-            "weight_on_friction": 9.81 * self.box.mass / (self.box.friction * pinch(self.box.size[0])),
+            "weight_on_friction": GRAVITY * self.box.mass / (self.box.friction * pinch(self.box.size[0])),
             "size": self.box.scale,
             "room": self.clearance / self.box.size[2],
             "flattest": self.flattest,

@@ -33,6 +33,7 @@ from ..assets.cracker_box import CrackerBox
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, axes, gap, shortest
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.suction import PULL, REACHES, TORQUE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
@@ -267,7 +268,7 @@ class CrackerBoxSuction(BoxAndSlot):
         yield require(apart > APART, "the box stands in the slot's place", apart=apart)
         steady, friction = STEADILY * self.box.size[0] / (2 * high), self.box.friction
         yield require(friction < steady, "the box tips when the cup is pressed on", friction=friction, most=steady)
-        grip, weight = self.box.friction * PULL, 9.81 * self.box.mass
+        grip, weight = self.box.friction * PULL, GRAVITY * self.box.mass
         yield require(grip > GRIPS * weight, "the box slips off a cup on its side", grip=grip, weight=weight)
         torque = weight * self.box.size[0] / 2
         yield require(TORQUE > PEELS * torque, "the box peels a cup off its side", torque=torque, most=TORQUE)
@@ -277,7 +278,7 @@ class CrackerBoxSuction(BoxAndSlot):
     def features(self) -> Mapping[str, float]:
         """What the cup carries over what it could, how readily the box tips, its size, room in the slot, turn, way."""
         return {
-            "weight_on_friction": 9.81 * self.box.mass / (self.box.friction * PULL),
+            "weight_on_friction": GRAVITY * self.box.mass / (self.box.friction * PULL),
             "tipping": self.box.friction * self.box.size[2] / self.box.size[0],
             "size": self.box.scale,
             "room": self.clearance / self.box.size[2],

@@ -40,6 +40,7 @@ from ..assets.patch import Patch
 from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
 from ..geometry import UP, Vec3, about_y, about_z, heading, polar
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP, TIPS_CLOSED, pinch
 from ..robots.panda import BASE
@@ -70,8 +71,6 @@ AIR = 0.005
 """Least space between hand and things [m]: jitter takes 2 mm, moves are exact to 3 mm."""
 TAPER = 0.35
 """Slope of the fingers' outer sides, which come nearer to each other towards the tips: measured in a cup."""
-GRAVITY = 9.81
-"""[m/s^2]"""
 POUR_AT, POUR_HEIGHT = 0.41, 0.22
 """Where the hand is that pours: how far from the robot's first axis, since it cannot point back at the robot from
 farther out, and how high over the table [m]."""

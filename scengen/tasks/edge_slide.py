@@ -35,6 +35,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, between, corners
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, held
 from ..robots.jaw import OPENING, PAD, TIP, pinch, time_to_grip
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
@@ -218,7 +219,7 @@ class EdgeSlide(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        plate, weight = self.plate, 9.81 * self.plate.mass
+        plate, weight = self.plate, GRAVITY * self.plate.mass
         yield require(self.side != 0, "the nearest edge is neither left nor right", side=self.side)
         yield on_table("the plate", self.outline)
         shorter = min(plate.length, plate.width)

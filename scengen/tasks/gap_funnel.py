@@ -39,6 +39,7 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, between, heading, quat
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER, OPENED, PALM_ACROSS, PALM_ALONG, TIP
@@ -61,8 +62,6 @@ from ..skills.motion import (
     wait,
 )
 
-GRAVITY = 9.81
-"""[m/s^2]: MuJoCo's default."""
 STILL = 0.02
 """Speed below which the ball lies [m/s]: it stops within 3 mm."""
 LIFTED = 0.02

@@ -40,6 +40,7 @@ from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading
 from ..params import check_bounds, param
+from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots import ik
 from ..robots.jaw import TIP
@@ -233,7 +234,7 @@ class IndirectPush(Scenario):
         yield on_table("the target or the zone", [self.outline, self.zone_outline])
         yield require(self.out_of_touch > 0, "the hand may touch the target without a block", gap=self.out_of_touch)
         entered = self.distance + self.way - ZONE / 2
-        reaches = self.stretch + 1.5 * self.edge + STRUCK**2 / (2 * 9.81 * self.friction)
+        reaches = self.stretch + 1.5 * self.edge + STRUCK**2 / (2 * GRAVITY * self.friction)
         yield require(reaches < entered, "one block would do", reaches=reaches, zone=entered)
         yield require(self.needed <= len(self.spots), "no chain is long enough", needed=self.needed)
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]

@@ -31,6 +31,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, between, heading, polar, quat
 from ..params import param
+from ..physics import passes, rolled, rolling_slows
 from ..predicates import fallen, held
 from ..robots import jaw
 from ..robots.panda import BASE
@@ -41,8 +42,6 @@ from ..skills.motion import COARSE, OPEN, Condition, closing_along, go_to, hold,
 
 LIFTED = 0.04
 """How far the ball's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
-GRAVITY = 9.81
-"""[m/s^2]: MuJoCo's default."""
 HAND_SPEED = 0.28
 """Of the hand along one axis, at most [m/s]; measured."""
 HAND_TURN = 1.2
@@ -269,8 +268,8 @@ class LinearIntercept(Scenario):
 
     @property
     def slowing(self) -> float:
-        """How fast it loses speed [m/s^2]: it carries 7/5 of its mass, as it turns."""
-        return self.rolling * GRAVITY / 1.4
+        """How fast it loses speed [m/s^2]."""
+        return rolling_slows(self.rolling)
 
     @property
     def way_to_edge(self) -> float:
@@ -306,18 +305,3 @@ class LinearIntercept(Scenario):
     def start(self) -> Vec3:
         """Centre of the ball at the start [m]."""
         return np.array([self.x, self.y, TABLE_TOP + self.ball.radius])
-
-
-def rolled(speed: float, slowing: float, seconds: float) -> float:
-    """How far a ball rolls in some time [m] that begins at `speed` [m/s] and loses it at an even rate [m/s^2]."""
-    if slowing > 0.0:
-        seconds = min(seconds, speed / slowing)
-    return speed * seconds - slowing * seconds**2 / 2
-
-
-def passes(distance: float, speed: float, slowing: float) -> float:
-    """When such a ball has come `distance` [m] far [s], 0 if it is past; inf if it stops before."""
-    if distance <= 0.0:
-        return 0.0
-    left = speed**2 - 2 * slowing * distance
-    return 2 * distance / (speed + math.sqrt(left)) if left > 0.0 else math.inf

@@ -40,6 +40,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, corners
 from ..orientation import FACED, UPRIGHT, Orientation
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, held
 from ..robots.jaw import OPENED, TIP, pinch
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
@@ -153,7 +154,7 @@ class MirrorPickPlace(Scenario):
         shown = self._believed(UPRIGHT if self.orientation != UPRIGHT else TAUGHT)
         aside = float(np.linalg.norm(shown - self.spot))
         yield require(aside >= ASIDE, "the picture shows the cube about where it is", aside=aside, least=ASIDE)
-        hold, weight = self.cube.friction * pinch(edge), 9.81 * self.cube.mass
+        hold, weight = self.cube.friction * pinch(edge), GRAVITY * self.cube.mass
         yield require(hold > 2 * weight, "the jaw does not hold the cube", hold=hold, weight=weight)
         yield within_reach("the cube", self.spot + half * UP)
 
@@ -162,7 +163,7 @@ class MirrorPickPlace(Scenario):
         return {
             "shown_aside": float(np.linalg.norm(self._believed(UPRIGHT) - self.spot)),
             "edge_over_opening": self.cube.edge / OPENED,
-            "hold_over_weight": self.cube.friction * pinch(self.cube.edge) / (9.81 * self.cube.mass),
+            "hold_over_weight": self.cube.friction * pinch(self.cube.edge) / (GRAVITY * self.cube.mass),
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -39,6 +39,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, shortest
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen
 from ..robots import panda
 from ..robots.jaw import PAD, TIP, TIPS_CLOSED, pinch
@@ -46,6 +47,7 @@ from ..robots.suction import REACHES, TUBE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
+from ..skills.handover import OVERLAP, STAND_OFF, hand_over
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -89,14 +91,8 @@ ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
 DOWNWARDS, PATIENCE, FIRM = 0.05, 12.0, 2.0
 """How fast the plate is lowered [m/s], when that is given up [s], and how much more than usual is asked of the hand
 against the friction of its joints: askew by 0.04 rad the plate has no room left in the slot."""
-STAND_OFF, OVERLAP = 0.06, 0.010
-"""Distance of the open jaw from the lip before it moves in, and how far the lip then is beyond the grip site [m]."""
 OVER = 0.02
 """Between the plate and the dividers before it is lowered [m]."""
-GENTLY = Pace(0.06, 0.002)
-"""Towards the lip: what pushes the plate peels it off the cup."""
-CLOSING = 0.45
-"""How long the jaw needs for something as thin as a plate [s]: `jaw.time_to_grip` at 2 mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,11 +195,7 @@ class PlateShelf(Scenario):
 
     def hand_over(self, world: World) -> Plan:
         """The jaw takes the lip, then the cup lets go."""
-        giver, taker = world.arms
-        yield from alone(taker, go_to(taker, self.lip(world) + STAND_OFF * LEFT, SIDEWAYS, STEADY, OPEN))
-        yield from alone(taker, go_to(taker, self.lip(world) - OVERLAP * LEFT, SIDEWAYS, GENTLY, OPEN))
-        yield from alone(taker, jaw.grasp(taker, CLOSING))
-        yield from alone(giver, hold(giver, 0.15, OPEN))
+        yield from hand_over(*world.arms, lambda: self.lip(world), SIDEWAYS)
 
     def leave(self, arm: Arm) -> Plan:
         """Up, and out of the way."""
@@ -363,7 +355,7 @@ class PlateShelf(Scenario):
         yield require(room > 0.0, "the fingers that hold the lip meet the dividers", room=room)
         left = TUBE - self.proud  # the dividers stop the tube
         yield require(left > 2 * DEEP, "a cup on the lip puts the plate into the slot alone", left=left)
-        grip, weight = plate.friction * pinch(plate.thickness), 9.81 * plate.mass
+        grip, weight = plate.friction * pinch(plate.thickness), GRAVITY * plate.mass
         yield require(grip > 2 * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
         right, left = panda.bases(2)
         yield within_reach("the plate", self.start, base=right)
@@ -374,7 +366,7 @@ class PlateShelf(Scenario):
         lever = plate.radius - OVERLAP
         return {
             "slack": self.slack,
-            "droop": 9.81 * plate.mass * lever / (pinch(plate.thickness) * PAD / 2),
+            "droop": GRAVITY * plate.mass * lever / (pinch(plate.thickness) * PAD / 2),
             "radius": plate.radius,
             "carried": float(np.linalg.norm(self.foot - self.start)),
             "slot_yaw": math.radians(self.shelf_yaw),

@@ -36,6 +36,7 @@ from ..assets.crowned_ramp import CrownedRamp
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
 from ..params import param
+from ..physics import GRAVITY
 from ..robots.jaw import FINGER, PALM_ACROSS, PALM_ALONG, TIP
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
@@ -266,7 +267,7 @@ class RampSort(Scenario):
             "drift_over_width": self.ramp.drift / (self.ramp.width / 2),
             "band_over_aside": self.band / aside,
             "ridge": self.ramp.ridge,
-            "speed": math.sqrt(10.0 / 7.0 * 9.81 * self.ramp.length * self.ramp.fall),
+            "speed": math.sqrt(10.0 / 7.0 * GRAVITY * self.ramp.length * self.ramp.fall),
             "balls": float(len(self.colours)),
         }
 

@@ -39,6 +39,7 @@ from ..assets.ycb import Ycb
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, heading
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPENED, PALM_ABOVE, TIP
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
@@ -59,7 +60,7 @@ CALM, RESTED = 0.02, 0.2
 """Speed below which a thing counts as at rest [m/s], and for how long it must be so before it is taken again [s]."""
 BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
-LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / 9.81)
+LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / GRAVITY)
 """From the beginning of a slip until the thing is below the finger tips [s]: 20 ms to let go, then free fall."""
 FLOWN = 0.018
 """How far a thing flies that is lost at the oracle's pace [m]: 16 to 22 mm measured."""

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 
 from scengen.assets.board import STEEL, Board
 from scengen.assets.prop import TABLE_HALF, TABLE_TOP, place, table
-
-GRAVITY = 9.81
+from scengen.physics import GRAVITY
 
 
 def lying(board, overhang):

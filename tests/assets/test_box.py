@@ -10,8 +10,7 @@ from hypothesis import given, settings
 
 from scengen.assets.box import Block, Cube, Domino, Lid
 from scengen.assets.prop import TABLE_TOP, place, table
-
-GRAVITY = 9.81
+from scengen.physics import GRAVITY
 
 
 def alone(box, slope=0.0):

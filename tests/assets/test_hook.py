@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scengen.assets.box import Cube
 from scengen.assets.hook import BARBED_J, ROUND_J, JHook, LHook, THook
 from scengen.assets.prop import TABLE_TOP, place, table
-
-GRAVITY = 9.81
+from scengen.physics import GRAVITY
 
 
 def hung(hook):

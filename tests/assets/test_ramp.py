@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from scengen.assets.ball import Ball
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.ramp import GRAVITY, THICKNESS, Ramp
+from scengen.assets.ramp import THICKNESS, Ramp
 from scengen.geometry import UP
+from scengen.physics import GRAVITY
 
 SLIPPERY, ROUGH = 0.0, 0.5
 angles = st.floats(12.0, 40.0)

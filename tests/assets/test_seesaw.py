@@ -13,8 +13,8 @@ from scengen.assets.box import Block
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.assets.seesaw import Seesaw, standing
 from scengen.geometry import UP
+from scengen.physics import GRAVITY
 
-GRAVITY = 9.81
 BEAM = "seesaw/beam"
 
 

@@ -17,9 +17,9 @@ from scengen.assets.cup import RIM, SHORTEST_HANDLE, Cup
 from scengen.assets.plate import Plate
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.assets.turned import PROUD, SECTORS
+from scengen.physics import GRAVITY
 from scengen.sim.scene_text import emit
 
-GRAVITY = 9.81
 ALL = [
     Plate(),
     Plate(thickness=0.002, mass=0.02, radius=0.13),

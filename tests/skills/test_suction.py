@@ -11,6 +11,7 @@ from scengen.assets.prop import TABLE_TOP, place, solid, table
 from scengen.control import osc
 from scengen.errors import GaveUp
 from scengen.geometry import UP, yaw_of
+from scengen.physics import GRAVITY
 from scengen.robots import suction
 from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES, TORQUE
 from scengen.sim import scene_text
@@ -19,7 +20,6 @@ from scengen.skills.jaw import release
 from scengen.skills.motion import CLOSED, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from scengen.skills.suction import carry, let_go, suck
 
-GRAVITY = 9.81
 FRICTION = 0.4
 LIP = np.array([sign * (PITCH / 2 + end * PAD / 2) for sign in (-1, 1) for end in (-1, 1)])
 """Where the corners of the pads are, along one axis of the cup [m]."""

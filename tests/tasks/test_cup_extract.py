@@ -22,9 +22,10 @@ from scengen import config
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, heading, quat
 from scengen.params import with_values
+from scengen.physics import GRAVITY
 from scengen.robots.jaw import PALM_ABOVE, TIP, pinch
 from scengen.sim.world import ROBOT
-from scengen.tasks.cup_extract import AIR, GRAVITY, TAPER, CupExtract
+from scengen.tasks.cup_extract import AIR, TAPER, CupExtract
 
 TASK = config.task("cup_extract")
 NOMINAL = CupExtract()

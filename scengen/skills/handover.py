@@ -1,0 +1,38 @@
+"""Moves of two arms: what hangs on one goes over to the other. See `motion`."""
+
+from collections.abc import Callable
+
+from ..geometry import Mat3, Vec3
+from ..scenario import Plan
+from ..sim.world import Arm
+from .jaw import grasp
+from .motion import OPEN, STEADY, Pace, alone, go_to, hold
+
+STAND_OFF, OVERLAP = 0.06, 0.010
+"""Distance of the open jaw from a rim before it moves in, and how far the rim then is beyond the grip site [m]."""
+GENTLY = Pace(0.06, 0.002)
+"""Towards the rim: what pushes a thing peels it off the cup that holds it."""
+CLOSING = 0.45
+"""How long the jaw needs for something as thin as a rim [s]: `robots.jaw.time_to_grip` at 2 mm."""
+LETTING_GO = 0.15
+"""How long a cup needs to let go, while the jaw holds [s]."""
+
+
+def take_rim(taker: Arm, rim: Callable[[], Vec3], hand: Mat3, overlap: float = OVERLAP) -> Plan:
+    """Close the jaw on a rim that another arm holds out, coming along the hand's approach; that arm holds still.
+
+    Args:
+        rim: where the outermost point of the rim is now [m].
+        hand: orientation of the hand that takes it.
+        overlap: how far the rim goes between the fingers, beyond the grip site [m].
+    """
+    along = hand[:, 2]
+    yield from alone(taker, go_to(taker, rim() - STAND_OFF * along, hand, STEADY, OPEN))
+    yield from alone(taker, go_to(taker, rim() + overlap * along, hand, GENTLY, OPEN))
+    yield from alone(taker, grasp(taker, CLOSING))
+
+
+def hand_over(giver: Arm, taker: Arm, rim: Callable[[], Vec3], hand: Mat3, overlap: float = OVERLAP) -> Plan:
+    """The jaw takes the rim of what hangs on a cup, as in `take_rim`; only then the cup lets go, where it is."""
+    yield from take_rim(taker, rim, hand, overlap)
+    yield from alone(giver, hold(giver, LETTING_GO, OPEN))
