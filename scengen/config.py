@@ -111,6 +111,7 @@ def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
     Raises:
         ScengenError: one line that says what is wrong.
     """
+    overrides = [_spelled_out(text) for text in overrides]
     with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
         parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
         try:
@@ -140,6 +141,21 @@ def _values(parser: OverridesParser, text: str) -> tuple[str, list[str]]:
     if not values:
         raise BadConfig(f"{cut(repr(text))} names no value; give at least one")
     return override.get_key_element(), values
+
+
+def _spelled_out(text: str) -> str:
+    """`task=all`, a category as in `task=P3`, or a list in which such words stand, as a list of tasks."""
+    key, _, value = text.partition("=")
+    words = value.split(",")
+    if key != "task" or not any(re.fullmatch(f"{ALL}|P[1-9]|M", word) for word in words):
+        return text
+    known = tasks()
+    named = {word: known if word == ALL else [t for t in known if category(t) == word] for word in words}
+    return f"task={','.join(dict.fromkeys(t for word, found in named.items() for t in found or [word]))}"
+
+
+ALL = "all"
+"""Stands for all tasks."""
 
 
 def shown(verb: str, overrides: Sequence[str]) -> str:
@@ -196,6 +212,22 @@ def splits(name: str, search: tuple[str, ...] = ()) -> tuple[str, ...]:
     """
     plain, _ = _composed("one_task", [f"task={name}", *search])
     return (ID, *(plain["task"].get("axes") or ()))
+
+
+@cache
+def category(name: str) -> str:
+    """The category of a task, as its file names it."""
+    return str(_composed("one_task", [f"task={name}"])[0]["task"].get("category"))
+
+
+def certified() -> dict[str, dict[str, dict[str, float]]]:
+    """What certification came to when the tasks were measured: conf/certified.yaml.
+
+    Returns:
+        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] for each that was.
+    """
+    found: dict[str, dict[str, dict[str, float]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
+    return found
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:

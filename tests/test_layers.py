@@ -21,7 +21,7 @@ LAYERS = (
     ("shards", "skills"),
     ("tasks",),
     ("samplers", "pool"),
-    ("validate",),
+    ("collection", "validate"),
     ("config",),
     ("attack",),
     ("runs",),

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from .. import collection
 from ..errors import BadConfig, cut
-from ..names import Misnamed
+from ..names import Misnamed, find
 from ..pool import Pool, PoolRow
 from ..printed import PlainConsole, printable
 from ..targets import write as write  # for the commands
@@ -39,16 +40,26 @@ def one(pool: str | list[str] | None) -> str:
     """The only pool named, for a command that takes one."""
     if pool is None:
         raise BadConfig("no pool was named; say pool=FOLDER")
-    if isinstance(pool, list):
-        raise BadConfig(f"pool = {cut(','.join(pool))}; this command takes one pool")
-    return pool
+    found = several(pool)
+    if len(found) > 1:
+        raise BadConfig(f"pool = {cut(','.join(found), 400)}; this command takes one pool")
+    return found[0]
 
 
 def several(pool: str | list[str]) -> list[str]:
-    """The pools named, one or more."""
+    """The pools named, one or more; those of a folder of pools, if that is named."""
     if not pool:
         raise BadConfig("pool = ''; name the folder of a pool")
-    return pool if isinstance(pool, list) else [pool]
+    return collection.folders(pool)
+
+
+def holder(pool: str | list[str] | None, name: str) -> Pool:
+    """The pool that holds the scenario that id= asks for, if several are named, or a folder of pools."""
+    found = [Pool.open(folder) for folder in several(pool or "")]
+    if len(found) == 1:
+        return found[0].check()
+    asked = find(name, (each for one in found for each in one.names()), "these pools").id
+    return next(one for one in found if any(each.id == asked for each in one.names())).check()
 
 
 def chosen(pool: Pool, name: str) -> PoolRow:

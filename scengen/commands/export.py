@@ -10,7 +10,7 @@ from ..parallel import SHOWN, each
 from ..pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
 from ..targets import try_folder
-from . import FAILED, OK, Arguments, chosen, err, one, say, warn
+from . import FAILED, OK, Arguments, chosen, err, holder, one, say, warn
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Settings:
 def command(arguments: Arguments) -> int:
     settings = read("export", arguments, Settings)
     try_folder(settings.to)
-    pool = Pool.open(one(settings.pool)).check()
+    pool = Pool.open(one(settings.pool)).check() if settings.id is None else holder(settings.pool, settings.id)
     rows = pool.rows(witness=False) if settings.id is None else [chosen(pool, settings.id)]
     count, lost = 0, []
     with ProgressBar(err, f"export to {settings.to}", len(pool) if settings.id is None else 1) as progress_bar:

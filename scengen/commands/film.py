@@ -10,12 +10,11 @@ from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
-from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..sim import scene_text
 from ..targets import try_file
 from ..validate.playable import check_row
-from . import OK, Arguments, chosen, err, one, say, write
+from . import OK, Arguments, chosen, err, holder, say, write
 
 STRIP = 100_000_000
 """Largest size of a film strip [pixels]: it takes three bytes of memory for each, several times over."""
@@ -71,7 +70,7 @@ def command(arguments: Arguments) -> int:
 
 def _of_pool(settings: Settings, arguments: Arguments) -> Take:
     """The witness of a scenario in a pool, or one of its shortcuts."""
-    row = check_row(chosen(Pool.open(one(settings.pool)).check(), str(settings.id)))
+    row = check_row(chosen(holder(settings.pool, str(settings.id)), str(settings.id)))
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     if settings.of == WITNESS:
         return Take.witness(row, scenario)

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from rich.table import Table
 
+from .. import collection
 from ..config import Combination, combinations, read_task
 from ..errors import BadConfig, ScengenError
 from ..pictures.report import attack_table, funnel_table, summary_lines
@@ -68,8 +69,14 @@ def command(arguments: Arguments) -> int:
     asked, found = _sensible(asked)
     runs = _apart(asked, found)
     say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
-    summaries = [run() for run in runs]
+    summaries = []
+    for run in runs:
+        summaries.append(run())
+        collection.write(summaries[-1].pool.folder.parent, [summaries[-1].pool])
     out.print(_table(asked, runs, summaries))
+    folder = summaries[-1].pool.folder.parent
+    stands = f"pool={folder} stands for all pools that it names"
+    say(f"wrote {folder / collection.INDEX}: {stands}, in verify, show, report, evaluate")
     short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
     return FAILED if short else OK
 

@@ -1,7 +1,12 @@
 """write witnesses as a LeRobot data set or for robomimic, with proprioception, forces, touch and pictures"""
 
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
 from ..config import read, search_path
-from ..export.recording import Settings, record
+from ..export.recording import ROBOMIMIC, Settings, record
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
@@ -9,11 +14,43 @@ from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
 
 def command(arguments: Arguments) -> int:
     settings = read("record", arguments, Settings)
+    parts = _apart(settings)
+    if len(parts) > 1:
+        say(f"{len(parts)} recordings, one for each {_kind(settings)}: {', '.join(parts)}")
+    statuses = []
+    for part in parts.values():
+        statuses.append(_record(part, arguments))
+        if statuses[-1] == INTERRUPTED:
+            break
+    return max(statuses)
+
+
+def _kind(settings: Settings) -> str:
+    """What all scenarios of a recording share: a data set has one robot, a file of robomimic one environment."""
+    return "task" if settings.format == ROBOMIMIC else "embodiment"
+
+
+def _apart(settings: Settings) -> Mapping[str, Settings]:
+    """The recordings to make, each below `to` if they are more than one."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for folder in settings.folders:
+        for (value,) in dict.fromkeys(Pool.open(folder).columns(_kind(settings))) or [("",)]:
+            found[value].append(folder)
+    if len(found) < 2:
+        return {settings.to: settings}
+    below, suffix = Path(settings.to).with_suffix(""), Path(settings.to).suffix
+    return {
+        value: replace(settings, pool=folders, to=str(below / f"{value}{suffix}")) for value, folders in found.items()
+    }
+
+
+def _record(settings: Settings, arguments: Arguments) -> int:
+    """Make one recording, and tell of it."""
     with ProgressBar(err, f"record to {settings.to}", 0) as progress_bar:
         try:
             summary = record(settings, progress_bar.of, search_path(arguments))
         except KeyboardInterrupt:
-            warn("scengen: interrupted; nothing was written")
+            warn(f"scengen: interrupted; nothing was written to {settings.to}")
             return INTERRUPTED
     say(
         f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} a second, "

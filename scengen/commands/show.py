@@ -13,7 +13,10 @@ from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
 from ..validate.playable import check_row
-from . import OK, Arguments, chosen, err, out, remark, say, several, write
+from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
+
+TOLD = 3
+"""Of more pools than these a line each is told, not every scenario."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +32,6 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("show", arguments, Settings)
-    folders = several(settings.pool)
-    pools = [Pool.open(folder).check() for folder in folders]
     target = Path(settings.to) if settings.to else None
     if settings.id is None:
         at_least(settings, images=0, films=0)
@@ -39,7 +40,10 @@ def command(arguments: Arguments) -> int:
                 f"to = {target}; name an .html file for a contact sheet (a single scenario, id=, gives a .png)"
             )
         try_file(target)
-        for pool in pools:
+        pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+        if len(pools) > TOLD:
+            out.print(report.pools_table(pools))
+        for pool in pools if len(pools) <= TOLD else ():
             out.print(report.pool_table(pool))
             out.print(report.funnel_table(pool.funnel, pool.reasons))
             say(f"pool sha256: {pool.sha256}")
@@ -52,9 +56,7 @@ def command(arguments: Arguments) -> int:
         if target and target.suffix != ".png":
             raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")
         try_file(target)
-        if len(pools) > 1:
-            raise BadConfig(f"pool = {','.join(folders)}; id= shows a scenario of one pool: name that one")
-        row = chosen(pools[0], settings.id)
+        row = chosen(holder(settings.pool, settings.id), settings.id)
         for table in report.scenario_tables(row):
             out.print(table)
         if target:

@@ -1,9 +1,11 @@
 """check what a pool claims: rebuild, draw again, replay, and repeat its checks"""
 
 import secrets
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -23,12 +25,14 @@ from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report, verify
-from . import BAD_INPUT, FAILED, OK, Arguments, err, one, out, say, warn, write, write_json
+from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, several, warn, write, write_json
 
 SHOWN = 20
 """Differences and faults that are told; the files hold all."""
 EXPIRED = ("fail", "report")
-STATUS = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
+STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
+WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound")}
+"""Exit statuses, the one that counts most among several pools first."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ def command(arguments: Arguments) -> int:
         raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
     if settings.hits is not None:
         return _hits(settings.hits, arguments)
-    pool = Pool.open(one(settings.pool))
+    folders = several(settings.pool or "")
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     options = Options(
         settings.level,
@@ -71,15 +75,23 @@ def command(arguments: Arguments) -> int:
         settings.expired == "fail",
         attacked,
     )
-    with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
-        report = verified(pool, options, search_path(arguments), progress_bar.show)
+    reports: dict[str, Report] = {}
+    plain: dict[str, dict[str, Any]] = {}
+    for folder in folders:
+        pool = Pool.open(folder)
+        with ProgressBar(err, f"verify {folder}", len(pool)) as progress_bar:
+            report = reports[folder] = verified(pool, options, search_path(arguments), progress_bar.show)
+        about = {key: value for key, value in asdict(report).items() if key != "names"}
+        plain[folder] = {"pool_sha256": pool.sha256, **about}
+        _tell(pool, report)
     if settings.json:
-        plain = {key: value for key, value in asdict(report).items() if key != "names"}
-        write_json(settings.json, {"pool_sha256": pool.sha256, **plain})
+        write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
     if settings.junit:
-        write(Path(settings.junit), junit(str(pool.folder), report))
-    _tell(pool, report)
-    return STATUS[report.verdict]
+        write(Path(settings.junit), junit(reports))
+    verdicts = Counter(report.verdict for report in reports.values())
+    if len(folders) > 1:
+        say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
+    return next(status for verdict, status in WORST.items() if verdicts[verdict])
 
 
 def verified(pool: Pool, options: Options, search: Sequence[str], progress: Callable[[int], None]) -> Report:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from .. import config
 from ..config import read, search_path
 from ..pictures.view import check_display, view
-from ..pool import Pool
 from ..validate.playable import check_row
-from . import OK, Arguments, chosen, one
+from . import OK, Arguments, chosen, holder
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("view", arguments, Settings)
-    row = chosen(Pool.open(one(settings.pool)).check(), settings.id)
+    row = chosen(holder(settings.pool, settings.id), settings.id)
     scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
     check_display()
     check_row(row)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..collection import members
 from ..errors import PoolError, UnknownName
 from ..names import find
 from ..pool import Pool, PoolRow
@@ -21,7 +22,17 @@ def rows_of(pool: Folders | None, task: str) -> list[PoolRow]:
     folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
     if not folders:
         raise PoolError("no pool was named; say pool=FOLDER, or a list of them; scengen generate makes pools")
-    return [row for folder in folders for row in _rows(folder, task)]
+    return [row for folder in folders for each in _of_task(folder, task) for row in _rows(each, task)]
+
+
+def _of_task(folder: str | Path, task: str) -> list[str]:
+    """A pool, or of a folder of pools those of the task."""
+    found = members(folder)
+    if len(found) == 1:
+        return found
+    if not (own := [each for each in found if Pool.open(each).task == task]):
+        raise PoolError(f"{folder} holds no pool of {task}; see scengen show pool={folder}")
+    return own
 
 
 def chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None = None) -> list[PoolRow]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import collection
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..errors import BadConfig, PoolError, ScengenError, at_least
@@ -50,7 +51,7 @@ class Settings:
     @property
     def folders(self) -> list[str]:
         """The pools to evaluate on."""
-        return self.pool if isinstance(self.pool, list) else [self.pool]
+        return collection.folders(self.pool)
 
     @property
     def folder(self) -> Path:

@@ -18,7 +18,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from .. import config
+from .. import collection, config
 from ..control.loop import Loop
 from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
@@ -70,7 +70,7 @@ class Settings:
     @property
     def folders(self) -> list[str]:
         """The pools to record."""
-        return self.pool if isinstance(self.pool, list) else [self.pool]
+        return collection.folders(self.pool)
 
     @property
     def eyes(self) -> list[str]:

@@ -1,7 +1,8 @@
 """What people see of a run and of a pool: the funnel, tables, and a contact sheet in one HTML file."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import jinja2
@@ -12,7 +13,7 @@ from ..attack.evidence import Rate, spelled
 from ..certificate import STAGES
 from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
-from ..samplers.axis import spell
+from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task
 from ..validate.playable import check_scene
@@ -78,6 +79,16 @@ def pool_table(pool: Pool) -> Table:
     return table
 
 
+def pools_table(pools: Sequence[Pool]) -> Table:
+    """One line for each of many pools."""
+    table = Table("pool", "code", "split", "scenarios", "proposed", title_justify="left")
+    for pool in pools:
+        codes = ", ".join(sorted({code for (code,) in pool.columns("code")}))
+        table.add_row(str(pool.folder), codes, pool.split, str(len(pool)), str(pool.funnel["proposed"]))
+    table.title = f"{len(pools)} pools, {sum(map(len, pools))} scenarios"
+    return table
+
+
 def scenario_tables(row: PoolRow) -> list[Table]:
     """One scenario: what it is, its parameters, and its certificate."""
     about = Table(title=str(row.name), title_justify="left", show_header=False)
@@ -96,11 +107,30 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     return [about, params, checks]
 
 
-def tasks_table(tasks: list[Task]) -> Table:
-    """All tasks in a few words."""
-    table = Table("task", "code", "category", "splits", "instruction", title="tasks", title_justify="left")
-    for task in tasks:
-        table.add_row(task.name, task.code, task.category, ", ".join(["id", *task.axes]), task.instruction)
+def tasks_table(tasks: Sequence[Task], certified: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+    """All tasks in a few words.
+
+    Args:
+        tasks: those of a category one after the other.
+        certified: what certification came to, see `config.certified`.
+    """
+    table = Table(title=f"{len(tasks)} tasks", title_justify="left")
+    for column in ("", "code", "task", "hands"):
+        table.add_column(column, no_wrap=True)
+    for column in ("axes", "certified", "CPU s"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("instruction")
+    for task, after in zip_longest(tasks, tasks[1:]):
+        told = certified.get(task.name, {}).values()
+        share = f"{sum(t['certified'] for t in told)} of {sum(t['indices'] for t in told)}" if told else "-"
+        each = certified.get(task.name, {}).get("id", {}).get("cpu")
+        hands = task.embodiment.replace("panda_", "")
+        cells = (task.name, hands, str(len(task.axes)), share, f"{each:.1f}" if each else "-", task.instruction)
+        table.add_row(
+            task.category, task.code, *cells, end_section=after is not None and after.category != task.category
+        )
+    table.caption = "certified: of the first draws of all splits; CPU s: for one certificate in training, level quick"
+    table.caption_justify = "left"
     return table
 
 
@@ -112,15 +142,26 @@ def task_tables(task: Task) -> list[Table]:
         spread = "" if dist == Fixed(p.nominal) else spell(dist)
         hidden = " (hidden)" if p.hidden else ""
         params.add_row(p.name + hidden, p.unit, f"{p.low:g} to {p.high:g}", f"{p.nominal:g}", spread)
-    axes = Table("axis", "parameter", "goes to", "gap", "proof", "why", title="axes: each lies outside training")
-    for name, axis in task.axes.items():
-        for proof in task.proofs[name]:
+    params.title_justify = "left"
+    return [params, axes_table([(task, axis) for axis in task.axes.values()])]
+
+
+def axes_table(axes: Sequence[tuple[Task, Axis]]) -> Table:
+    """Axes with their proofs; the task is named where there are several."""
+    several = len({task.name for task, _ in axes}) > 1
+    table = Table(*(["task"] if several else []), title="axes: each lies outside training", title_justify="left")
+    for column in ("axis", "parameter", "training", "goes to", "gap", "proof", "why"):
+        table.add_column(column)
+    for task, axis in axes:
+        told = [*([task.name] if several else []), axis.name], f"{axis.why} ({axis.source or 'no source'})"
+        for proof in task.proofs[axis.name]:
             relative = f" = {proof.relative:.2g} training widths" if proof.relative else ""
             gap = f"{proof.gap:.3g} {task.known[proof.parameter].unit}{relative}"
-            goes = spell(axis.replace[proof.parameter])
-            axes.add_row(name, proof.parameter, goes, gap, proof.kind, f"{axis.why} ({axis.source or 'no source'})")
-    params.title_justify = axes.title_justify = "left"
-    return [params, axes]
+            spread = [spell(dist[proof.parameter]) for dist in (task.training, axis.replace)]
+            table.add_row(*told[0], proof.parameter, *spread, gap, proof.kind, told[1])
+            told = [""] * len(told[0]), ""  # once for all parameters of an axis
+        table.add_section()
+    return table
 
 
 def template(name: str) -> jinja2.Template:

@@ -89,6 +89,10 @@ class Task:
         """The scenario with these parameter values, such as those of a pool's row."""
         return with_values(self.family(), params)
 
+    def of_paper(self, axis: Axis) -> bool:
+        """Whether an axis is the one that the paper's table of OOD conditions (App. I) has for this task."""
+        return axis.source == f"paper, App. I, {self.category} {self.name.replace('_', '-')}"
+
     @cached_property
     def proofs(self) -> dict[str, list[Proof]]:
         """Why each axis lies outside the training support.

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 from .findings import Report
 
@@ -9,12 +10,19 @@ _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold."""
 
 
-def junit(pool: str, report: Report) -> str:
-    """The text of a file that CI systems read.
+def junit(reports: Mapping[str, Report]) -> str:
+    """The text of a file that CI systems read, a suite for each pool.
 
     Args:
-        pool: name of the pool.
+        reports: by the name of the pool.
     """
+    suites = ET.Element("testsuites")
+    suites.extend(_suite(pool, report) for pool, report in reports.items())
+    ET.indent(suites)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode") + "\n"
+
+
+def _suite(pool: str, report: Report) -> ET.Element:
     name = _UNWRITABLE.sub("?", pool)
     of_pool = [f for f in report.failed if f["id"] not in {e["id"] for e in report.examinations}]
     tests = [*of_pool, *report.examinations]
@@ -29,7 +37,4 @@ def junit(pool: str, report: Report) -> str:
             kind = "failure" if test["verdict"] == "refuted" else "error"
             reason = _UNWRITABLE.sub("?", test["reason"])
             ET.SubElement(case, kind, {"type": test["verdict"], "message": reason[:300]}).text = reason
-    suites = ET.Element("testsuites")
-    suites.append(suite)
-    ET.indent(suites)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode") + "\n"
+    return suite

@@ -75,7 +75,8 @@ GENERATE = ("generate", "task=domino_single")
         (("show", "pool=nowhere"), "no pool at nowhere"),
         (("export", "pool=nowhere", "to=x"), "no pool at nowhere"),
         (("tasks", "task=domino_singel"), "did you mean 'domino_single'"),
-        (("tasks", "name=domino_single"), "no setting of tasks named 'name'; known: task"),
+        (("tasks", "axes=papr"), "no choice of axes named 'papr' (did you mean 'paper'?)"),
+        (("tasks", "name=domino_single"), "no setting of tasks named 'name'"),
     ],
 )
 def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):

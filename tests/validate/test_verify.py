@@ -503,7 +503,7 @@ def test_junit_tells_every_scenario_and_survives_any_text(mine):
     changed(mine, lambda m: m["funnel"].update(certified=40))
     found = report(mine)
     found.failed[0]["reason"] += "\x1b]0;<&\x00"
-    suite = ET.fromstring(junit("a\x07b", found).encode()).find("testsuite")
+    suite = ET.fromstring(junit({"a\x07b": found}).encode()).find("testsuite")
     assert suite.attrib["tests"] == "7" and suite.attrib["failures"] == "1"
     assert len(suite.findall("testcase")) == 7
 
