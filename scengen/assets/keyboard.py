@@ -7,6 +7,7 @@ import numpy as np
 
 from ..geometry import Vec3
 from ..params import param
+from .glyph import write
 from .prop import Prop, Rgba, show, solid
 
 ROWS = ("QWERTYUIOP", "ASDFGHJKL", "ZXCVBNM")
@@ -16,6 +17,12 @@ STAGGER = 0.5
 """By how much each row is shifted against the one behind it, as a share of the pitch."""
 PLATE = 0.004
 """Thickness of the plate that carries the caps [m]."""
+KEY = 0.01
+"""Mass of a cap [kg]."""
+PRINT, FAINT = 0.55, 0.0007
+"""Height of the letters as a share of a cap, and half the width of their strokes [m]."""
+GREY: Rgba = (0.62, 0.62, 0.62, 1.0)
+"""Colour of the letters."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +40,8 @@ class Keyboard(Prop):
     height: float = param(0.012, "m", 0.006, 0.030)
     """Of the caps' upper faces above the ground."""
     friction: float = param(0.6, "1", 0.05, 1.5)
+    mass: float = param(0.3, "kg", 0.1, 2.0)
+    """Of the plate; typewriter keyboards without their caps weigh 0.3 to 1.2 kg."""
     rgba: Rgba = (0.86, 0.86, 0.84, 1.0)
 
     @property
@@ -56,11 +65,13 @@ class Keyboard(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         x, y, _ = self.size / 2
         thick, rise = PLATE / 2, (self.height - PLATE) / 2
-        solid(body, "plate", [x, y, thick], [0, 0, thick], friction=self.friction, mass=0.3, rgba=(0.2, 0.2, 0.22, 1))
+        below: Rgba = (0.2, 0.2, 0.22, 1.0)
+        solid(body, "plate", [x, y, thick], [0, 0, thick], friction=self.friction, mass=self.mass, rgba=below)
         for letter in LETTERS:
             key = body.add_body(name=f"key_{letter}", pos=self.at(letter).tolist())
             size, pos = [self.cap / 2, self.cap / 2, rise], [0, 0, -rise]
-            solid(key, f"cap_{letter}", size, pos, friction=self.friction, mass=0.01, rgba=self.rgba)
+            solid(key, f"cap_{letter}", size, pos, friction=self.friction, mass=KEY, rgba=self.rgba)
+            write(key, letter, [0.0, 0.0, 0.0], PRINT * self.cap, FAINT, GREY, f"print_{letter}")
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ class Arena:
         self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
         self.world = World.load(scene_xml, embodiment)
         self._places = starts(self.world)
-        nothing = np.zeros((0, self.world.loop.size), np.float32)
+        nothing = np.zeros((0, self.world.size), np.float32)
         self.start = Node(self.world.state(), 0.0, nothing, self.signature())
         found = trace(scenario, self.world, witness)
         if found is None:
@@ -231,4 +231,4 @@ class _Run:
 
     def _actions(self) -> Actions:
         """What the controller has received so far."""
-        return np.array(self.rows, np.float32).reshape(-1, self.world.loop.size)
+        return np.array(self.rows, np.float32).reshape(-1, self.world.size)

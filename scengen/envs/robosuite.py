@@ -25,7 +25,7 @@ from ..errors import BadConfig, PoolError, UnknownName
 from ..pool import PoolRow
 from ..robots import panda
 from ..scenario import Scenario
-from ..sim.world import JAW, SUCTION, World, hands
+from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
 from ..validate.identity import check_versions
 from .object_state import ObjectState, bodies_of
 from .observations import turns_pictures
@@ -123,13 +123,13 @@ class RobosuiteEnv(ManipulationEnv):
         self.action_filter, self.reward_scale = action_filter, reward_scale
         self.task = config.task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
-        grippers = [GRIPPERS[hand] for hand in hands(self.task.embodiment)]
+        grippers = [GRIPPERS[hand] for hand in all_hands(self.task.embodiment)]
         if gripper_types != "default" and _listed(gripper_types) != grippers:
             self._refuse("gripper_types", _listed(gripper_types), grippers)
         self.use_object_obs, self._seen = use_object_obs, None
         if use_object_obs:
             bodies = bodies_of(self.task, {row.scene_xml for row in self._choice})
-            self.objects = ObjectState(bodies, len(grippers))
+            self.objects = ObjectState(bodies, len(hands(self.task.embodiment)))
         super().__init__(
             robots=[ROBOT] * len(grippers) if robots is None else robots,
             gripper_types=grippers,  # type: ignore[arg-type]
@@ -154,12 +154,28 @@ class RobosuiteEnv(ManipulationEnv):
         """robosuite's step, behind the filter that was asked for."""
         return super().step(self.world.filter(action) if self.action_filter else action)
 
+    @property
+    def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and largest action: of the arms that actions drive. Those of the scene's own get theirs from it."""
+        low, high = super().action_spec
+        return low[: self.action_dim], high[: self.action_dim]
+
+    @property
+    def action_dim(self) -> int:
+        """Numbers in an action."""
+        return action_size(self.task.embodiment)
+
+    @property
+    def _driven(self) -> int:
+        """How many robots actions drive."""
+        return len(hands(self.task.embodiment))
+
     def _check_success(self) -> bool:
         """Whether the goal has been reached, and nothing forbidden has happened since."""
         return self.episode.outcome == "success"
 
     def _check_robot_configuration(self, robots: Sequence[str]) -> None:
-        certified = [ROBOT] * len(hands(self.task.embodiment))
+        certified = [ROBOT] * len(all_hands(self.task.embodiment))
         if list(robots) != certified:
             self._refuse("robots", robots, certified)
         layout = self.env_configuration
@@ -202,7 +218,7 @@ class RobosuiteEnv(ManipulationEnv):
     def _setup_references(self) -> None:
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
-        self.world = World(model, data, Loop(model, data))
+        self.world = World(model, data, Loop(model, data), len(self.robots) - self._driven)
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()
@@ -235,7 +251,11 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Between mj_step1 and mj_step2, in every physics step."""
-        super()._pre_action(action, policy_step)
+        assert len(action) == self.action_dim, f"an action has {self.action_dim} numbers, not {len(action)}"
+        every = np.split(np.asarray(self.world.joined(action)), len(self.robots))
+        for number, (robot, own) in enumerate(zip(self.robots, every, strict=True)):
+            # Partners hear something new in every control period, however seldom actions come.
+            robot.control(own, policy_step=policy_step if number < self._driven else self._substep == 0)
         self.world.command(action)
         self.world.loop.watch(first=self._substep == 0)
 

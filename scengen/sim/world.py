@@ -36,24 +36,38 @@ HANDS: dict[str, Callable[[mujoco.MjSpec, bool, int, NDArray[np.float64]], None]
     SUCTION: suction.attach,
 }
 """Arms by their hands, and how each is added to a scene: with or without visual geometry, its number, its place."""
-EMBODIMENTS = tuple("+".join(hands) for arms in range(1, MOST_ARMS + 1) for hands in product(HANDS, repeat=arms))
+SCRIPTED = "scripted_"
+"""What the name of a hand begins with whose arm belongs to the scene: its events move it, and no action does."""
+EMBODIMENTS = (
+    *("+".join(hands) for arms in range(1, MOST_ARMS + 1) for hands in product(HANDS, repeat=arms)),
+    *(f"{driven}+{SCRIPTED}{partner}" for driven, partner in product(HANDS, repeat=MOST_ARMS)),
+)
 """The robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one
-on the right."""
+on the right. What is scripted comes last."""
 
 
-def hands(embodiment: str) -> tuple[str, ...]:
-    """The hands of a robot, in the order of its arms.
+def all_hands(embodiment: str) -> tuple[str, ...]:
+    """The hands of all arms in a scene with that robot, in their order, scripted ones included.
 
     Raises:
         UnknownName: it is none of `EMBODIMENTS`.
     """
     if embodiment not in EMBODIMENTS:
         raise UnknownName("embodiment", embodiment, EMBODIMENTS)
-    return tuple(embodiment.split("+"))
+    return tuple(hand.removeprefix(SCRIPTED) for hand in embodiment.split("+"))
+
+
+def hands(embodiment: str) -> tuple[str, ...]:
+    """The hands that actions drive, in the order of their arms: what a policy has.
+
+    Raises:
+        UnknownName: it is none of `EMBODIMENTS`.
+    """
+    return all_hands(embodiment)[: len(all_hands(embodiment)) - embodiment.count(SCRIPTED)]
 
 
 def action_size(embodiment: str) -> int:
-    """Numbers in an action of a robot: seven for each arm."""
+    """Numbers in an action of a robot: seven for each arm that actions drive."""
     return ACTION * len(hands(embodiment))
 
 
@@ -66,7 +80,7 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
     scene = mujoco.MjSpec.from_string(scene_xml)
     if not visual:
         panda.strip_visual(scene)
-    named = hands(embodiment)
+    named = all_hands(embodiment)
     for number, (hand, base) in enumerate(zip(named, panda.bases(len(named)), strict=True)):
         HANDS[hand](scene, visual, number, base)
     return scene
@@ -81,6 +95,8 @@ class Arm:
         self.number, self.data = number, world.data
         self.grip = -1.0
         """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
+        self.told: NDArray[np.float64] = IDLE
+        """What a scripted arm does in the coming control period, shape (7,)."""
         joints = [model.joint(name) for name in names.joints]
         self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
         self._fingers = panda.fingers(model, names)
@@ -149,6 +165,22 @@ class Arm:
         self.world.check_event("jamming a gripper")
         self.world.loop.jam(self.number, on)
 
+    def tell(self, action: ArrayLike) -> None:
+        """Say what a scripted arm does in the coming control period and no longer; else it stays where it is, open.
+
+        Args:
+            action: seven numbers, for the controller as they are: no filter is in between.
+
+        Raises:
+            NoEvent: called by anything but a scenario's `events`.
+            UnknownName: actions drive the arm.
+        """
+        if self not in self.world.partners:
+            raise UnknownName("scripted arm", self.label, [arm.label for arm in self.world.partners])
+        self.world.check_event(f"telling {self.label}")
+        self.told = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        self.grip = float(self.told[-1])
+
     def wrench(self) -> NDArray[np.float64]:
         """Force [N] and torque [N m] between hand and wrist, axes of the wrist's sensor frame, shape (6,).
 
@@ -207,15 +239,20 @@ class World:
     model: mujoco.MjModel
     data: mujoco.MjData
     loop: Loop
+    scripted: int = 0
+    """How many arms, the last ones, the scene's events move instead of actions."""
     filter: Filter = field(init=False)
     arms: tuple[Arm, ...] = field(init=False)
-    """All arms of the robot; an action holds seven numbers for each, in this order."""
+    """The arms that actions drive; an action holds seven numbers for each, in this order."""
+    partners: tuple[Arm, ...] = field(init=False)
+    """The arms that events move (`Arm.tell`)."""
     memory: Memory = field(init=False)
     """What has happened in the episode, by the names that the scene was told to `remember`; all 0 at the start."""
     _happening: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
-        self.arms = tuple(Arm(self, names.number) for names in panda.arms(self.model))
+        every = tuple(Arm(self, names.number) for names in panda.arms(self.model))
+        self.arms, self.partners = every[: len(every) - self.scripted], every[len(every) - self.scripted :]
         this = weakref.proxy(self)
         self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
         self.filter = Filter(len(self.arms))
@@ -233,13 +270,17 @@ class World:
         spec = compose(scene_xml, embodiment, visual)
         if substeps is not None:
             spec.option.timestep = Loop.PERIOD / substeps
-        return cls.of(spec.compile())
+        return cls.of(spec.compile(), len(all_hands(embodiment)) - len(hands(embodiment)))
 
     @classmethod
-    def of(cls, model: mujoco.MjModel) -> Self:
-        """A world at its start, around a compiled scene with robot."""
+    def of(cls, model: mujoco.MjModel, scripted: int = 0) -> Self:
+        """A world at its start, around a compiled scene with robot.
+
+        Args:
+            scripted: how many arms, the last ones, the scene's events move.
+        """
         data = mujoco.MjData(model)
-        world = cls(model, data, Loop(model, data))
+        world = cls(model, data, Loop(model, data), scripted)
         world.reset()
         return world
 
@@ -247,8 +288,13 @@ class World:
         """Back to the start; a used world then behaves bit by bit like a fresh one."""
         self.loop.reset()
         self.filter.reset()
-        for arm in self.arms:
-            arm.grip = -1.0
+        for arm in (*self.arms, *self.partners):
+            arm.grip, arm.told = -1.0, IDLE
+
+    @property
+    def size(self) -> int:
+        """Numbers in an action."""
+        return ACTION * len(self.arms)
 
     def step(self, action: ArrayLike) -> NDArray[np.float32]:
         """Pass an action through the teleoperation filter and advance one control period (10 ms).
@@ -270,10 +316,18 @@ class World:
             ValueError: the action has another shape, or is not finite.
             Unstable: MuJoCo raised a warning.
         """
-        warnings = self.loop.step(filtered)
+        warnings = self.loop.step(self.joined(filtered))
         self.command(filtered)
         if warnings:
             raise Unstable(f"MuJoCo raised a warning at t = {self.time:.3f} s: {', '.join(self.warnings)}")
+
+    def joined(self, action: NDArray[np.floating]) -> NDArray[np.floating]:
+        """An action, shape (7 * arms,), and behind it what the partners do: what the controllers of all arms get."""
+        if not self.partners:
+            return action
+        if np.shape(action) != (self.size,):
+            raise ValueError(f"an action has shape ({self.size},), not {np.shape(action)}")
+        return np.concatenate([action, *(arm.told for arm in self.partners)], dtype=np.float32)
 
     def command(self, action: NDArray[np.floating]) -> None:
         """Remember the gripper commands of an action, shape (7 * arms,), that has been simulated, here or elsewhere."""
@@ -286,10 +340,12 @@ class World:
     def events(self) -> Iterator[None]:
         """The moment before a control period in which a scenario's events happen; an `Episode` opens it.
 
-        Forces of the period that has passed (`force`) end with it.
+        Forces of the period that has passed (`force`) end with it, and so does what partners were told.
         """
         self._happening = True
         self.data.xfrc_applied[:] = 0.0
+        for arm in self.partners:
+            arm.grip, arm.told = -1.0, IDLE
         try:
             yield
         finally:
@@ -462,6 +518,8 @@ class World:
         self.filter.state = motion
         for arm, grip in zip(self.arms, grips, strict=True):
             arm.grip = float(grip)
+        for arm in self.partners:
+            arm.grip, arm.told = -1.0, IDLE  # until the events of the coming period tell it again
 
     @property
     def digest(self) -> str:
@@ -492,7 +550,7 @@ class World:
     @functools.cached_property
     def _labels(self) -> dict[str, int]:
         """Rows of the loop's table of contacts that stand for more than one body."""
-        names = [*(arm.label for arm in self.arms), ROBOT]
+        names = [*(arm.label for arm in (*self.arms, *self.partners)), ROBOT]
         return {name: self.model.nbody + k for k, name in enumerate(names)}
 
     @functools.cached_property

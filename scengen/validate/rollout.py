@@ -95,7 +95,7 @@ class Jitter:
                 model.body_inertia[part] *= heavier
                 model.geom_friction[model.geom_bodyid == part, 0] *= rougher
         mujoco.mj_setConst(model, mujoco.MjData(model))
-        return World.of(model)
+        return World.of(model, world.scripted)
 
     def shaken(self, action: Action, period: int) -> Action:
         """The action with noise on the six motion channels of each arm."""
@@ -235,7 +235,7 @@ def _live(
         return episode.step(actions[-1])
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
-        rows = np.array(actions, np.float32).reshape(-1, world.loop.size)
+        rows = np.array(actions, np.float32).reshape(-1, world.size)
         return Rollout(outcome, reason, round(at, 6), rows, world.digest, source.note)
 
     while step() is None:

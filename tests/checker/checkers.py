@@ -81,7 +81,7 @@ def replay(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
             if row["id"] != scenario.id or any(check["passed"] is False for check in certificate["checks"]):
                 return _no("the id does not belong to the parameters, or a check has failed")
             world = World.load(row["scene_xml"], row["embodiment"])
-            actions = np.array(row["witness"], np.float32).reshape(-1, world.loop.size)
+            actions = np.array(row["witness"], np.float32).reshape(-1, world.size)
             if not play(scenario, world, actions, row["horizon"], settle).solved:
                 return _no("the witness fails")
     except Exception as error:

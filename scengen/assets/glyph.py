@@ -1,0 +1,84 @@
+"""Capital letters as strokes: scenes refer to no files, and so to no fonts."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..geometry import Vec3
+from .prop import Rgba, shown
+
+WIDTH, HEIGHT = 4, 6
+"""Extent of the grid on which the strokes are drawn, from its lower left corner (0, 0)."""
+STROKES = {
+    "A": "00 04 26 44 40,03 43",
+    "B": "00 06 46 40 00,03 43",
+    "C": "40 00 06 46",
+    "D": "00 06 26 44 42 20 00",
+    "E": "40 00 06 46,03 33",
+    "F": "00 06 46,03 33",
+    "G": "23 43 40 00 06 46",
+    "H": "00 06,40 46,03 43",
+    "I": "20 26",
+    "J": "02 00 40 46",
+    "K": "00 06,46 03 40",
+    "L": "06 00 40",
+    "M": "00 06 23 46 40",
+    "N": "00 06 40 46",
+    "O": "00 40 46 06 00",
+    "P": "00 06 46 43 03",
+    "Q": "00 40 46 06 00,22 40",
+    "R": "00 06 46 43 03,23 40",
+    "S": "00 40 43 03 06 46",
+    "T": "20 26,06 46",
+    "U": "06 00 40 46",
+    "V": "06 20 46",
+    "W": "06 10 23 30 46",
+    "X": "00 46,06 40",
+    "Y": "06 23 46,23 20",
+    "Z": "06 46 00 40",
+}
+"""Polylines of every letter: points as two digits, column and row, from which strokes lead to the next."""
+THICK = 0.0008
+"""How far a letter stands out of the face on which it is written [m]: flat as print, drawn before the face."""
+
+
+def lines(letter: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Both ends of every stroke, in units of the letter's height, from its middle; each of shape (2,).
+
+    Raises:
+        ValueError: it is no capital letter.
+    """
+    if letter not in STROKES:
+        raise ValueError(f"no strokes for {letter!r}; known: {''.join(STROKES)}")
+    for line in STROKES[letter].split(","):
+        points = [(np.array([int(c), int(r)]) - [WIDTH / 2, HEIGHT / 2]) / HEIGHT for c, r in line.split()]
+        yield from pairwise(points)
+
+
+def write(
+    body: mujoco.MjsBody, letter: str, at: ArrayLike, height: float, weight: float, rgba: Rgba, name: str
+) -> None:
+    """Write a letter flat on a body, upright for someone who looks along its x axis from above.
+
+    Args:
+        at: its middle, on the face, in the body's axes [m].
+        height: of the letter [m].
+        weight: half the width of its strokes [m].
+        name: what the names of its strokes begin with.
+    """
+    middle = np.asarray(at, float)
+    for number, (begin, end) in enumerate(lines(letter)):
+        here, there = (middle + height * _lie(point) for point in (begin, end))
+        along = there - here
+        half = float(np.linalg.norm(along)) / 2
+        angle = float(np.arctan2(along[1], along[0])) / 2
+        turn, size = [np.cos(angle), 0.0, 0.0, np.sin(angle)], [half + weight, weight, THICK]
+        shown(body, f"{name}_{number}", rgba, size=size, pos=(here + there) / 2, quat=turn)
+
+
+def _lie(point: np.ndarray) -> Vec3:
+    """A point of the page on the ground: up the page is +x, along the line -y."""
+    return np.array([point[1], -point[0], 0.0])
