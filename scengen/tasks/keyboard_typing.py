@@ -39,14 +39,14 @@ from ..assets.glyph import write
 from ..assets.keyboard import LETTERS, PRINT, Keyboard
 from ..assets.prop import TABLE_TOP, Rgba, place, shown, table
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, between, corners
+from ..geometry import UP, Mat3, Vec3, about_z, between, corners, quat
 from ..params import param
 from ..predicates import fallen
 from ..robots import panda
 from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.memory import remember
 from ..sim.world import Arm, World
-from ..skills.motion import CLOSED, COARSE, FINE, Pace, facing_down, go_to, hold, retreat, stay, steer, until
+from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, hold, stay, steer, until, wait
 
 TRAINED = tuple("WORLD PLANT MUSIC FRUIT BREAD CHAIR HOUSE NIGHT QUICK JUMBO GHOST BLACK".split())
 UNSEEN = tuple("TABLE STONE CLOUD OCEAN TIGER LEMON SUGAR VIDEO PIANO ZEBRA WALTZ FLAME".split())
@@ -67,8 +67,11 @@ LOW, NEAR, ON = 0.02, 0.004, 0.010
 down, and how far from there it may come while it is down [m]. From 12 mm on it would touch the neighbour."""
 DEEP = 0.020
 """How far below the upper face of a cap the partner aims: it arrives at 0.08 m/s and presses with about 8 N [m]."""
-PRESS = 0.012
-"""The same for the agent's oracle [m]."""
+PRESS, ABOVE, SOFTLY = 0.012, 0.02, Pace(0.08, 0.0)
+"""The agent's oracle: how far below that face it aims, from how far above it comes down slowly [m], and how."""
+PATIENCE, LONGER, STUBBORN = 20.0, 0.05, 4.0
+"""How long it waits for a turn; how much longer than needed shortcuts hold a key; how long one waits over it [s]."""
+NOWHERE: Vec3 = np.zeros(3)
 TIP_HALF, NARROWEST = 0.013, 0.006
 """Half of the closed finger tips along y, and the least free way to a neighbouring cap [m]."""
 EXACT = 0.70
@@ -79,8 +82,8 @@ behind the keyboard it stands [m]."""
 HIDDEN, PROUD = 0.03, 0.0003
 """How far below the table top bold letters wait until they are shown, and how far before the faint ones then [m]."""
 SHADES: tuple[tuple[Rgba, Rgba, Rgba], ...] = (
-    ((1.0, 0.80, 0.55, 1.0), (0.98, 0.72, 0.45, 1.0), (0.70, 0.25, 0.0, 1.0)),
-    ((0.70, 0.82, 1.0, 1.0), (0.55, 0.72, 1.0, 1.0), (0.0, 0.10, 0.55, 1.0)),
+    ((1.0, 0.80, 0.55, 1.0), (0.96, 0.66, 0.38, 1.0), (0.70, 0.25, 0.0, 1.0)),
+    ((0.70, 0.82, 1.0, 1.0), (0.48, 0.66, 1.0, 1.0), (0.0, 0.10, 0.55, 1.0)),
 )
 """Colour of a cap, of a faint and of a bold letter: the partner's, the agent's."""
 SEVERAL = -1
@@ -99,7 +102,7 @@ class KeyboardTyping(Scenario):
     """Its number in `WORDS`."""
     mine: int = param(0b01010, "1", 1, 254)
     """Which places of the word are the agent's, a bit for each; the lowest is the first letter's."""
-    hold: float = param(0.15, "s", 0.05, 1.0, hidden=True)
+    hold: float = param(0.2, "s", 0.05, 1.0, hidden=True)
     """How long a key must be touched until it counts."""
     pace: float = param(0.22, "m/s", 0.05, 0.30)
     """How fast the partner goes."""
@@ -114,13 +117,14 @@ class KeyboardTyping(Scenario):
         scene = table()
         remember(scene, *MEMORY)
         place(scene, self.keyboard, "keyboard", self.spot, math.radians(self.yaw))
+        turn = quat("z", math.radians(self.yaw))
         body, half = scene.body("keyboard"), [LARGE, SPACING * len(self.letters) / 2, 0.0005]
         shown(body, "display", (0.97, 0.97, 0.95, 1.0), size=half, pos=self._shown_at((len(self.letters) - 1) / 2))
         for k, letter in reversed(list(enumerate(self.letters))):  # a letter twice: its key shows the first owner
             cap, faint, bold = SHADES[self.owns(k)]
             scene.geom(f"keyboard/cap_{letter}").rgba = np.array(cap, np.float32)
-            write(body, letter, self._shown_at(k), LARGE, BOLD / 3, faint, f"faint_{k}")
-            typed = scene.worldbody.add_body(name=f"typed_{k}", mocap=True, pos=self.spot - HIDDEN * UP)
+            write(body, letter, self._shown_at(k), LARGE, BOLD / 2, faint, f"faint_{k}")
+            typed = scene.worldbody.add_body(name=f"typed_{k}", mocap=True, pos=self.spot - HIDDEN * UP, quat=turn)
             for where, height in ((self._shown_at(k), LARGE), (self.keyboard.at(letter), PRINT * self.keyboard.cap)):
                 write(typed, letter, where + PROUD * UP, height, BOLD, bold, f"bold_{height:.3f}_{k}")
         return scene
@@ -217,15 +221,18 @@ class KeyboardTyping(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Look whose turn it is: go and type the letter, or make room and wait until it is typed."""
-        while (k := int(world.memory["typed"])) < len(self.letters):
-            if self.owns(k):
-                yield from until(hold(world.arm, math.inf, CLOSED), lambda: self.beside(world, *world.partners))
-                yield from self.press(world, k)
-            else:
-                yield from self.make_room(world)
-                yield from until(hold(world.arm, math.inf, CLOSED), lambda k=k: world.memory["typed"] > k)
-        yield from retreat(world.arm, OVER)
+        """Wait beside the keyboard for each own letter's turn, go and type it; in the end make room for the others."""
+        for k in self.own:
+            yield from self.await_turn(world, k)
+            yield from self.press(world, k)
+        yield from self.make_room(world)
+
+    def await_turn(self, world: World, k: int) -> Plan:
+        """Wait, out of the way, until a place of the word is the next one and the partner has left the keyboard."""
+        if world.memory["typed"] < k:
+            yield from self.make_room(world)
+            yield from wait(world.arm, lambda: world.memory["typed"] >= k, PATIENCE)
+        yield from wait(world.arm, lambda: self.beside(world, *world.partners), PATIENCE)
 
     def make_room(self, world: World) -> Plan:
         """Go beside the keyboard, if the hand is not there."""
@@ -234,26 +241,32 @@ class KeyboardTyping(Scenario):
             yield from go_to(world.arm, ASIDE, facing_down(), COARSE, CLOSED)
 
     def _rise(self, world: World) -> Plan:
+        """Straight up to where hands go over the keys."""
         hand = world.arm.hand
         if hand[2] < self._way(world) - LOW:
-            yield from go_to(world.arm, [*hand[:2], self._way(world)], facing_down(), COARSE, CLOSED)
+            yield from go_to(world.arm, [*hand[:2], self._way(world)], facing_down(), COARSE)
 
-    def press(self, world: World, k: int, shift: Vec3 | None = None, seconds: float = math.inf) -> Plan:
-        """Type the letter of a place: over its key, down, stay there until it counts, up.
+    def press(
+        self, world: World, k: int, shift: Vec3 = NOWHERE, seconds: float = math.inf, grip: float = CLOSED
+    ) -> Plan:
+        """Type the letter of a place: over its key, down, stay there until a letter becomes bold, up.
 
         Args:
-            shift: by how much it is missed [m].
-            seconds: how long the key is held at most.
+            shift: by how much the key is missed [m].
+            seconds: how long it is held at most.
+            grip: of the hand.
         """
-        off = np.zeros(3) if shift is None else shift
-        down, arm = facing_down(), world.arm
+        arm, down, over = world.arm, facing_down(), self.key(world, k) + shift
         yield from self._rise(world)
-        over = self.key(world, k) + off
-        yield from go_to(arm, [*over[:2], self._way(world)], down, COARSE, CLOSED)
-        yield from go_to(arm, over + 0.02 * UP, down, FINE, CLOSED)
+        yield from go_to(arm, [*over[:2], self._way(world)], down, COARSE, grip)
+        over = self.key(world, k) + shift
+        yield from go_to(arm, over + ABOVE * UP, down, FINE, grip)
         before = world.memory["typed"]
-        done = lambda: world.memory["typed"] > before or world.memory["held_0"] >= seconds - 1e-9  # noqa: E731
-        yield from stay(arm, over - PRESS * UP, down, done, Pace(0.08, 0.0), CLOSED)
+
+        def done() -> bool:
+            return world.memory["typed"] > before or world.memory["held_0"] > seconds - 1e-9
+
+        yield from stay(arm, over - PRESS * UP, down, done, SOFTLY, grip)
         yield from self._rise(world)
 
     # --- what must not work ---------------------------------------------------------------
@@ -266,6 +279,7 @@ class KeyboardTyping(Scenario):
             "one_key_aside": Shortcut(self._one_aside),
             "short_taps": Shortcut(self._taps),
             "make_no_room": Shortcut(self._no_room),
+            "open_fingers": Shortcut(self._open),
         }
 
     def _type_all(self, world: World) -> Plan:
@@ -276,37 +290,47 @@ class KeyboardTyping(Scenario):
     def _mine_at_once(self, world: World) -> Plan:
         """Own letters one after the other, whoever's turn it is; each held long enough for any key."""
         for k in self.own:
-            yield from self.press(world, k, seconds=self.hold + 0.05)
+            yield from self.press(world, k, seconds=self.hold + LONGER)
 
     def _once_more(self, world: World) -> Plan:
-        """Like the oracle up to its first own letter, and that one again."""
-        k = self.own[0]
-        yield from until(self.oracle(world), lambda: world.memory["typed"] > k)
-        yield from self._rise(world)
-        yield from self.press(world, k, seconds=self.hold + 0.05)
-        yield from self.oracle(world)
+        """Like the oracle up to an own letter, and that one again, where another one is next."""
+        again = next(k for k in self.own if self.letters[k : k + 2] != 2 * self.letters[k])
+        for k in [k for k in self.own if k <= again]:
+            yield from self.await_turn(world, k)
+            yield from self.press(world, k)
+        yield from self.press(world, again, seconds=self.hold + LONGER)
+
+    def _first(self, world: World) -> Plan:
+        """Like the oracle until it is the turn of the first own letter."""
+        yield from self.await_turn(world, self.own[0])
 
     def _one_aside(self, world: World) -> Plan:
-        """Like the oracle, one key farther along the row."""
-        for k in self.own:
-            yield from until(self.oracle(world), lambda k=k: world.memory["typed"] >= k)
-            across = self.keyboard.at(self.letters[k])[1]
-            shift = -math.copysign(self.keyboard.pitch, across) * world.rot("keyboard")[:, 1]
-            yield from self.press(world, k, shift, self.hold + 0.05)
+        """One key farther along the row."""
+        yield from self._first(world)
+        across = self.keyboard.at(self.letters[self.own[0]])[1]
+        shift = -math.copysign(self.keyboard.pitch, across) * world.rot("keyboard")[:, 1]
+        yield from self.press(world, self.own[0], shift, self.hold + LONGER)
 
     def _taps(self, world: World) -> Plan:
-        """Like the oracle, but up as soon as the key is touched."""
-        for k in self.own:
-            yield from until(self.oracle(world), lambda k=k: world.memory["typed"] >= k)
-            yield from self.press(world, k, seconds=self.hold / 2)
+        """Up again as soon as the key has been touched, three times."""
+        yield from self._first(world)
+        for _ in range(3):
+            yield from self.press(world, self.own[0], seconds=Loop.PERIOD)
 
     def _no_room(self, world: World) -> Plan:
-        """Wait for the turn over the next own key."""
-        for k in self.own:
-            over = self.key(world, k) + (OVER + 0.05) * UP
-            yield from go_to(world.arm, over, facing_down(), COARSE, CLOSED)
-            yield from until(hold(world.arm, math.inf), lambda k=k: world.memory["typed"] >= k)
-            yield from self.press(world, k)
+        """Wait for one's turn over the key, and press when it does not come."""
+        k = next(k for k in self.own if k > 0 and not self.owns(k - 1))
+        for before in [before for before in self.own if before < k]:
+            yield from self.await_turn(world, before)
+            yield from self.press(world, before)
+        yield from go_to(world.arm, self.key(world, k) + OVER * UP, facing_down(), COARSE, CLOSED)
+        yield from until(hold(world.arm, STUBBORN), lambda: world.memory["typed"] >= k)
+        yield from self.press(world, k, seconds=self.hold + LONGER)
+
+    def _open(self, world: World) -> Plan:
+        """With fingers that have not been closed: they come down on the keys to both sides."""
+        yield from self._first(world)
+        yield from self.press(world, self.own[0], seconds=self.hold + LONGER, grip=OPEN)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The keys of the partner's letters give way: nothing touches them, and its turn never ends."""
@@ -346,7 +370,7 @@ class KeyboardTyping(Scenario):
             "own_share": len(self.own) / len(self.letters),
             "own_way": float(sum(math.dist(a, b) for a, b in pairwise(keys))),
             "room_beside_a_finger": self.keyboard.pitch - self.keyboard.cap / 2 - TIP_HALF,
-            "hold": self.hold,
+            "time_on_a_key": self.hold,
             "partner_speed": self.pace,
             "keyboard_yaw": math.radians(self.yaw),
         }
@@ -373,9 +397,8 @@ class KeyboardTyping(Scenario):
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
-    def _axes(self) -> np.ndarray:
-        c, s = math.cos(math.radians(self.yaw)), math.sin(math.radians(self.yaw))
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    def _axes(self) -> Mat3:
+        return about_z(math.radians(self.yaw))
 
     def key(self, world: World, k: int) -> Vec3:
         """Middle of the upper face of the key for a place of the word, where it now is [m]."""
