@@ -39,11 +39,11 @@ from ..assets.glyph import write
 from ..assets.keyboard import LETTERS, PRINT, Keyboard
 from ..assets.prop import TABLE_TOP, Rgba, place, shown, table
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, Vec3, about_z, between, corners, quat
+from ..geometry import UP, Mat3, Vec3, about_z, between, quat
 from ..params import param
 from ..predicates import fallen
 from ..robots import panda
-from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, on_table, require
+from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, require
 from ..sim.memory import remember
 from ..sim.world import Arm, World
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, hold, stay, steer, until, wait
@@ -351,8 +351,6 @@ class KeyboardTyping(Scenario):
         yield require(first < last, "there is no turn of the partner to wait for", first=first, last=last)
         room = self.keyboard.pitch - self.keyboard.cap / 2 - TIP_HALF
         yield require(room >= NARROWEST, "a finger that presses a key touches its neighbour", room=room)
-        outline = corners(self.spot, math.radians(self.yaw), self.keyboard.size[:2])
-        yield on_table("the keyboard", outline)
         apart = min(self._beside(hand) for hand in (ASIDE, HOME))
         yield require(apart > CLEAR, "nowhere is a hand out of the way", apart=apart, least=CLEAR)
         right, left = panda.bases(2)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from scengen.control.loop import Loop
 from scengen.control.teleop import Filter
+from scengen.errors import NoEvent, UnknownName
 from scengen.robots import panda
-from scengen.sim.world import EMBODIMENTS, HANDS, ROBOT, World, action_size, hands
+from scengen.sim.world import EMBODIMENTS, HANDS, IDLE, ROBOT, SCRIPTED, World, action_size, all_hands, hands
 
 PERIODS = 150
 PARKED = np.tile(np.array([0, 0, 0, 0, 0, 0, -1], np.float32), (PERIODS, 1))
@@ -29,9 +30,9 @@ def scene(embodiment: str = "", base: NDArray[np.float64] | None = None) -> Worl
         box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.02, 0.02, 0.02], mass=0.1)
     if base is not None:
         panda.attach(spec, base=base)
-    for number, hand in enumerate(hands(embodiment) if embodiment else ()):
+    for number, hand in enumerate(all_hands(embodiment) if embodiment else ()):
         HANDS[hand](spec, False, number, panda.bases(2)[number])
-    return World.of(spec.compile())
+    return World.of(spec.compile(), embodiment.count(SCRIPTED))
 
 
 def waving(seed: int = 0) -> NDArray[np.float32]:
@@ -93,7 +94,7 @@ def test_equal_actions_give_equal_paths_side_by_side(pair: World) -> None:
 # --- bits ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("embodiment", [e for e in EMBODIMENTS if "+" in e])
+@pytest.mark.parametrize("embodiment", [e for e in EMBODIMENTS if "+" in e and SCRIPTED not in e])
 def test_reset_restore_and_replay_give_the_same_bits(embodiment: str) -> None:
     world, actions = scene(embodiment), np.hstack([down(), waving()])
     paths(world, actions)
@@ -122,6 +123,37 @@ def test_the_state_holds_the_filters_and_grippers_of_both_arms(pair: World) -> N
     pair.restore(middle)
     assert [arm.grip for arm in pair.arms] == [-1.0, 1.0]
     np.testing.assert_array_equal([pair.step(action) for action in after], first)
+
+
+# --- an arm of the scene's own ------------------------------------------------------------
+
+
+def test_an_arm_that_is_told_moves_as_one_that_actions_drive(pair: World) -> None:
+    pair.reset()
+    driven = scene("panda_jaw+scripted_panda_jaw")
+    assert [arm.label for arm in (*driven.arms, *driven.partners)] == ["robot0", "robot1"] and driven.size == 7
+    for own, told in zip(waving(), down(), strict=True):
+        pair.apply(np.concatenate([own, told]))
+        with driven.events():
+            driven.partners[0].tell(told)
+        driven.apply(own)
+    assert driven.digest == pair.digest and driven.touched("robot1", "left")
+
+
+def test_what_an_arm_is_told_holds_for_one_period_and_only_events_may_tell_it() -> None:
+    world = scene("panda_jaw+scripted_panda_jaw")
+    (partner,) = world.partners
+    for event in ([1.0] * 7, None):
+        with world.events():
+            if event:
+                partner.tell(event)
+        np.testing.assert_array_equal(world.joined(np.zeros(7))[7:], event or IDLE)
+    with pytest.raises(NoEvent, match="telling robot1"):
+        partner.tell(IDLE)
+    with world.events(), pytest.raises(UnknownName, match="'robot0'"):
+        world.arm.tell(IDLE)
+    with pytest.raises(ValueError, match=r"shape \(7,\)"):
+        world.apply(np.zeros(14, np.float32))
 
 
 # --- contacts -----------------------------------------------------------------------------
@@ -187,6 +219,9 @@ def test_a_cup_pulls_by_its_own_pads_alone() -> None:
 def test_names_of_robots_are_lists_of_hands() -> None:
     assert hands("panda_suction+panda_jaw") == ("panda_suction", "panda_jaw")
     assert [action_size(name) for name in ("panda_jaw", "panda_suction+panda_jaw")] == [7, 14]
+    shared = "panda_jaw+scripted_panda_suction"
+    assert hands(shared) == ("panda_jaw",) and all_hands(shared) == ("panda_jaw", "panda_suction")
+    assert action_size(shared) == 7
     world = scene("panda_suction+panda_jaw")
     assert [arm.suction for arm in world.arms] == [True, False]
     assert [len(arm.finger_pos) for arm in world.arms] == [0, 2] and world.idle.shape == (14,)
