@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..params import param
 from .prop import Rgba, show
-from .turned import PROUD, Section, Turned
+from .turned import PROUD, SHORTEST, Section, Turned
 
 BANDS = 6
 """Cones that stand for the shell. Tangents of the inner sphere, chords of the outer one: 0.25 mm of 3 mm get lost."""
@@ -29,6 +29,8 @@ class Bowl(Turned):
     wall: float = param(0.003, "m", 0.002, 0.004)
     bead: float = param(0.005, "m", 0.004, 0.008)
     """Thickness of the rim, over its last 12 mm; it is thicker towards the inside."""
+    hole: float = param(0.0, "m", 0.0, 0.020)
+    """Radius of a round hole in the middle of the foot; 0: none."""
     mass: float = param(0.050, "kg", 0.01, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.36, 0.52, 0.62, 1.0)
@@ -67,7 +69,8 @@ class Bowl(Turned):
         angles = [self._first + i * self._step for i in range(BANDS + 1)]
         outside = [self._corner(self.outer, a) for a in angles]
         inside = [self._corner(self.inner / math.cos(self._step / 2), a) for a in angles]
-        bottom = [(0.0, PROUD), outside[0], inside[0], (0.0, inside[0][1])]
+        hole = min(self.hole, 0.8 * self.foot) if self.hole >= SHORTEST else 0.0
+        bottom = [(hole, PROUD), outside[0], inside[0], (hole, inside[0][1])]
         shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(BANDS)]
         edge = [(self.radius, self.depth), (self.radius - self.bead, self.depth)]
         bead = [outside[-1], *edge, self._corner(self.outer - self.bead, angles[-1])]

@@ -160,9 +160,22 @@ CAMERAS = (
 """Name, position [m] and orientation (wxyz) of robosuite's TableArena cameras."""
 
 
-def place(scene: mujoco.MjSpec, asset: Prop, name: str, pos: ArrayLike, yaw: float = 0.0, free: bool = True) -> None:
-    """Put `asset` on the scene as body `name` at `pos` [m], turned by `yaw` [rad] about the vertical."""
-    frame = scene.worldbody.add_frame(pos=np.asarray(pos), quat=quat("z", yaw))
+def place(
+    scene: mujoco.MjSpec,
+    asset: Prop,
+    name: str,
+    pos: ArrayLike,
+    yaw: float = 0.0,
+    free: bool = True,
+    turn: ArrayLike | None = None,
+) -> None:
+    """Put `asset` on the scene as body `name`, its origin at `pos` [m].
+
+    Args:
+        yaw: about the vertical [rad].
+        turn: orientation instead of that (wxyz).
+    """
+    frame = scene.worldbody.add_frame(pos=np.asarray(pos), quat=quat("z", yaw) if turn is None else np.asarray(turn))
     body = frame.attach_body(asset.spec().body("body"), f"{name}/", "")
     body.name = name
     if free:
