@@ -242,8 +242,8 @@ class CubeToss(Scenario):
             "share_of_the_farthest_throw": (self.distance - RADIUS) / (farthest - RADIUS),
             "flight_time": seconds,
             "room_over_edge": self.opening / self.cube.edge,
-            "bearing": math.radians(abs(self.bearing)),
-            "turn": math.radians(abs(self.turn)),
+            "to_the_side": math.radians(abs(self.bearing)),
+            "tray_turned_by": math.radians(abs(self.turn)),
             "opening_time": self.opens,
         }
 
