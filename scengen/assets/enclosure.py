@@ -1,0 +1,102 @@
+"""Three walls that throw a ball back: a U that is open on one side, on a floor of its own."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from ..geometry import Vec3
+from ..params import param
+from ..physics import contact, reflected
+from .prop import PRIORITY, Prop, Rgba, show, solid
+
+STIFFNESS = 2e4
+"""Of the walls [1/s^2]: a bounce takes 22 ms, 11 steps of the simulation, and a ball that comes with 0.5 m/s goes
+3.5 mm into the wall. Stiffer walls return shares of the speed that depend on the time step."""
+LASTS = math.pi / math.sqrt(STIFFNESS)
+"""How long a bounce takes [s]."""
+MOST = 10
+"""How many ways are foreseen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Enclosure(Prop):
+    """A back wall and two side walls, smooth. The origin is the middle of the opening, on the ground; x leads in."""
+
+    width: float = param(0.52, "m", 0.1, 0.7)
+    """Between the side walls."""
+    depth: float = param(0.38, "m", 0.1, 0.7)
+    """From the opening to the back wall."""
+    height: float = param(0.050, "m", 0.02, 0.15)
+    thickness: float = param(0.020, "m", 0.01, 0.05)
+    restitution: float = param(0.84, "1", 0.3, 0.95)
+    """What is left of a ball's speed against a wall. Billiard cushions: 0.6 to 0.9."""
+    rgba: Rgba = (0.24, 0.42, 0.36, 1.0)
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        out, half = self.thickness / 2, self.height / 2
+        walls = {
+            "back": ([out, self.width / 2 + self.thickness, half], [self.depth + out, 0.0, half]),
+            "left": ([self.depth / 2, out, half], [self.depth / 2, self.width / 2 + out, half]),
+            "right": ([self.depth / 2, out, half], [self.depth / 2, -self.width / 2 - out, half]),
+        }
+        bouncy = contact(self.restitution, STIFFNESS)
+        for name, (size, pos) in walls.items():
+            wall = {"friction": 0.0, "condim": 1, "solref": bouncy, "priority": PRIORITY + 1, "rgba": self.rgba}
+            solid(body, name, size, pos, **wall)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of its outline on the ground [m]; the middle of that is `depth` / 2 behind the origin."""
+        return self.depth + self.thickness, self.width + 2 * self.thickness
+
+    # --- mechanics ------------------------------------------------------------------------
+
+    def ways(self, at: Vec3, velocity: Vec3, radius: float, restitution: float | None = None) -> list["Way"]:
+        """The straight ways from here on of a ball that slides without friction; the last one has no end.
+
+        Args:
+            at: where the ball is [m], seen from the enclosure.
+            velocity: of it [m/s], seen so.
+            radius: of the ball [m].
+            restitution: of the walls, if they had another one: 1 for mirror images.
+        """
+        found, seconds = [], 0.0
+        while len(found) < MOST:
+            found.append(Way(seconds, at, velocity))
+            if (hit := self._hit(at, velocity, radius)) is None:
+                break
+            normal, wait = hit
+            at, seconds = at + wait * velocity, seconds + wait
+            velocity = reflected(velocity, normal, self.restitution if restitution is None else restitution)
+        return found
+
+    def _hit(self, at: Vec3, velocity: Vec3, radius: float) -> tuple[Vec3, float] | None:
+        """The inward normal of the wall that is met first, and when [s]."""
+        found = []
+        if velocity[0] > 0.0:
+            found.append((np.array([-1.0, 0.0, 0.0]), (self.depth - radius - at[0]) / velocity[0]))
+        if velocity[1] != 0.0:
+            side = math.copysign(1.0, velocity[1])
+            wait = (self.width / 2 - radius - side * at[1]) / abs(velocity[1])
+            if at[0] + wait * velocity[0] > 0.0:
+                found.append((np.array([0.0, -side, 0.0]), wait))
+        found = [(normal, wait) for normal, wait in found if wait > 1e-9]
+        return min(found, key=lambda hit: hit[1]) if found else None
+
+
+class Way(NamedTuple):
+    """A straight way of a ball."""
+
+    begins: float
+    """[s]."""
+    at: Vec3
+    """Where it begins [m]."""
+    velocity: Vec3
+    """[m/s]."""
+
+
+if __name__ == "__main__":
+    show(Enclosure())
