@@ -210,11 +210,13 @@ class BounceIntercept(LaunchedBall):
         yield require(len(ways) > 1, "the ball meets no wall")
         nearest = min(*(self._from_ends(way.at) for way in ways[1:]), *map(self._beside_ends, ways))
         near = CORNER * self.ball.radius
-        yield require(nearest >= near, "the ball meets a corner, or the end of a wall", nearest=nearest, near=near)
+        near_end = "the ball meets a corner, or the end of a wall"
+        yield require(nearest >= near, near_end, nearest=max(nearest, -1.0), near=near)
         slowest = min(float(np.linalg.norm(way.velocity)) for way in ways)
         yield require(slowest > SLOWEST, "the ball comes back too slowly", speed=slowest)
         met = self.met(ways, READY, spare=2.5 * SPARE)
-        yield require(met is not None, "the hand comes too late to every place on the ball's way")
+        late = "the hand comes too late to every place on the ball's way"
+        yield require(met is not None, late, speed=self.speed, hand=HAND_SPEED)
 
     def features(self) -> Mapping[str, float]:
         """The ball's speed before and after its walls as a share of the hand's, how far the wall turns its way off the
