@@ -52,9 +52,17 @@ def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
 def best_grip(arm: Arm, body: str) -> Grip | None:
     """The narrowest way to take hold of a thing as it lies now, of equal ones that which turns the hand least.
 
-    Taken at the middle of its height, or as low as the palm allows. None if it is too wide in every direction.
+    None if it is too wide in every direction.
     """
-    world = arm.world
+    found = grips(arm.world, body)
+    return min(found, key=lambda grip: (round(grip.width, 3), abs(_turn(arm, grip.closing))), default=None)
+
+
+def grips(world: World, body: str) -> list[Grip]:
+    """Every way to take hold of a thing as it lies now, along and across its axes; none if it is too wide for all.
+
+    Taken at the middle of its height, or as low as the palm allows.
+    """
     low, high = extent(world, body, UP)
     height = max((low + high) / 2, high - PALM_ABOVE + UNDER_THE_PALM, TABLE_TOP + TIP + UNDER_THE_PALM)
     found = []
@@ -63,8 +71,7 @@ def best_grip(arm: Arm, body: str) -> Grip | None:
         (near, far), (left, right) = extent(world, body, closing), extent(world, body, beside)
         at = (near + far) / 2 * closing + (left + right) / 2 * beside + height * UP
         found.append(Grip(at, closing, far - near))
-    fitting = [grip for grip in found if grip.width <= WIDEST]
-    return min(fitting, key=lambda grip: (round(grip.width, 3), abs(_turn(arm, grip.closing))), default=None)
+    return [grip for grip in found if grip.width <= WIDEST]
 
 
 def extent(world: World, body: str, direction: Vec3) -> tuple[float, float]:

@@ -1,0 +1,304 @@
+"""T28 stack-collapse-recovery: three cubes stand on each other; something knocks them down; put them up again.
+
+        +-+                                                +-+
+    ==> +-+               start                            +-+         end
+       +---+                       +---+                  +---+
+       +---+              +-+      |   |      +---+       +---+
+      +-----+             +-+     +-----+     +---+      +-----+
+    --+-----+--    -->  --+-+-----+-----+-----+---+-- -->-+-----+--
+
+WRITE ME
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import mujoco
+import numpy as np
+
+from ..assets.box import Cube
+from ..assets.prop import TABLE_TOP, place, table
+from ..control.loop import Loop
+from ..geometry import UP, Outline, Vec3, corners, gap, heading
+from ..params import check_bounds, param
+from ..predicates import fallen, still
+from ..robots.jaw import FINGER, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, SPAN, TIP
+from ..robots.panda import BASE
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.memory import remember
+from ..sim.world import World
+from ..skills.grip import WIDEST, Grip, directions, extent, grips
+from ..skills.jaw import carry, grasp, pick, put, release
+from ..skills.motion import OPEN, Pace, closing_along, go_to, retreat, wait
+
+CALM, RESTED = 0.01, 0.2
+"""Speed below which a cube counts as at rest [m/s], and for how long all must be so before the oracle acts [s]."""
+OVER = 0.03
+"""How far a cube is carried over the top of the tower, and the hand rises over one that it has let go [m]."""
+BEYOND = 0.004
+"""How far over the edge a cube's middle is let go by who does not look for the one below [m]."""
+LEVEL = Pace(0.30, 0.008)
+"""Over the cubes to the next one."""
+GRAVITY = 9.81
+"""[m/s^2]"""
+DIFFERENT = 0.004
+"""Least difference of two cubes' edges [m]."""
+NEAREST, FARTHEST = 0.30, 0.75
+"""How far from the robot's first axis the hand, pointing down, takes things from the table [m]: measured."""
+NAMES = ("bottom", "middle", "top")
+MEMORY = ("blows", "stood", "fell")
+"""How many blows there were; for how long the tower has stood untouched [s]; whether its top has lain on the table
+since the last blow."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blow:
+    """What knocks the tower down: an impulse through the middle of the top cube, and one through that under it."""
+
+    when: float = param(0.7, "s", 0.1, 6.0, hidden=True)
+    """How long the tower has stood before."""
+    both: int = param(1, "", 0, 1, hidden=True)
+    """Whether it strikes the middle cube, too."""
+    heading: float = param(90.0, "deg", -360.0, 360.0, period=360.0, hidden=True)
+    """Way that the top cube goes."""
+    heading_middle: float = param(270.0, "deg", -360.0, 360.0, period=360.0, hidden=True)
+    speed: float = param(0.88, "m/s", 0.1, 2.5, hidden=True)
+    """What the impulse gives the top cube."""
+    speed_middle: float = param(0.92, "m/s", 0.1, 2.5, hidden=True)
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StackCollapseRecovery(Scenario):
+    """A tower of three cubes and one blow or two."""
+
+    HOLD = 1.0
+    MOVING = NAMES
+    NO_ABLATIONS = "every cube is part of what is asked for; without the blow nothing is left to do"
+
+    x: float = param(-0.08, "m", -0.4, 0.4)
+    y: float = param(0.0, "m", -0.4, 0.4)
+    yaw: float = param(0.0, "deg", -180.0, 180.0, period=90.0)
+    bottom: Cube = Cube(edge=0.060, mass=0.13, friction=0.45, rgba=(0.20, 0.36, 0.66, 1.0))
+    middle: Cube = Cube(edge=0.050, mass=0.075, friction=0.45, rgba=(0.90, 0.70, 0.16, 1.0))
+    top: Cube = Cube(edge=0.040, mass=0.04, friction=0.45)
+    blows: int = param(1, "", 1, 2, hidden=True)
+    blow_0: Blow = Blow()
+    blow_1: Blow = Blow(both=0)
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        scene = table()
+        remember(scene, *MEMORY)
+        for name, foot in zip(NAMES, self.feet, strict=True):
+            place(scene, self.cubes[name], name, foot, math.radians(self.yaw))
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        struck = world.memory["blows"] == self.blows and world.memory["fell"] > 0
+        return struck and self.stands(world)
+
+    def stands(self, world: World) -> bool:
+        """Whether each cube rests on the next larger one, and nothing touches them."""
+        touched = [{"table", "middle"}, {"bottom", "top"}, {"middle"}]
+        if [world.touching_bodies(name) for name in NAMES] != touched:
+            return False
+        return all(still(world, name, CALM) for name in NAMES) and self.bears(world, "middle", "top")
+
+    def failure(self, world: World) -> str | None:
+        return "a cube fell off the table" if fallen(world, *NAMES) else None
+
+    def events(self, world: World) -> None:
+        """Strike as soon as the tower has stood for long enough; see whether it has come down."""
+        memory = world.memory
+        memory["fell"] = max(memory["fell"], float(world.touching("top", "table")))
+        memory["stood"] = memory["stood"] + Loop.PERIOD if self.stands(world) else 0.0
+        number = int(memory["blows"])
+        if number < self.blows and memory["stood"] >= self.planned[number].when - 1e-9:
+            memory["blows"], memory["stood"], memory["fell"] = number + 1, 0.0, 0.0
+            for name, velocity in self.struck(self.planned[number]).items():
+                world.force(name, self.cubes[name].mass / Loop.PERIOD * velocity)
+
+    def pending(self, world: World) -> bool:
+        """Whether the tower stands and is going to be struck."""
+        return world.memory["blows"] < self.blows and (world.time == 0.0 or world.memory["stood"] > 0.0)
+
+    # --- oracle ---------------------------------------------------------------------------
+
+    def oracle(self, world: World) -> Plan:
+        """Wait for the blow; then always: look until all is at rest, and put up the lowest cube that is not in place."""
+        yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
+        while True:
+            yield from self.settle(world)
+            missing = [pair for pair in pairwise(NAMES) if not self.bears(world, *pair)]
+            yield from self.stack(world, *missing[0]) if missing else (world.idle,)
+
+    def settle(self, world: World) -> Plan:
+        """Wait until all cubes have been at rest for a while."""
+        quiet = 0.0
+        while quiet < RESTED:
+            yield world.idle
+            quiet = quiet + Loop.PERIOD if all(still(world, name, CALM) for name in NAMES) else 0.0
+
+    def bears(self, world: World, below: str, name: str) -> bool:
+        """Whether a cube lies on top of another one."""
+        return world.touching(below, name) and world.com(name)[2] > extent(world, below, UP)[1]
+
+    def stack(self, world: World, below: str, name: str, off: float = 0.0) -> Plan:
+        """Take a cube, put its centre of mass over the middle of another one, or `off` towards the robot [m], let go."""
+        yield from self.take(world, name)
+        foot = np.array([*self.centre(world, below)[:2], extent(world, below, UP)[1]]) - [off, 0.0, 0.0]
+        high = world.com(name)[2] - extent(world, name, UP)[0]
+        yield from put(world.arm, name, foot + high * UP, on=below, hover=OVER)
+        yield from retreat(world.arm, self.cubes[name].edge / 2 + OVER)
+
+    def take(self, world: World, name: str) -> Plan:
+        """Take a cube by those sides beside which the open jaw has most room, and lift it over the tower."""
+        best = max(grips(world, name), key=lambda grip: self.room(world, name, grip))
+        highest = max(extent(world, other, UP)[1] for other in NAMES if other != name)
+        high = highest + self.cubes[name].edge / 2 + OVER - best.at[2]
+        yield from go_to(world.arm, best.at + high * UP, pace=LEVEL, grip=OPEN)  # there the wrist's range is seen
+        yield from pick(world.arm, best.at, best.closing, above=high, lift=high)
+
+    def room(self, world: World, name: str, grip: Grip) -> float:
+        """Air between the open jaw around a cube and the other cubes, as seen from above [m]."""
+        air, yaw = math.inf, math.atan2(grip.closing[1], grip.closing[0])
+        for other in NAMES:
+            top = extent(world, other, UP)[1]
+            for bottom, size in ((-TIP, (SPAN, 2 * FINGER)), (PALM_ABOVE, (2 * PALM_ALONG, 2 * PALM_ACROSS))):
+                if other != name and top > grip.at[2] + bottom:
+                    air = min(air, gap(corners(grip.at, yaw, size), self.outline(world, other)))
+        return air
+
+    def outline(self, world: World, name: str) -> Outline:
+        """Of a cube that lies on one of its faces, as seen from above."""
+        x, y, _ = directions(world, name)[0]
+        return corners(self.centre(world, name), math.atan2(y, x), [self.cubes[name].edge] * 2)
+
+    def centre(self, world: World, name: str) -> Vec3:
+        """Middle of a cube, wherever its foot is now [m]."""
+        return world.pos(name) + self.cubes[name].edge / 2 * world.rot(name)[:, 2]
+
+    # --- shortcuts ------------------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        """What does not put up the tower that was; the last one only where it is wrong."""
+        found = {
+            "hold_the_tower": Shortcut(self._hold),
+            "smallest_at_the_bottom": Shortcut(self._upside_down),
+            "over_the_edge": Shortcut(self._over_the_edge),
+        }
+        return {**found, "as_if_the_middle_stood": Shortcut(self._top_alone)} if self.blow_0.both else found
+
+    def _hold(self, world: World) -> Plan:
+        """Take hold of the top cube where it stands, as fast as can be, keep it there for a while, and let go."""
+        at, side = self.centre(world, "top"), world.rot("top")[:, 1]
+        yield from go_to(world.arm, at, closing_along(world.arm, side), Pace(0.30, 0.01), OPEN)
+        yield from grasp(world.arm, 2.0)
+        yield from release(world.arm)
+        yield from retreat(world.arm)
+
+    def _upside_down(self, world: World) -> Plan:
+        """The middle cube on the smallest, and the largest on both, all centred."""
+        yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
+        yield from self.settle(world)
+        for below, name in pairwise(reversed(NAMES)):
+            yield from self.stack(world, below, name)
+
+    def _over_the_edge(self, world: World) -> Plan:
+        """The right cubes in the right order, but each let go beyond the edge of the one below."""
+        yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
+        yield from self.settle(world)
+        for below, name in pairwise(NAMES):
+            if not self.bears(world, below, name):
+                yield from self.stack(world, below, name, self.cubes[below].edge / math.sqrt(2) + BEYOND)
+                yield from self.settle(world)
+
+    def _top_alone(self, world: World) -> Plan:
+        """Put the top cube back to where it stood, and do not look whether something is there to bear it."""
+        yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
+        yield from self.settle(world)
+        yield from self.take(world, "top")
+        at = self.feet[2] + self.top.edge / 2 * UP
+        yield from carry(world.arm, "top", at + OVER * UP, pace=LEVEL)
+        yield from carry(world.arm, "top", at)
+        yield from release(world.arm)
+        yield from retreat(world.arm)
+
+    # --- constraints ------------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        edges = [cube.edge for cube in self.cubes.values()]
+        yield require(max(edges) <= WIDEST, "the jaw cannot take a cube", edge=max(edges), widest=WIDEST)
+        apart = min(abs(a - b) for a, b in combinations(edges, 2))
+        yield require(apart >= DIFFERENT, "two cubes are alike", difference=apart, least=DIFFERENT)
+        yield within_reach("the tower", self.feet[2] + self.top.edge * UP)
+        for blow in self.planned:
+            yield on_table("a cube", self.spots(blow), margin=self.top.edge)
+            for name, below in (("top", self.middle), ("middle", self.bottom)):
+                speed = math.hypot(*self.struck(blow).get(name, [math.inf, 0.0, 0.0])[:2])
+                least = math.sqrt(2 * self.cubes[name].friction * GRAVITY * below.edge / math.sqrt(2))
+                yield require(speed > least, "a blow is too weak to throw a cube down", speed=speed, least=least)
+            away = [math.dist(spot[:2], BASE[:2]) for spot in self.spots(blow)]
+            yield require(min(away) >= NEAREST, "a cube comes too close to the robot", away=min(away), least=NEAREST)
+            yield require(max(away) <= FARTHEST, "a cube comes out of reach", away=max(away), most=FARTHEST)
+
+    def features(self) -> Mapping[str, float]:
+        """How many cubes come down, when, how far away and on which side; what the tower is like."""
+        ways = [spot - self.feet[0] for blow in self.planned for spot in self.spots(blow)]
+        return {
+            "cubes_thrown_down": float(sum(len(self.struck(blow)) for blow in self.planned)),
+            "time_of_the_first_blow": self.blow_0.when,
+            "farthest": max(math.hypot(*way[:2]) for way in ways),
+            "nearest": min(math.hypot(*way[:2]) for way in ways),
+            "top_to_the_left": math.sin(math.radians(self.blow_0.heading)),
+            "slope_of_the_sides": (self.bottom.edge - self.top.edge) / sum(c.edge for c in self.cubes.values()),
+        }
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def cubes(self) -> dict[str, Cube]:
+        """By name, from the lowest up."""
+        return dict(zip(NAMES, (self.bottom, self.middle, self.top), strict=True))
+
+    @property
+    def feet(self) -> list[Vec3]:
+        """Where each cube stands at first [m]."""
+        heights = np.cumsum([0.0, self.bottom.edge, self.middle.edge])
+        return [np.array([self.x, self.y, TABLE_TOP + height]) for height in heights]
+
+    @property
+    def planned(self) -> tuple[Blow, ...]:
+        """The blows that come, in their order."""
+        return (self.blow_0, self.blow_1)[: self.blows]
+
+    def struck(self, blow: Blow) -> dict[str, Vec3]:
+        """The velocity that a blow gives to each cube that it strikes [m/s]."""
+        found = {"top": blow.speed * heading(blow.heading)}
+        if blow.both:
+            found["middle"] = blow.speed_middle * heading(blow.heading_middle)
+        return found
+
+    def spots(self, blow: Blow) -> list[Vec3]:
+        """How far along the table the cubes that a blow strikes can come, with their middles [m].
+
+        Sliding friction takes speed as far as the edge of the cube below; then they fall freely, and slide on. Tumbling
+        makes it less: measured 0.6 to 1.0 of it.
+        """
+        found = []
+        for name, velocity in self.struck(blow).items():
+            below, foot = self.cubes[NAMES[NAMES.index(name) - 1]], self.feet[NAMES.index(name)]
+            brake = 2 * self.cubes[name].friction * GRAVITY
+            speed = math.hypot(*velocity[:2])
+            left = math.sqrt(max(0.0, speed**2 - brake * below.edge / 2))
+            far = below.edge / 2 + left * math.sqrt(2 * (foot[2] - TABLE_TOP) / GRAVITY) + left**2 / brake
+            found.append(self.feet[0] + far / speed * velocity)
+        return found
