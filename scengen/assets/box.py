@@ -9,7 +9,10 @@ import numpy as np
 
 from ..geometry import Vec3
 from ..params import param
-from .prop import Prop, Rgba, show, solid
+from .prop import Prop, Rgba, show, shown, solid
+
+DARK = (0.16, 0.10, 0.10, 1.0)
+"""Paint on the loaded side of a cube."""
 
 
 class Box(Prop):
@@ -91,6 +94,65 @@ class Cube(Box):
         return np.array([self.edge] * 3)
 
 
+LEAD = 11340.0
+"""Density [kg/m^3]."""
+SLUG = 0.9
+"""Share of a loaded cube's mass that is in its slug; the rest is foam, 35 kg/m^3 at 52 mm and 0.05 kg."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedCube(Box):
+    """A cube of foam with a slug of lead behind its dark side, which is that along x.
+
+    A heavier one holds a larger slug, which cannot come as close to the side.
+    """
+
+    edge: float = param(0.040, "m", 0.02, 0.07)
+    mass: float = param(0.04, "kg", 0.01, 0.5, hidden=True)
+    lean: float = param(0.0, "1", 0.0, 0.35, hidden=True)
+    """How far the centre of mass is from the middle, as a share of the edge; at 0 no side is dark."""
+    friction: float = param(0.45, "1", 0.05, 1.5, hidden=True)
+    rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.edge] * 3)
+
+    @property
+    def com(self) -> float:
+        """How far from the middle the centre of mass is, along x [m]."""
+        return self.lean * self.edge
+
+    @property
+    def slug(self) -> float:
+        """Edge of the slug, a cube [m]."""
+        return (SLUG * self.mass / LEAD) ** (1 / 3)
+
+    @property
+    def steepest(self) -> float:
+        """The lean at which the slug touches the side from within."""
+        return SLUG * (self.edge - self.slug) / (2 * self.edge)
+
+    @property
+    def inertia(self) -> Vec3:
+        """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
+        foam, slug = (1 - SLUG) * self.mass, SLUG * self.mass
+        own = (foam * self.edge**2 + slug * self.slug**2) / 6
+        across = own + foam * self.com**2 + slug * (self.com / SLUG - self.com) ** 2
+        return np.array([own, across, across])
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        """One box to touch, a dark side to see; how its mass is spread is told to the body and not by its parts."""
+        super().fill(body, spec)
+        if not self.lean:
+            return
+        half, skin = self.edge / 2, 0.0002
+        shown(body, "dark_side", DARK, size=[skin, 0.9 * half, 0.9 * half], pos=[half, 0, half])
+        body.explicitinertial = True
+        body.mass, body.inertia = self.mass, self.inertia
+        body.ipos = np.array([self.com, 0.0, half])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Lid(Box):
     """A flat square lid without knob, twice as wide as the jaw opens, that lies on whatever it covers.
@@ -110,5 +172,5 @@ class Lid(Box):
 
 
 if __name__ == "__main__":
-    for box in (Domino(), Block(), Cube(), Lid()):
+    for box in (Domino(), Block(), Cube(), LoadedCube(lean=0.25), Lid()):
         show(box)

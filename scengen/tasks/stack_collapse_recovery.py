@@ -18,7 +18,7 @@ from itertools import combinations, pairwise
 import mujoco
 import numpy as np
 
-from ..assets.box import Cube
+from ..assets.box import Cube, LoadedCube
 from ..assets.prop import TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..geometry import UP, Outline, Vec3, corners, gap, heading
@@ -30,8 +30,8 @@ from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, 
 from ..sim.memory import remember
 from ..sim.world import World
 from ..skills.grip import WIDEST, Grip, directions, extent, grips
-from ..skills.jaw import carry, grasp, pick, put, release
-from ..skills.motion import OPEN, Pace, closing_along, go_to, retreat, wait
+from ..skills.jaw import carry, pick, put, release
+from ..skills.motion import OPEN, Pace, go_to, retreat, wait
 
 CALM, RESTED = 0.01, 0.2
 """Speed below which a cube counts as at rest [m/s], and for how long all must be so before the oracle acts [s]."""
@@ -85,7 +85,7 @@ class StackCollapseRecovery(Scenario):
     yaw: float = param(0.0, "deg", -180.0, 180.0, period=90.0)
     bottom: Cube = Cube(edge=0.060, mass=0.13, friction=0.45, rgba=(0.20, 0.36, 0.66, 1.0))
     middle: Cube = Cube(edge=0.050, mass=0.075, friction=0.45, rgba=(0.90, 0.70, 0.16, 1.0))
-    top: Cube = Cube(edge=0.040, mass=0.04, friction=0.45)
+    top: LoadedCube = LoadedCube()
     blows: int = param(1, "", 1, 2, hidden=True)
     blow_0: Blow = Blow()
     blow_1: Blow = Blow(both=0)
@@ -95,7 +95,8 @@ class StackCollapseRecovery(Scenario):
     def build(self) -> mujoco.MjSpec:
         scene = table()
         remember(scene, *MEMORY)
-        for name, foot in zip(NAMES, self.feet, strict=True):
+        loaded = self.feet[2] - self.top.com * heading(self.yaw)  # its centre of mass over the others'
+        for name, foot in zip(NAMES, (*self.feet[:2], loaded), strict=True):
             place(scene, self.cubes[name], name, foot, math.radians(self.yaw))
         return scene
 
@@ -133,7 +134,7 @@ class StackCollapseRecovery(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Wait for the blow; then always: look until all is at rest, and put up the lowest cube that is not in place."""
+        """Wait for the blow; then always look until all is at rest, and put up the lowest cube out of place."""
         yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
         while True:
             yield from self.settle(world)
@@ -151,19 +152,25 @@ class StackCollapseRecovery(Scenario):
         """Whether a cube lies on top of another one."""
         return world.touching(below, name) and world.com(name)[2] > extent(world, below, UP)[1]
 
-    def stack(self, world: World, below: str, name: str, off: float = 0.0) -> Plan:
-        """Take a cube, put its centre of mass over the middle of another one, or `off` towards the robot [m], let go."""
+    def stack(self, world: World, below: str, name: str, off: float = 0.0, weighed: bool = True) -> Plan:
+        """Take a cube, let go of it over another one, go up.
+
+        Args:
+            off: how far from the other's middle, towards the robot [m].
+            weighed: whether its centre of mass is brought there, or else its middle.
+        """
         yield from self.take(world, name)
         foot = np.array([*self.centre(world, below)[:2], extent(world, below, UP)[1]]) - [off, 0.0, 0.0]
-        high = world.com(name)[2] - extent(world, name, UP)[0]
-        yield from put(world.arm, name, foot + high * UP, on=below, hover=OVER)
+        at = foot + (world.com(name)[2] - extent(world, name, UP)[0]) * UP
+        if not weighed:
+            at[:2] += (world.com(name) - self.centre(world, name))[:2]
+        yield from put(world.arm, name, at, on=below, hover=OVER)
         yield from retreat(world.arm, self.cubes[name].edge / 2 + OVER)
 
     def take(self, world: World, name: str) -> Plan:
         """Take a cube by those sides beside which the open jaw has most room, and lift it over the tower."""
         best = max(grips(world, name), key=lambda grip: self.room(world, name, grip))
-        highest = max(extent(world, other, UP)[1] for other in NAMES if other != name)
-        high = highest + self.cubes[name].edge / 2 + OVER - best.at[2]
+        high = max(extent(world, other, UP)[1] for other in NAMES) + self.cubes[name].edge / 2 + OVER - best.at[2]
         yield from go_to(world.arm, best.at + high * UP, pace=LEVEL, grip=OPEN)  # there the wrist's range is seen
         yield from pick(world.arm, best.at, best.closing, above=high, lift=high)
 
@@ -189,19 +196,22 @@ class StackCollapseRecovery(Scenario):
     # --- shortcuts ------------------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """What does not put up the tower that was; the last one only where it is wrong."""
+        """What does not put up the tower that was; the last two only where they are wrong."""
         found = {
             "hold_the_tower": Shortcut(self._hold),
             "smallest_at_the_bottom": Shortcut(self._upside_down),
             "over_the_edge": Shortcut(self._over_the_edge),
         }
-        return {**found, "as_if_the_middle_stood": Shortcut(self._top_alone)} if self.blow_0.both else found
+        if self.blow_0.both:
+            found["as_if_the_middle_stood"] = Shortcut(self._top_alone)
+        if self.top.com > self.middle.edge / 2:
+            found["middle_over_middle"] = Shortcut(self._middle_over_middle)
+        return found
 
     def _hold(self, world: World) -> Plan:
-        """Take hold of the top cube where it stands, as fast as can be, keep it there for a while, and let go."""
+        """Take hold of the top cube where it stands, as fast as can be, hold it there for a while, let go."""
         at, side = self.centre(world, "top"), world.rot("top")[:, 1]
-        yield from go_to(world.arm, at, closing_along(world.arm, side), Pace(0.30, 0.01), OPEN)
-        yield from grasp(world.arm, 2.0)
+        yield from pick(world.arm, at, side, above=self.top.edge + OVER, lift=0.0, squeeze=2.0, pace=LEVEL)
         yield from release(world.arm)
         yield from retreat(world.arm)
 
@@ -232,6 +242,15 @@ class StackCollapseRecovery(Scenario):
         yield from release(world.arm)
         yield from retreat(world.arm)
 
+    def _middle_over_middle(self, world: World) -> Plan:
+        """As the oracle, but as if the weight of a cube were in its middle."""
+        yield from wait(world.arm, lambda: world.memory["blows"] > 0, self.blow_0.when + 1.0)
+        yield from self.settle(world)
+        for below, name in pairwise(NAMES):
+            if not self.bears(world, below, name):
+                yield from self.stack(world, below, name, weighed=False)
+                yield from self.settle(world)
+
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
@@ -239,13 +258,14 @@ class StackCollapseRecovery(Scenario):
         yield require(max(edges) <= WIDEST, "the jaw cannot take a cube", edge=max(edges), widest=WIDEST)
         apart = min(abs(a - b) for a, b in combinations(edges, 2))
         yield require(apart >= DIFFERENT, "two cubes are alike", difference=apart, least=DIFFERENT)
+        steep = self.top.steepest
+        yield require(self.top.lean <= steep, "the slug does not fit in", lean=self.top.lean, steepest=steep)
         yield within_reach("the tower", self.feet[2] + self.top.edge * UP)
         for blow in self.planned:
             yield on_table("a cube", self.spots(blow), margin=self.top.edge)
-            for name, below in (("top", self.middle), ("middle", self.bottom)):
-                speed = math.hypot(*self.struck(blow).get(name, [math.inf, 0.0, 0.0])[:2])
-                least = math.sqrt(2 * self.cubes[name].friction * GRAVITY * below.edge / math.sqrt(2))
-                yield require(speed > least, "a blow is too weak to throw a cube down", speed=speed, least=least)
+            speeds = {name: math.hypot(*velocity[:2]) for name, velocity in self.struck(blow).items()}
+            spare = min(speed - self.least(name) for name, speed in speeds.items())
+            yield require(spare > 0.0, "a blow is too weak to throw a cube down", spare=spare)
             away = [math.dist(spot[:2], BASE[:2]) for spot in self.spots(blow)]
             yield require(min(away) >= NEAREST, "a cube comes too close to the robot", away=min(away), least=NEAREST)
             yield require(max(away) <= FARTHEST, "a cube comes out of reach", away=max(away), most=FARTHEST)
@@ -259,13 +279,14 @@ class StackCollapseRecovery(Scenario):
             "farthest": max(math.hypot(*way[:2]) for way in ways),
             "nearest": min(math.hypot(*way[:2]) for way in ways),
             "top_to_the_left": math.sin(math.radians(self.blow_0.heading)),
+            "top_centre_of_mass_off": self.top.com / self.middle.edge,
             "slope_of_the_sides": (self.bottom.edge - self.top.edge) / sum(c.edge for c in self.cubes.values()),
         }
 
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def cubes(self) -> dict[str, Cube]:
+    def cubes(self) -> dict[str, Cube | LoadedCube]:
         """By name, from the lowest up."""
         return dict(zip(NAMES, (self.bottom, self.middle, self.top), strict=True))
 
@@ -302,3 +323,14 @@ class StackCollapseRecovery(Scenario):
             far = below.edge / 2 + left * math.sqrt(2 * (foot[2] - TABLE_TOP) / GRAVITY) + left**2 / brake
             found.append(self.feet[0] + far / speed * velocity)
         return found
+
+    def least(self, name: str) -> float:
+        """Speed with which a cube comes to the edge of the one below, along its diagonal [m/s].
+
+        The middle cube bears the top one for the first half of that: it goes the other way.
+        """
+        rank = NAMES.index(name)
+        way, load = self.cubes[NAMES[rank - 1]].edge / math.sqrt(2), 0.0
+        if name == "middle":
+            load = self.top.mass / self.middle.mass * self.middle.edge / 2
+        return math.sqrt(2 * self.cubes[name].friction * GRAVITY * (way + load))
