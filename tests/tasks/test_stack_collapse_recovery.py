@@ -1,0 +1,231 @@
+"""Cubes that are struck go where mechanics says; only the tower that has fallen and stands again counts."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from controls import (
+    after_oracle,
+    builds_or_is_refuted,
+    each_refuted_for_its_own_reason,
+    load,
+    mistaken,
+    not_certified,
+    play,
+    play_shortcut,
+    replayed,
+    solution,
+    unchecked,
+)
+from helpers import anywhere
+from hypothesis import given, settings
+
+from scengen import config
+from scengen.assets.box import Cube, LoadedCube
+from scengen.assets.prop import TABLE_TOP
+from scengen.episode import Episode
+from scengen.geometry import heading
+from scengen.sim.world import IDLE
+from scengen.tasks.stack_collapse_recovery import GRAVITY, NAMES, Blow, StackCollapseRecovery
+
+TASK = config.task("stack_collapse_recovery")
+NOMINAL = StackCollapseRecovery()
+ALONE = replace(NOMINAL, blow_0=Blow(both=0))
+SETTLED = 2.5
+"""When all has come to rest after the nominal blow, nobody acting [s]."""
+
+
+def watched(scenario, look, seconds=SETTLED, world=None):
+    """What `look` sees of the world after every period in which nobody acts."""
+    world = world or load(TASK, scenario)
+    episode, seen = Episode(scenario, world), []
+    while world.time < seconds - 1e-9:
+        episode.step(IDLE.astype(np.float32))
+        seen.append(look(world))
+    return seen
+
+
+def energy(world):
+    """Kinetic and potential energy of the cubes [J]."""
+    total = 0.0
+    for name, cube in NOMINAL.cubes.items():
+        velocity, spin = world.velocity(name)[3:], world.velocity(name)[:3]
+        total += cube.mass * (velocity @ velocity / 2 + GRAVITY * (world.com(name)[2] - TABLE_TOP))
+        total += cube.mass * cube.edge**2 / 6 * (spin @ spin) / 2
+    return total
+
+
+@pytest.fixture(scope="module")
+def collapse():
+    """The nominal collapse: time, blows, energy, place and velocity of the cubes."""
+
+    def look(w):
+        return w.time, w.memory["blows"], energy(w), {n: w.com(n) for n in NAMES}, {n: w.velocity(n) for n in NAMES}
+
+    return watched(NOMINAL, look)
+
+
+# --- the blow -----------------------------------------------------------------------------
+
+
+def test_the_blow_comes_when_the_tower_has_stood_for_its_time(collapse):
+    first = next(time for time, blows, *_ in collapse if blows == 1.0)
+    assert first == pytest.approx(NOMINAL.blow_0.when, abs=0.03)
+
+
+def test_each_struck_cube_gets_the_momentum_that_the_parameters_say_and_the_lowest_none(collapse):
+    struck = next(velocities for _, blows, _, _, velocities in collapse if blows == 1.0)
+    loss = NOMINAL.top.friction * GRAVITY * 0.01  # one period of sliding, and as much again under the cube on top
+    for name, velocity in NOMINAL.struck(NOMINAL.blow_0).items():
+        assert struck[name][3:5] == pytest.approx(velocity[:2], abs=3.5 * loss)
+        assert struck[name][3:5] @ velocity[:2] < velocity @ velocity
+    assert np.linalg.norm(struck["bottom"][3:]) < 0.01
+    bottom = [places["bottom"] for *_, places, _ in collapse]
+    assert math.dist(bottom[0], bottom[-1]) < 0.001
+
+
+def test_the_top_cube_falls_freely_between_the_tower_and_the_table(collapse):
+    flight = [(time, places["top"]) for time, blows, _, places, _ in collapse if blows]
+    flight = [(time, at) for time, at in flight if 0.035 < at[2] - TABLE_TOP < 0.11]
+    times, heights = np.array([time for time, _ in flight]), np.array([at[2] for _, at in flight])
+    assert len(times) >= 4
+    assert -2 * np.polyfit(times, heights, 2)[0] == pytest.approx(GRAVITY, rel=0.04)
+
+
+def test_after_the_blow_energy_is_lost_and_never_gained(collapse):
+    history = np.array([joules for _, blows, joules, *_ in collapse if blows])
+    given = sum(NOMINAL.cubes[n].mass * v @ v / 2 for n, v in NOMINAL.struck(NOMINAL.blow_0).items())
+    before = next(joules for _, blows, joules, *_ in collapse if not blows)
+    assert history[0] - before == pytest.approx(given, rel=0.12)
+    assert np.diff(history).max() < 0.01 * given
+    lying = GRAVITY * sum(cube.mass * cube.edge / 2 for cube in NOMINAL.cubes.values())
+    assert history[-1] == pytest.approx(lying, rel=0.01)
+
+
+@pytest.mark.parametrize(("share", "leaves"), [(0.93, False), (1.07, True)])
+def test_a_cube_leaves_the_one_below_if_friction_does_not_stop_it_within_half_an_edge(share, leaves):
+    """v^2 = 2 mu g (edge / 2): its middle has passed the edge then."""
+    speed = share * math.sqrt(NOMINAL.top.friction * GRAVITY * NOMINAL.middle.edge)
+    weak = unchecked(StackCollapseRecovery)(blow_0=Blow(both=0, speed=speed))
+    world = load(TASK, weak)
+    watched(weak, lambda w: None, world=world)
+    assert (world.memory["fell"] == 1.0) == leaves
+
+
+@pytest.mark.parametrize("both", [0, 1])
+def test_what_is_struck_falls_and_comes_to_rest_no_farther_than_friction_allows(both):
+    scenario = replace(NOMINAL, blow_0=Blow(both=both))
+    world = load(TASK, scenario)
+    watched(scenario, lambda w: None, world=world)
+    assert world.touching("middle", "bottom") == (not both) and world.touching("top", "table")
+    for name, spot in zip(scenario.struck(scenario.blow_0), scenario.spots(scenario.blow_0), strict=True):
+        come, far = (math.dist(at[:2], scenario.feet[0][:2]) for at in (world.com(name), spot))
+        assert 0.4 < come / far < 1.3
+        assert world.rot(name)[2] == pytest.approx(np.round(world.rot(name)[2]), abs=0.01)  # on a face
+
+
+def test_a_collapse_goes_on_bit_by_bit_from_a_state_in_its_midst():
+    world, again = load(TASK, NOMINAL), load(TASK, NOMINAL)
+    watched(NOMINAL, lambda w: None, NOMINAL.blow_0.when + 0.12, world)
+    again.restore(world.state())
+    assert 0.0 < world.memory["blows"] and np.abs(world.velocity("top")).max() > 0.3
+    watched(NOMINAL, lambda w: None, world=world)
+    watched(NOMINAL, lambda w: None, world=again)
+    assert world.digest == again.digest
+
+
+# --- goal and failure ---------------------------------------------------------------------
+
+
+def test_the_tower_counts_only_struck_fallen_and_put_up_again():
+    world = load(TASK, NOMINAL)
+    watched(NOMINAL, lambda w: None, 0.3, world)
+    assert NOMINAL.stands(world) and not NOMINAL.success(world)
+    world = after_oracle(TASK, ALONE)
+    assert ALONE.success(world)
+    with world.events():
+        world.memory["fell"] = 0.0
+    assert not ALONE.success(world)
+
+
+def test_who_holds_the_tower_only_puts_off_the_blow():
+    later = replace(NOMINAL, blow_0=replace(NOMINAL.blow_0, when=2.0))
+    world = load(TASK, later)
+    assert not play_shortcut(TASK, later, "hold_the_tower", world).solved
+    assert world.memory["blows"] == 1.0 and world.time > 5.0
+
+
+@pytest.mark.parametrize("name", ["smallest_at_the_bottom", "over_the_edge", "as_if_the_middle_stood"])
+def test_another_tower_or_none_is_not_the_goal(name):
+    world = load(TASK, NOMINAL)
+    ended = play_shortcut(TASK, NOMINAL, name, world)
+    assert not ended.solved and not ended.gave_up
+    upside_down = world.touching("bottom", "middle") and world.com("bottom")[2] > world.com("middle")[2]
+    assert upside_down == (name == "smallest_at_the_bottom")
+
+
+def test_a_second_blow_is_for_the_tower_that_stands_again():
+    twice = replace(ALONE, blows=2)
+    world = after_oracle(TASK, twice)
+    assert world.memory["blows"] == 2.0
+    assert not replayed(TASK, ALONE, twice).solved
+    assert len(solution(TASK, twice).actions) > 1.4 * len(solution(TASK, ALONE).actions)
+
+
+@pytest.mark.parametrize("split", ["hard_blow", "other_side", "late_blow"])
+def test_a_memorised_motion_serves_no_other_collapse(split):
+    trained, moved = (TASK.draw(name, 0, 0).scenario for name in ("id", split))
+    assert not replayed(TASK, trained, moved).solved
+
+
+def test_a_cube_with_its_weight_on_one_side_stands_only_where_its_centre_of_mass_is_borne():
+    loaded = TASK.draw("loaded_top", 0, 0).scenario
+    assert solution(TASK, loaded).solved
+    world = load(TASK, loaded)
+    assert not play_shortcut(TASK, loaded, "middle_over_middle", world).solved
+    assert not world.touching("top", "middle") or world.touching("top", "table")
+
+
+# --- scenes that must not be certified ----------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyOrder(StackCollapseRecovery):
+    """Whatever has fallen and stands on something counts."""
+
+    def success(self, world):
+        return bool(world.memory["fell"]) and sum(world.touching(name, "table") for name in NAMES) == 1
+
+
+@pytest.mark.parametrize(
+    ("scenario", "check", "says"),
+    [
+        (unchecked(StackCollapseRecovery)(blow_0=Blow(speed=0.3)), "solved", "the oracle failed"),
+        (AnyOrder(), "shortcuts", "'smallest_at_the_bottom' reaches the goal"),
+        (mistaken(StackCollapseRecovery, "as_if_the_middle_stood")(), "solved", "the oracle failed"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, StackCollapseRecovery) else str(value),
+)
+def test_an_invalid_scenario_is_not_certified(scenario, check, says):
+    not_certified(TASK, scenario, check, says)
+
+
+def test_every_refutation_has_its_own_reason():
+    each_refuted_for_its_own_reason(
+        [
+            replace(NOMINAL, top=LoadedCube(edge=0.049)),
+            replace(NOMINAL, top=LoadedCube(lean=0.34)),
+            replace(NOMINAL, x=0.39, y=0.38),
+            replace(NOMINAL, y=0.25),
+            replace(NOMINAL, blow_0=Blow(speed=0.3)),
+            replace(NOMINAL, x=-0.2, blow_0=Blow(heading=180.0)),
+            replace(NOMINAL, x=0.1, blow_0=Blow(heading=0.0)),
+        ]
+    )
+
+
+@given(scenario=anywhere(StackCollapseRecovery))
+@settings(max_examples=30, deadline=None)
+def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
+    builds_or_is_refuted(scenario)
