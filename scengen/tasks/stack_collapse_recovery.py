@@ -77,7 +77,7 @@ since the last blow."""
 class Blow:
     """What knocks the tower down: an impulse through the middle of the top cube, and one through that under it."""
 
-    when: float = param(0.7, "s", 0.1, 6.0, hidden=True)
+    when: float = param(0.7, "s", 0.1, 10.0, hidden=True)
     """How long the tower has stood before."""
     both: int = param(1, "", 0, 1, hidden=True)
     """Whether it strikes the middle cube, too."""
@@ -97,7 +97,6 @@ class StackCollapseRecovery(Scenario):
     """A tower of three cubes and one blow or two."""
 
     HOLD = 1.0
-    MOVING = NAMES
     NO_ABLATIONS = "every cube is part of what is asked for; without the blow nothing is left to do"
 
     x: float = param(-0.08, "m", -0.4, 0.4)
@@ -148,8 +147,9 @@ class StackCollapseRecovery(Scenario):
                 world.force(name, self.cubes[name].mass / Loop.PERIOD * velocity)
 
     def pending(self, world: World) -> bool:
-        """Whether the tower stands and is going to be struck."""
-        return world.memory["blows"] < self.blows and (world.time == 0.0 or world.memory["stood"] > 0.0)
+        """Whether the tower is going to be struck: for the first time, or, as it stands, once more."""
+        blows = world.memory["blows"]
+        return blows < self.blows and (blows == 0.0 or world.memory["stood"] > 0.0)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -234,7 +234,7 @@ class StackCollapseRecovery(Scenario):
     def _hold(self, world: World) -> Plan:
         """Take hold of the top cube where it stands, as fast as can be, hold it there for a while, let go."""
         at, side = self.centre(world, "top"), world.rot("top")[:, 1]
-        yield from pick(world.arm, at, side, above=self.top.edge + OVER, lift=0.0, squeeze=2.0, pace=LEVEL)
+        yield from pick(world.arm, at, side, above=self.top.edge + OVER, lift=0.0, squeeze=1.0, pace=LEVEL)
         yield from release(world.arm)
         yield from retreat(world.arm)
 
@@ -296,6 +296,7 @@ class StackCollapseRecovery(Scenario):
         """How many cubes come down, when, how far away and on which side; what the tower is like."""
         ways = [spot - self.feet[0] for blow in self.planned for spot in self.spots(blow)]
         return {
+            "blows": float(self.blows),
             "cubes_thrown_down": float(sum(len(self.struck(blow)) for blow in self.planned)),
             "time_of_the_first_blow": self.blow_0.when,
             "farthest": max(math.hypot(*way[:2]) for way in ways),

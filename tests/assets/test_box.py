@@ -1,6 +1,7 @@
 """Boxes tip, slide and stop where a textbook says."""
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from helpers import anywhere
 from hypothesis import given, settings
 
-from scengen.assets.box import Block, Cube, Domino, Lid
+from scengen.assets.box import LEAD, Block, Cube, Domino, Lid, LoadedCube
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.physics import GRAVITY
 
@@ -29,7 +30,7 @@ def lean(data, about_x, angle):
     data.qpos[3:7] = math.cos(angle / 2), 0, math.sin(angle / 2), 0
 
 
-@pytest.mark.parametrize("box", [Domino(), Block(), Cube(), Lid()], ids=lambda box: type(box).__name__)
+@pytest.mark.parametrize("box", [Domino(), Block(), Cube(), LoadedCube(), Lid()], ids=lambda box: type(box).__name__)
 def test_a_box_weighs_what_it_should_and_stands_on_the_middle_of_its_foot(box):
     model, data = alone(box)
     mujoco.mj_forward(model, data)
@@ -103,3 +104,35 @@ def test_a_cube_goes_along_with_a_lid_whose_friction_on_it_exceeds_what_holds_bo
         data.body("lid").xfrc_applied[0] = 0.2 * data.time  # [N], far more slowly than anything swings
         mujoco.mj_step(model, data)
     assert data.time < 3.0 and (data.body("cube").xpos[0] > 0.004) == goes_along
+
+
+@pytest.mark.parametrize(("beyond", "tips"), [(-0.001, False), (0.001, True)])
+def test_a_loaded_cube_tips_once_its_centre_of_mass_has_passed_the_edge(beyond, tips):
+    """15 mm from its middle, on a block 24 mm wide: the middle of the cube is 2 to 4 mm behind the edge then."""
+    cube, block = LoadedCube(edge=0.052, lean=0.29), Cube(edge=0.024, mass=0.2)
+    scene = table()
+    place(scene, block, "block", [0, 0, TABLE_TOP])
+    place(scene, cube, "cube", [block.edge / 2 + beyond - cube.com, 0, TABLE_TOP + block.edge])
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 500)
+    assert (data.body("cube").xmat[8] < math.cos(math.radians(20))) == tips
+
+
+def test_the_slug_of_a_loaded_cube_weighs_what_lead_weighs_and_fits_in():
+    cube = LoadedCube(edge=0.052, mass=0.05, lean=0.29)
+    assert cube.slug**3 * LEAD == pytest.approx(0.9 * 0.05)
+    assert cube.com / 0.9 + cube.slug / 2 < cube.edge / 2  # where its outer side is
+    assert cube.lean < cube.steepest
+    assert replace(cube, lean=cube.steepest).com / 0.9 + cube.slug / 2 == pytest.approx(cube.edge / 2)
+
+
+def test_a_loaded_cube_swings_about_an_edge_with_the_inertia_of_foam_and_slug():
+    """The parallel axis theorem, for two cubes: about an axis through the middle, across the load."""
+    cube = LoadedCube(edge=0.052, mass=0.05, lean=0.29)
+    foam, slug = 0.1 * 0.05, 0.9 * 0.05
+    about_the_middle = foam * cube.edge**2 / 6 + slug * (cube.slug**2 / 6 + (cube.com / 0.9) ** 2)
+    assert cube.inertia[2] + cube.mass * cube.com**2 == pytest.approx(about_the_middle)
+    model, _ = alone(cube)
+    assert model.body("box").inertia == pytest.approx(cube.inertia)
+    assert model.body("box").ipos == pytest.approx([cube.com, 0.0, cube.edge / 2])
