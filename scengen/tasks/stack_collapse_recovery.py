@@ -297,7 +297,7 @@ class StackCollapseRecovery(Scenario):
         """How many cubes come down, when, how far away and on which side; what the tower is like."""
         ways = [spot - self.feet[0] for blow in self.planned for spot in self.spots(blow)]
         return {
-            "blows": float(self.blows),
+            "number_of_blows": float(self.blows),
             "cubes_thrown_down": float(sum(len(self.struck(blow)) for blow in self.planned)),
             "time_of_the_first_blow": self.blow_0.when,
             "farthest": max(math.hypot(*way[:2]) for way in ways),
