@@ -22,7 +22,8 @@ from scengen import config
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, rotation
 from scengen.params import values, with_values
-from scengen.tasks.plate_shelf import ALONG, BREAKS, DEEP, LEAN, PlateShelf
+from scengen.tasks.plate_and_slot import ALONG, BREAKS, DEEP, LEAN
+from scengen.tasks.plate_shelf import PlateShelf
 from scengen.validate.rollout import replay
 
 TASK = config.task("plate_shelf_hetbi")

@@ -1,0 +1,180 @@
+"""What the two tasks with a plate and a shelf share (T05, T06): the scene, the goal, and how a held plate is put in.
+
+* A plate that falls faster than 0.35 m/s, as from 6 mm, breaks, and the episode is lost. No hand lowers anything faster
+  than 0.3 m/s. Speeds are looked at every 10 ms, in which a fall gains 0.1 m/s: from 10 mm on it is seen for certain.
+  The shelf is polished, so that a plate that is let go in the slot does fall.
+* In the slot means: on edge within 10 deg, along the slot, with its middle between the dividers and its rim on the
+  slot's floor, and let go. Leaning against the shelf from outside is not.
+"""
+
+import math
+
+import mujoco
+import numpy as np
+
+from ..assets.dish import Dish
+from ..assets.plate import Plate
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.slot_shelf import SlotShelf
+from ..control.loop import Loop
+from ..errors import GaveUp
+from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
+from ..predicates import fallen
+from ..scenario import Plan, Scenario
+from ..sim.world import ROBOT, Arm, World
+from ..skills import jaw
+from ..skills.motion import CLOSED, STEADY, Pace, closing_along, facing_down, go_to, retreat, steer, turn_to
+
+LEAN = math.radians(10.0)
+"""Largest angle between the plate's axis and the level, and between it and the slot's normal [rad]."""
+DEEP = 0.005
+"""Largest height of the rim's lowest point above the slot's floor [m]."""
+LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
+"""From the right arm to the left one."""
+BREAKS = 0.35
+"""Speed of a fall that the plate does not survive [m/s]."""
+AIR = 0.002
+"""Between the plate's foot and the divider as it goes down [m]."""
+ALONG = 0.03
+"""How far along the slot the plate may stand from its middle [m]: at an end a cup could pass the dividers outside."""
+DOWNWARDS, PATIENCE, FIRM = 0.05, 12.0, 2.0
+"""How fast the plate is lowered [m/s], when that is given up [s], and how much more than usual is asked of the hand
+against the friction of its joints: askew by 0.04 rad the plate has no room left in the slot."""
+OVER = 0.02
+"""Between the plate and the dividers before it is lowered [m]."""
+
+
+class PlateAndSlot(Scenario):
+    """A plate on the table and a shelf with a slot. Subclasses are dataclasses with these parameters."""
+
+    HOLD = 0.5
+
+    plate_x: float
+    plate_y: float
+    shelf_x: float
+    shelf_y: float
+    shelf_yaw: float
+    plate: Plate | Dish
+    gap: float
+    proud: float
+
+    # --- scene ----------------------------------------------------------------------------
+
+    def build(self) -> mujoco.MjSpec:
+        return self._scene(self.plate, self.shelf)
+
+    @property
+    def shelf(self) -> SlotShelf:
+        """The shelf, made to measure."""
+        return SlotShelf(gap=self.gap, height=2 * self.plate.radius - self.proud, base=0.012, chamfer=0.012)
+
+    def _scene(self, plate: Plate | Dish, shelf: SlotShelf) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, plate, "plate", self.start)
+        place(scene, shelf, "shelf", self.foot, math.radians(self.shelf_yaw), free=False)
+        return scene
+
+    # --- goal -----------------------------------------------------------------------------
+
+    def success(self, world: World) -> bool:
+        return not world.touching(ROBOT, "plate") and self.on_edge(world) and self.within(world)
+
+    def on_edge(self, world: World) -> bool:
+        """Whether the plate stands on edge, along the slot."""
+        normal, across = world.rot("plate")[:, 2], world.rot("shelf")[:, 0]
+        return bool(abs(normal[2]) < math.sin(LEAN) and abs(normal @ across) > math.cos(LEAN))
+
+    def within(self, world: World) -> bool:
+        """Whether the plate's middle is between the dividers and its rim on the slot's floor."""
+        place = world.rot("shelf").T @ (self.middle(world) - self.foot) - self.shelf.base * UP
+        between = abs(place[0]) < self.gap / 2 and abs(place[1]) < ALONG and place[2] < self.shelf.height
+        return bool(between and self.lowest(world) - self.foot[2] - self.shelf.base < DEEP)
+
+    def middle(self, world: World) -> Vec3:
+        """The plate's middle now, at half its height [m]."""
+        return world.pos("plate") + self.plate.height / 2 * world.rot("plate")[:, 2]
+
+    def lowest(self, world: World) -> float:
+        """Height of the rim's lowest point now [m]."""
+        normal = world.rot("plate")[:, 2]
+        faces = (world.pos("plate")[2] + h * normal[2] for h in (self.plate.rise, self.plate.height))
+        return float(min(faces) - self.plate.radius * math.sqrt(1.0 - min(1.0, normal[2] ** 2)))
+
+    def failure(self, world: World) -> str | None:
+        if fallen(world, "plate"):
+            return "the plate fell off the table"
+        return "the plate was dropped" if world.velocity("plate")[5] < -BREAKS else None
+
+    # --- from the hand into the slot --------------------------------------------------------
+
+    def put_on_edge(self, arm: Arm) -> Plan:
+        """Tip the hand down, so that the plate hangs under it, and then turn it: rolled first, it would swing."""
+        yield from turn_to(arm, facing_down(), 0.8)
+        yield from go_to(
+            arm, [*arm.hand[:2], self.foot[2] + self.shelf.top + 2 * self.plate.radius + OVER], pace=STEADY
+        )
+        yield from turn_to(arm, closing_along(arm, arm.world.rot("shelf")[:, 0]), 1.2)
+
+    def put_in(self, arm: Arm) -> Plan:
+        """Over the slot, along it, down until the rim is on the floor; let go."""
+        for pace in (STEADY, Pace(0.10, 0.008)):  # once more: what hangs in the pinch has swung
+            yield from self.bring(arm, pace)
+        yield from self.lower(arm)
+        yield from jaw.release(arm)
+        yield from retreat(arm)
+
+    def lower(self, arm: Arm) -> Plan:
+        """Lower the held plate until its rim is on the floor, in the middle of the slot and square with it.
+
+        Raises:
+            GaveUp: that took too long.
+        """
+        world, aim = arm.world, self.seat(arm.world) + (self.middle(arm.world) - self.foot)[2] * UP
+        end = world.time + PATIENCE
+        while self.lowest(world) - self.foot[2] - self.shelf.base > DEEP / 2:
+            if world.time > end:
+                raise GaveUp(f"the plate was not down after {PATIENCE:g} s")
+            aim = aim - DOWNWARDS * Loop.PERIOD * UP
+            turn = FIRM * between(np.eye(3), self.squared(world))
+            yield steer(arm, arm.hand + FIRM * (aim - self.middle(world)), -DOWNWARDS * UP, turn, CLOSED)
+
+    def bring(self, arm: Arm, pace: Pace) -> Plan:
+        """Take the held plate over its seat, its axis across the slot."""
+        world, turn = arm.world, self.squared(arm.world)
+        target = self.seat(world) + (self.shelf.top + self.plate.radius + OVER) * UP
+        com = target + turn @ (world.com("plate") - self.middle(world))
+        yield from jaw.carry(arm, "plate", com, turn @ world.rot("plate"), pace)
+
+    def squared(self, world: World) -> Mat3:
+        """The turn that brings the plate's axis across the slot."""
+        return shortest(world.rot("plate")[:, 2], self.across(world))
+
+    def across(self, world: World) -> Vec3:
+        """Across the slot, to the side that the plate's upper face is nearer to."""
+        across = world.rot("shelf")[:, 0]
+        return math.copysign(1.0, float(world.rot("plate")[:, 2] @ across)) * across
+
+    def seat(self, world: World) -> Vec3:
+        """Under the plate's middle in the slot [m]: with its foot at a divider there is room for fingers on its lip."""
+        return self.foot - (self.slack / 2 - AIR) * self.across(world)
+
+    # --- geometry -------------------------------------------------------------------------
+
+    @property
+    def slack(self) -> float:
+        """By how much the slot is wider than the plate is high [m]."""
+        return self.gap - self.plate.height
+
+    @property
+    def start(self) -> Vec3:
+        """Where the plate stands [m]."""
+        return np.array([self.plate_x, self.plate_y, TABLE_TOP])
+
+    @property
+    def foot(self) -> Vec3:
+        """Where the shelf stands [m]."""
+        return np.array([self.shelf_x, self.shelf_y, TABLE_TOP])
+
+    @property
+    def _outline(self) -> Outline:
+        return corners(self.foot, math.radians(self.shelf_yaw), (self.shelf.width, self.shelf.length))
