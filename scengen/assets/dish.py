@@ -25,7 +25,7 @@ class Dish(Turned):
     """Outer one."""
     rim: float = param(0.033, "m", 0.020, 0.045)
     """Width of the sloping part, along the ground."""
-    incline: float = param(20.0, "deg", 5.0, 35.0)
+    incline: float = param(20.0, "deg", 0.0, 35.0)
     """Of the rim to the level."""
     thickness: float = param(0.005, "m", 0.0015, 0.008)
     """Along the vertical, everywhere."""

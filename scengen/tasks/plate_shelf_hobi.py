@@ -1,105 +1,348 @@
-"""T05 plate-shelf-hobi."""
+r"""T05 plate-shelf-hobi: stand a plate on edge in the slot of a shelf, with two jaws.
+
+           press                 ___/ jaw
+             |               ___/  /
+             v           ___/     /          From the robot: the right arm presses the plate's rim to the table. The
+           _____     ___/                    plate turns about the edge of its foot, by the incline of its rim, and the
+    ------/_______\_/--------------------    other side comes up: there is room for the palm of the left hand.
+
+Bottleneck: no jaw takes the plate from the table, as the palm of a hand level with the rim would be under it. A second
+arm has to press it, has to go on until the first one holds the raised rim, and has to be gone before the plate is
+turned on edge. What is done wrong costs the episode: a plate that falls breaks.
+
+Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slot" and "slight incline":
+
+* The plate has a wide foot and a rim that rises by 12 mm: pressed down there it leans by the incline, 20 deg, and the
+  other side is 76 mm high. The rim that comes up has the incline twice, and so has the hand that takes it.
+* The plate is glazed. A hand over the table that grips the rim of a plate that lies flat is steeper than 60 deg. Two
+  pads hold a rim that slopes by s and is askew to them as long as the difference is less than twice the angle of
+  friction: they do at a friction of 0.6, and at 0.3 they slip off. A single finger under the rim does not lift it
+  either; it pushes the plate away.
+* Not where something stops the plate: pushed against the shelf, or so far to the table's edge that the palm finds room
+  beside it, one arm could lift the rim. A plate that is slid by 4 cm scratches the table, and the episode is lost.
+* The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get in
+  between the dividers with it. The dividers are lower than the plate, so that the fingers on its upper rim are free.
+* Which arm presses: the one that is farther from the shelf. In training that is the right one.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from ..assets.dish import Dish
-from ..assets.prop import TABLE_TOP
+from ..assets.prop import TABLE_HALF, TABLE_TOP
+from ..assets.slot_shelf import SlotShelf
+from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, corners, gap, rotation
 from ..params import param
 from ..physics import GRAVITY
+from ..predicates import displaced
 from ..robots import panda
 from ..robots.jaw import PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
 from ..skills.handover import OVERLAP, STAND_OFF, take_rim
-from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, hold, retreat, together, until
-from .plate_and_slot import AIR, LEFT, OVER, PlateAndSlot
+from ..skills.motion import (
+    CLOSED,
+    COARSE,
+    OPEN,
+    STEADY,
+    Pace,
+    alone,
+    facing_down,
+    go_to,
+    retreat,
+    together,
+    until,
+)
+from .plate_and_slot import AIR, LEAN, LEFT, OVER, PlateAndSlot
 
-UNDER_THE_PALM = 0.008
-PRESS_AT = 0.008
-PRESSING = Pace(0.04, 0.0)
-DEEPER = 0.008
+SLID, DOWN = 0.04, 0.003
+"""How far the plate may be slid [m], and how high over the table something still slides on it [m]."""
+PRESS_AT, PRESSED = 0.008, 0.96
+"""Where the rim is pressed, from its edge [m], and down to which share of its incline."""
+PRESSING, DEEPER = Pace(0.04, 0.0), 0.008
+"""How the rim is pressed, towards a place that is deeper than the fingers get [m]."""
+HARDEST = 10.0
+"""Force that a hand which holds its place gives without being pushed away [N]: by 10 mm (`control.osc.KP`)."""
+UNDER_THE_PALM, ASKEW = 0.005, math.radians(12.0)
+"""Air between palm and table [m], and how much steeper than the rim a hand may be for it [rad]: less than friction."""
+EDGE = 0.06
+"""How far from the table's edge a rim must stay [m], else a palm that passes the edge finds room for a grip."""
+HOLDS = 1.5
+"""How many times the plate's weight the friction of the pads must hold."""
+LIFT, SLOWLY = 0.25, Pace(0.10, 0.01)
+"""How high the plate is lifted before it is turned on edge [m], and how: it turns in the pinch."""
 ASIDE: Vec3 = np.array([-0.15, 0.35, TABLE_TOP + 0.35])
-LIFT = Pace(0.10, 0.01)
+"""Where the left hand is out of the way [m]; the right one at its mirror image."""
+ENDS = 0.02
+"""By how much the slot is longer than the plate at either end [m]: more than a finger tip."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlateShelfHobi(PlateAndSlot):
     """A plate on the table and a shelf with a slot."""
 
-    plate_x: float = param(-0.14, "m", -0.3, 0.2)
+    plate_x: float = param(-0.15, "m", -0.3, 0.2)
     plate_y: float = param(-0.03, "m", -0.35, 0.35)
     shelf_x: float = param(0.10, "m", -0.1, 0.3)
     shelf_y: float = param(0.05, "m", -0.3, 0.3)
     shelf_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
     plate: Dish = Dish()
     gap: float = param(0.036, "m", 0.02, 0.09)
+    """Width of the slot."""
     proud: float = param(0.04, "m", 0.0, 0.1)
+    """How far the plate stands out of the slot."""
+
+    @property
+    def shelf(self) -> SlotShelf:
+        return replace(super().shelf, length=2 * (self.plate.radius + ENDS))
+
+    def failure(self, world: World) -> str | None:
+        low = self.lowest(world) < TABLE_TOP + DOWN
+        slid = low and displaced(world, "plate", self.start) > SLID
+        return "the plate was slid" if slid else super().failure(world)
+
+    # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
+        """Press the rim with one arm, take the other side of it with the other one, put the plate in."""
+        presser, taker = self.roles(world)
+        yield from self.take(world)
+        yield from alone(presser, self.leave(presser))
+        yield from self.deliver(taker)
+
+    def take(self, world: World) -> Plan:
+        """Press the rim and take the side that comes up."""
         presser, taker = self.roles(world)
         yield from self.both(world, self.press(presser), self.wait_beside(taker))
         yield from take_rim(taker, lambda: self.rim(world), self.gripping(world))
-        yield from alone(presser, self.leave(presser))
-        yield from alone(taker, go_to(taker, taker.hand + 0.25 * UP, pace=LIFT))
-        yield from alone(taker, self.put_on_edge(taker))
-        yield from alone(taker, self.put_in(taker))
+
+    def deliver(self, arm: Arm) -> Plan:
+        """Lift the plate that is held by its rim, turn it on edge, put it in."""
+        yield from alone(arm, go_to(arm, arm.hand + LIFT * UP, pace=SLOWLY))
+        yield from alone(arm, self.put_on_edge(arm))
+        yield from alone(arm, self.put_in(arm))
 
     def roles(self, world: World) -> tuple[Arm, Arm]:
+        """The arm that presses and the one that takes the plate."""
         right, left = world.arms
         return (right, left) if self.side > 0 else (left, right)
 
-    def both(self, world, presser_plan, taker_plan) -> Plan:
-        plans = (presser_plan, taker_plan)
+    def both(self, world: World, pressing: Plan, taking: Plan) -> Plan:
+        """Plans of the two roles at once."""
+        plans = (pressing, taking)
         yield from together(world, *(plans if self.side > 0 else plans[::-1]))
 
-    @property
-    def side(self) -> float:
-        return math.copysign(1.0, self.shelf_y)
+    def press(self, arm: Arm) -> Plan:
+        """Press the rim to the table with closed fingers."""
+        world, at = arm.world, self.start - (self.plate.radius - PRESS_AT) * self.outside
+        yield from go_to(arm, at + (self.plate.height + TIP + 0.03) * UP, facing_down(), STEADY, CLOSED)
+        below = go_to(arm, at + (self.plate.thickness + TIP - DEEPER) * UP, facing_down(), PRESSING, CLOSED)
+        yield from until(below, lambda: self.tilt(world) > PRESSED * self.plate.slope)
 
-    def tilt(self, world) -> float:
+    def wait_beside(self, arm: Arm) -> Plan:
+        """Bring the open jaw beside the place where the rim is going to be."""
+        plate, hand = self.plate, self.hand(self.raised_tilt)
+        out = (plate.radius + plate.foot) * math.cos(plate.slope) + plate.rise * math.sin(plate.slope) - plate.foot
+        rim = self.start + out * self.outside + (plate.raised + plate.thickness / 2) * UP
+        yield from go_to(arm, rim - STAND_OFF * hand[:, 2], hand, STEADY, OPEN)
+
+    def leave(self, arm: Arm) -> Plan:
+        """Up, and out of the way."""
+        yield from retreat(arm, 0.10)
+        yield from go_to(arm, ASIDE * [1.0, -self.side, 1.0], pace=COARSE)
+
+    def hand(self, tilt: float) -> Mat3:
+        """A hand that points at the other arm, `tilt` below the level [rad], and closes up and down.
+
+        Of the two rolls it is the one with which an arm gets there; with the other one it runs into joint 6.
+        """
+        level = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -self.side], [-self.side, 0.0, 0.0]])
+        return rotation(np.array([self.side * tilt, 0.0, 0.0])) @ level
+
+    def gripping(self, world: World) -> Mat3:
+        """The hand along the rim as it lies now, or steeper where the table asks for it."""
+        return self.hand(max(self.plate.slope + self.tilt(world), self.raised_tilt))
+
+    def tilt(self, world: World) -> float:
+        """By how much the side of the plate that is taken comes up [rad]."""
         return math.asin(float(self.outwards(world) @ UP))
 
-    def outwards(self, world) -> Vec3:
-        normal, out = world.rot("plate")[:, 2], self.side * LEFT
-        along = out - (out @ normal) * normal
+    def outwards(self, world: World) -> Vec3:
+        """Unit vector in the plane of the plate, towards the side of it that is taken."""
+        normal = world.rot("plate")[:, 2]
+        along = self.outside - (self.outside @ normal) * normal
         return along / math.sqrt(along @ along)
 
-    def rim(self, world) -> Vec3:
+    def rim(self, world: World) -> Vec3:
+        """The outermost point on the side that is taken, at half the rim's thickness [m]."""
         middle = self.plate.rise + self.plate.thickness / 2
         return world.pos("plate") + middle * world.rot("plate")[:, 2] + self.plate.radius * self.outwards(world)
 
-    def press(self, arm: Arm) -> Plan:
-        world = arm.world
-        at = self.start - self.side * (self.plate.radius - PRESS_AT) * LEFT
-        down = facing_down()
-        yield from go_to(arm, at + (self.plate.height + TIP + 0.03) * UP, down, STEADY, CLOSED)
-        below = at + (self.plate.thickness + TIP - DEEPER) * UP
-        yield from until(go_to(arm, below, down, PRESSING, CLOSED), lambda: self.tilt(world) > 0.96 * self.plate.slope)
+    # --- what must not work ---------------------------------------------------------------
 
-    def wait_beside(self, arm: Arm) -> Plan:
-        hand = self.hand(2 * self.plate.slope)
-        slope = self.plate.slope
-        out = self.side * (self.plate.foot * (math.cos(slope) - 1)+ self.plate.radius * math.cos(slope)) * LEFT
-        rim = self.start + out + self.plate.raised * UP
-        yield from go_to(arm, rim - STAND_OFF * hand[:, 2], hand, STEADY, OPEN)
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "grip_it_flat": Shortcut(lambda world: self._grip_flat(world, self.flat_tilt)),
+            "grip_it_from_above": Shortcut(lambda world: self._grip_flat(world, math.pi / 2)),
+            "pry_it_up": Shortcut(self._pry),
+            "slide_it_to_the_edge": Shortcut(self._slide),
+            "let_it_fall_back": Shortcut(self._too_early),
+            "squeeze_it_between_the_hands": Shortcut(self._squeeze),
+            "insert_it_flat": Shortcut(self._insert_flat),
+        }
 
-    def hand(self, tilt: float) -> Mat3:
-        level = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -self.side], [-self.side, 0.0, 0.0]])
-        return rotation(np.array([self.side * tilt, 0, 0])) @ level
+    def _grip_flat(self, world: World, tilt: float) -> Plan:
+        """Take the rim of the plate as it lies, with one arm."""
+        _, taker = self.roles(world)
+        yield from take_rim(taker, lambda: self.rim(world), self.hand(tilt))
+        yield from self.deliver(taker)
 
-    def gripping(self, world) -> Mat3:
-        return self.hand(self.plate.slope + self.tilt(world))
+    def _pry(self, world: World) -> Plan:
+        """Put a finger under the rim, lift and level the hand, close."""
+        _, taker = self.roles(world)
+        hand = self.hand(self.flat_tilt)
+        yield from alone(taker, go_to(taker, self.rim(world) - STAND_OFF * hand[:, 2], hand, STEADY, OPEN))
+        for share in np.linspace(0.0, 1.0, 6):
+            tilt = (1.0 - share) * self.flat_tilt + share * self.raised_tilt
+            high = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
+            with suppress(GaveUp):
+                yield from alone(taker, go_to(taker, high, self.hand(tilt), Pace(0.06, 0.003, 2.0), OPEN))
+        yield from alone(taker, jaw.grasp(taker))
+        yield from self.deliver(taker)
 
-    def leave(self, arm: Arm) -> Plan:
-        yield from retreat(arm, 0.10)
-        yield from go_to(arm, ASIDE * [1, -self.side, 1], pace=COARSE)
+    def _slide(self, world: World) -> Plan:
+        """Push the plate to the side of the table with one arm, where there is room for its palm, and take it."""
+        _, taker = self.roles(world)
+        plate = self.plate
+        behind = self.start - (plate.radius + 0.03) * self.outside + (plate.rise + TIP) * UP
+        there = TABLE_HALF - 0.01 - plate.radius
 
-    def shortcuts(self): return {}
-    def ablations(self): return {}
+        def beyond() -> bool:
+            return float(world.pos("plate") @ self.outside) > there
+
+        yield from alone(taker, jaw.poke(taker, behind, 0.06 * self.outside, beyond, rot=facing_down()))
+        hand = self.hand(plate.slope)
+        away = self.rim(world) - 2 * STAND_OFF * hand[:, 2]
+        yield from alone(taker, go_to(taker, away + 0.15 * UP, hand, STEADY, OPEN))
+        yield from take_rim(taker, lambda: self.rim(world), hand)
+        yield from self.deliver(taker)
+
+    def _too_early(self, world: World) -> Plan:
+        """Press the rim, let go, and take the plate then."""
+        presser, taker = self.roles(world)
+        yield from self.both(world, self.press(presser), self.wait_beside(taker))
+        yield from alone(presser, self.leave(presser))
+        yield from self._grip_flat(world, self.flat_tilt)
+
+    def _squeeze(self, world: World) -> Plan:
+        """Lift the plate between the fingers of both hands, and lower it on the slot."""
+        half, above = self.plate.radius, self.foot + (self.shelf.top + 0.04) * UP
+        low = (self.plate.rise / 2 + TIP) * UP
+        stations = [(self.start + low, 0.04), (self.start + low, -0.01), (self.start + low + 0.3 * UP, -0.01)]
+        stations += [(above + 0.05 * UP, -0.01), (above, -0.01), (above, 0.03)]
+
+        def plan(arm: Arm, out: Vec3) -> Plan:
+            for middle, beside in stations:
+                with suppress(GaveUp):
+                    yield from go_to(arm, middle + (half + beside) * out, facing_down(), Pace(0.1, 0.003, 3.0), CLOSED)
+
+        presser, taker = self.roles(world)
+        yield from self.both(world, plan(presser, -self.outside), plan(taker, self.outside))
+
+    def _insert_flat(self, world: World) -> Plan:
+        """Take the plate as one should, and lower it on the slot without turning it on edge."""
+        presser, taker = self.roles(world)
+        yield from self.take(world)
+        yield from alone(presser, self.leave(presser))
+        yield from alone(taker, go_to(taker, taker.hand + LIFT * UP, self.hand(self.plate.slope), SLOWLY))
+        for above in (0.05, 0.01):
+            here = self.foot + (self.shelf.top + above) * UP - self.middle(world)
+            yield from alone(taker, go_to(taker, taker.hand + here, pace=SLOWLY))
+        yield from alone(taker, jaw.release(taker))
+        yield from alone(taker, go_to(taker, taker.hand + STAND_OFF * self.outside))
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        return {
+            "flat_plate": self._scene(replace(self.plate, incline=0.0), self.shelf),
+            "closed_slot": self._scene(self.plate, replace(self.shelf, gap=0.010)),
+        }
+
+    # --- what must hold -------------------------------------------------------------------
+
+    def constraints(self) -> Iterator[Refutation | None]:
+        plate, shelf, around = self.plate, self.shelf, corners(self.start, 0.0, 2 * [2 * self.plate.radius])
+        yield on_table("the plate", around, SLID)
+        yield on_table("the shelf", self._outline)
+        apart = gap(self._outline, around)
+        yield require(apart > SLID + 0.01, "the shelf stops a plate that is pushed", apart=apart)
+        aside = TABLE_HALF - abs(self.plate_y) - plate.radius - SLID
+        yield require(aside > EDGE, "there is room for a palm beside the table", aside=aside)
+        yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
+        lean = math.atan2(self.slack, shelf.height)
+        yield require(lean < 0.8 * LEAN, "the plate leans in the slot", lean=lean)
+        room = self.proud - OVERLAP - TIP
+        yield require(room > 0.0, "the fingers that hold the rim meet the dividers", room=room)
+        askew, slips = self.flat_tilt - plate.slope, 2 * math.atan(plate.friction)
+        yield require(askew > slips, "one jaw takes the plate from the table", askew=askew, slips=slips)
+        askew = self.raised_tilt - 2 * plate.slope
+        yield require(askew < ASKEW, "the palm of the hand that takes the raised rim meets the table", askew=askew)
+        force = GRAVITY * plate.mass * plate.foot / (plate.rim - PRESS_AT)
+        yield require(force < HARDEST, "no hand presses so hard", force=force)
+        grip, weight = plate.friction * pinch(plate.thickness), GRAVITY * plate.mass
+        yield require(grip > HOLDS * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
+        presser, taker = panda.bases(2)[:: int(self.side)]
+        yield within_reach("the rim", self.start - plate.radius * self.outside, base=presser)
+        yield within_reach("the slot", self.foot + (shelf.top + 2 * plate.radius + OVER) * UP, base=taker)
+
+    def features(self) -> Mapping[str, float]:
+        plate = self.plate
+        return {
+            "pressed_tilt": plate.slope,
+            "raised": plate.raised,
+            "askew": self.raised_tilt - 2 * plate.slope,
+            "droop": GRAVITY * plate.mass * (plate.radius - OVERLAP) / (pinch(plate.thickness) * PAD / 2),
+            "slack": self.slack,
+            "radius": plate.radius,
+            "carried": float(np.linalg.norm(self.foot - self.start)),
+            "slot_yaw": math.radians(self.shelf_yaw),
+            "taker": self.side,
+        }
+
+    # --- geometry of the hand over the rim --------------------------------------------------
+
+    @property
+    def side(self) -> float:
+        """On which side the plate is taken: 1 by the left arm, -1 by the right one. The shelf stands nearer to it."""
+        return math.copysign(1.0, self.shelf_y)
+
+    @property
+    def outside(self) -> Vec3:
+        """Level unit vector from the side that is pressed to the one that is taken."""
+        return self.side * LEFT
+
+    @property
+    def raised_tilt(self) -> float:
+        """Tilt of the hand that takes the raised rim [rad]: along it, or as steep as the table asks of the palm."""
+        height = self.plate.raised + self.plate.thickness / 2 - UNDER_THE_PALM
+        return max(2 * self.plate.slope, _steepness(height, PALM_ABOVE - OVERLAP))
+
+    @property
+    def flat_tilt(self) -> float:
+        """Least tilt of a hand whose finger tips hold the rim of the plate as it lies [rad]."""
+        return _steepness(self.plate.rise + self.plate.thickness / 2, PALM_ABOVE + TIP)
+
+
+def _steepness(height: float, before: float) -> float:
+    """Least tilt below the level at which the palm of a hand that closes up and down is over the table [rad].
+
+    With the rim `height` over the table [m], and `before` the palm's front [m], the palm's lower edge is at
+    height + before * sin(tilt) - PALM_ALONG * cos(tilt).
+    """
+    return math.atan2(PALM_ALONG, before) - math.asin(min(1.0, height / math.hypot(PALM_ALONG, before)))
