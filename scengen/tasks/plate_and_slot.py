@@ -113,7 +113,11 @@ class PlateAndSlot(Scenario):
         yield from go_to(
             arm, [*arm.hand[:2], self.foot[2] + self.shelf.top + 2 * self.plate.radius + OVER], pace=STEADY
         )
-        yield from turn_to(arm, closing_along(arm, arm.world.rot("shelf")[:, 0]), 1.2)
+        yield from turn_to(arm, self.edgewise(arm), 1.2)
+
+    def edgewise(self, arm: Arm) -> Mat3:
+        """The hand, which points down, with the plate in it across the slot: of two ways the nearer one."""
+        return closing_along(arm, arm.world.rot("shelf")[:, 0])
 
     def put_in(self, arm: Arm) -> Plan:
         """Over the slot, along it, down until the rim is on the floor; let go."""

@@ -37,7 +37,7 @@ from ..assets.dish import Dish
 from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, corners, gap, rotation
+from ..geometry import UP, Mat3, Vec3, about_z, corners, gap, polar, rotation
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import displaced
@@ -157,6 +157,15 @@ class PlateShelfHobi(PlateAndSlot):
         """Up, and out of the way."""
         yield from retreat(arm, 0.10)
         yield from go_to(arm, ASIDE * [1.0, -self.side, 1.0], pace=COARSE)
+
+    def edgewise(self, arm: Arm) -> Mat3:
+        """The hand with the plate's upper face towards the robot: the rim slopes, and so the hand looks away from it.
+
+        The other way round the arm would have to reach over the plate, as far as it goes.
+        """
+        world = arm.world
+        turn = math.remainder(polar(-world.rot("shelf")[:, 0])[0] - polar(world.rot("plate")[:, 2])[0], 2 * math.pi)
+        return about_z(turn) @ arm.hand_rot
 
     def hand(self, tilt: float) -> Mat3:
         """A hand that points at the other arm, `tilt` below the level [rad], and closes up and down.
