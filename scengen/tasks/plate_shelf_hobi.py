@@ -18,8 +18,9 @@ Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slo
   pads hold a rim that slopes by s and is askew to them as long as the difference is less than twice the angle of
   friction: they do at a friction of 0.6, and at 0.3 they slip off. A single finger under the rim does not lift it
   either; it pushes the plate away.
-* Not where something stops the plate: pushed against the shelf, or so far to the table's edge that the palm finds room
-  beside it, one arm could lift the rim. A plate that is slid by 4 cm scratches the table, and the episode is lost.
+* Where something stops the plate, or a palm finds room beside the table, one arm could lift the rim all the same. So a
+  plate that comes within 6 cm of the table's edge is lost, and so is one that knocks against the shelf: only a plate on
+  edge, over the slot, may touch it. Nor can it be laid down on the shelf, to be taken there by its rim.
 * The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get in
   between the dividers with it. The dividers are lower than the plate, so that the fingers on its upper rim are free.
 * Which arm presses: the one that is farther from the shelf. In training that is the right one.
@@ -36,17 +37,17 @@ import numpy as np
 from ..assets.dish import Dish
 from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
+from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, corners, gap, polar, rotation
+from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, rotation
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import displaced
 from ..robots import panda
-from ..robots.jaw import PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
+from ..robots.jaw import FINGER, PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
-from ..skills.handover import OVERLAP, STAND_OFF, take_rim
+from ..skills.handover import CLOSING, GENTLY, OVERLAP, STAND_OFF, take_rim
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -56,30 +57,37 @@ from ..skills.motion import (
     alone,
     facing_down,
     go_to,
+    push,
     retreat,
+    steer,
     together,
     until,
 )
 from .plate_and_slot import AIR, LEAN, LEFT, OVER, PlateAndSlot
 
-SLID, DOWN = 0.04, 0.003
-"""How far the plate may be slid [m], and how high over the table something still slides on it [m]."""
+EDGE, LOW = 0.06, 0.010
+"""How far from the table's edge the rim must stay [m], where a palm that passes the edge finds room for a grip, as long
+as it is not this much higher than that of a plate that lies on the table [m]."""
+ASTRAY = math.radians(30.0)
+"""By how much a plate that touches the shelf may be off the slot [rad]."""
 PRESS_AT, PRESSED = 0.008, 0.96
 """Where the rim is pressed, from its edge [m], and down to which share of its incline."""
 PRESSING, DEEPER = Pace(0.04, 0.0), 0.008
 """How the rim is pressed, towards a place that is deeper than the fingers get [m]."""
+SPARE = 0.015
+"""How far a plate that is pressed may move to either side [m]: by 4 mm, as it turns about its foot."""
 HARDEST = 10.0
 """Force that a hand which holds its place gives without being pushed away [N]: by 10 mm (`control.osc.KP`)."""
 UNDER_THE_PALM, ASKEW = 0.005, math.radians(12.0)
 """Air between palm and table [m], and how much steeper than the rim a hand may be for it [rad]: less than friction."""
-EDGE = 0.06
-"""How far from the table's edge a rim must stay [m], else a palm that passes the edge finds room for a grip."""
 HOLDS = 1.5
 """How many times the plate's weight the friction of the pads must hold."""
 LIFT, SLOWLY = 0.25, Pace(0.10, 0.01)
 """How high the plate is lifted before it is turned on edge [m], and how: it turns in the pinch."""
 ASIDE: Vec3 = np.array([-0.15, 0.35, TABLE_TOP + 0.35])
 """Where the left hand is out of the way [m]; the right one at its mirror image."""
+SQUEEZED = 0.02
+"""How much nearer to each other than the plate allows two hands are sent that squeeze it [m]."""
 ENDS = 0.02
 """By how much the slot is longer than the plate at either end [m]: more than a finger tip."""
 
@@ -104,9 +112,19 @@ class PlateShelfHobi(PlateAndSlot):
         return replace(super().shelf, length=2 * (self.plate.radius + ENDS))
 
     def failure(self, world: World) -> str | None:
-        low = self.lowest(world) < TABLE_TOP + DOWN
-        slid = low and displaced(world, "plate", self.start) > SLID
-        return "the plate was slid" if slid else super().failure(world)
+        low = self.lowest(world) < TABLE_TOP + self.plate.rise + LOW
+        if low and float(np.abs(self.middle(world)[:2]).max()) > TABLE_HALF - EDGE - self.plate.radius:
+            return "the plate was pushed to the table's edge"
+        if world.touching("plate", "shelf") and not self.over_slot(world):
+            return "the plate knocked against the shelf"
+        return super().failure(world)
+
+    def over_slot(self, world: World) -> bool:
+        """Whether the plate is about on edge, its middle over the slot or in it."""
+        across = world.rot("shelf")[:, 0]
+        beside = abs(float((self.middle(world) - self.foot) @ across))
+        upright = abs(float(world.rot("plate")[:, 2] @ across)) > math.cos(ASTRAY)
+        return upright and beside < self.gap / 2 + self.shelf.chamfer
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -208,9 +226,13 @@ class PlateShelfHobi(PlateAndSlot):
         }
 
     def _grip_flat(self, world: World, tilt: float) -> Plan:
-        """Take the rim of the plate as it lies, with one arm."""
+        """Take the rim of the plate as it lies, with one arm: as deep as the table lets the lower finger go."""
         _, taker = self.roles(world)
-        yield from take_rim(taker, lambda: self.rim(world), self.hand(tilt))
+        hand = self.hand(tilt)
+        yield from alone(taker, go_to(taker, self.rim(world) - STAND_OFF * hand[:, 2], hand, STEADY, OPEN))
+        with suppress(GaveUp):
+            yield from alone(taker, go_to(taker, self.rim(world) + OVERLAP * hand[:, 2], hand, GENTLY, OPEN))
+        yield from alone(taker, jaw.grasp(taker, CLOSING))
         yield from self.deliver(taker)
 
     def _pry(self, world: World) -> Plan:
@@ -223,21 +245,23 @@ class PlateShelfHobi(PlateAndSlot):
             high = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
             with suppress(GaveUp):
                 yield from alone(taker, go_to(taker, high, self.hand(tilt), Pace(0.06, 0.003, 2.0), OPEN))
-        yield from alone(taker, jaw.grasp(taker))
+        yield from alone(taker, jaw.grasp(taker, CLOSING))
         yield from self.deliver(taker)
 
     def _slide(self, world: World) -> Plan:
-        """Push the plate to the side of the table with one arm, where there is room for its palm, and take it."""
-        _, taker = self.roles(world)
-        plate = self.plate
+        """Push the plate beyond the side of the table, where there is room for a palm, and take it there."""
+        pusher, taker = self.roles(world)
+        plate, hand = self.plate, self.hand(self.plate.slope)
         behind = self.start - (plate.radius + 0.03) * self.outside + (plate.rise + TIP) * UP
-        there = TABLE_HALF - 0.01 - plate.radius
+        there = TABLE_HALF + 0.03 - plate.radius
 
-        def beyond() -> bool:
+        def arrived() -> bool:
             return float(world.pos("plate") @ self.outside) > there
 
-        yield from alone(taker, jaw.poke(taker, behind, 0.06 * self.outside, beyond, rot=facing_down()))
-        hand = self.hand(plate.slope)
+        yield from alone(pusher, go_to(pusher, behind + 0.1 * UP, facing_down(), STEADY, CLOSED))
+        yield from alone(pusher, go_to(pusher, behind, facing_down(), STEADY))
+        yield from alone(pusher, push(pusher, 0.06 * self.outside, arrived, give_up=8.0))
+        yield from alone(pusher, self.leave(pusher))
         away = self.rim(world) - 2 * STAND_OFF * hand[:, 2]
         yield from alone(taker, go_to(taker, away + 0.15 * UP, hand, STEADY, OPEN))
         yield from take_rim(taker, lambda: self.rim(world), hand)
@@ -251,19 +275,24 @@ class PlateShelfHobi(PlateAndSlot):
         yield from self._grip_flat(world, self.flat_tilt)
 
     def _squeeze(self, world: World) -> Plan:
-        """Lift the plate between the fingers of both hands, and lower it on the slot."""
-        half, above = self.plate.radius, self.foot + (self.shelf.top + 0.04) * UP
-        low = (self.plate.rise / 2 + TIP) * UP
-        stations = [(self.start + low, 0.04), (self.start + low, -0.01), (self.start + low + 0.3 * UP, -0.01)]
-        stations += [(above + 0.05 * UP, -0.01), (above, -0.01), (above, 0.03)]
+        """Lift the plate between the fingers of both hands, lower it on the slot, let go."""
+        pressing, taking = self.roles(world)
+        out, across = self.outside, facing_down(math.pi / 2)
+        low, high = self.start + (self.plate.rise / 2 + TIP) * UP, self.foot[2] + self.shelf.top + TIP
+        beside = (self.plate.radius + FINGER) * out
+        away = self.foot - self.start - self.foot[2] * UP + self.start[2] * UP
 
-        def plan(arm: Arm, out: Vec3) -> Plan:
-            for middle, beside in stations:
-                with suppress(GaveUp):
-                    yield from go_to(arm, middle + (half + beside) * out, facing_down(), Pace(0.1, 0.003, 3.0), CLOSED)
+        def go(arm: Arm, at: Vec3) -> Plan:
+            yield from go_to(arm, at, across, Pace(0.1, 0.005), CLOSED)
 
-        presser, taker = self.roles(world)
-        yield from self.both(world, plan(presser, -self.outside), plan(taker, self.outside))
+        for above, apart in ((0.1, 0.04), (0.0, 0.04), (0.0, 0.005)):
+            middle = low + above * UP
+            places = middle - beside - apart * out, middle + beside + apart * out
+            yield from self.both(world, go(pressing, places[0]), go(taking, places[1]))
+        for way in (0.0 * UP, (high - low[2] + 0.05) * UP, away, -0.045 * UP):
+            moves = _carry_between(pressing, out, way), _carry_between(taking, -out, way)
+            yield from self.both(world, *moves)
+        yield from self.both(world, go(pressing, pressing.hand - 0.04 * out), go(taking, taking.hand + 0.04 * out))
 
     def _insert_flat(self, world: World) -> Plan:
         """Take the plate as one should, and lower it on the slot without turning it on edge."""
@@ -287,12 +316,10 @@ class PlateShelfHobi(PlateAndSlot):
 
     def constraints(self) -> Iterator[Refutation | None]:
         plate, shelf, around = self.plate, self.shelf, corners(self.start, 0.0, 2 * [2 * self.plate.radius])
-        yield on_table("the plate", around, SLID)
+        yield on_table("the plate", around, EDGE + SPARE)
         yield on_table("the shelf", self._outline)
         apart = gap(self._outline, around)
-        yield require(apart > SLID + 0.01, "the shelf stops a plate that is pushed", apart=apart)
-        aside = TABLE_HALF - abs(self.plate_y) - plate.radius - SLID
-        yield require(aside > EDGE, "there is room for a palm beside the table", aside=aside)
+        yield require(apart > SPARE, "plate and shelf stand in each other's place", apart=apart)
         yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
         lean = math.atan2(self.slack, shelf.height)
         yield require(lean < 0.8 * LEAN, "the plate leans in the slot", lean=lean)
@@ -355,3 +382,13 @@ def _steepness(height: float, before: float) -> float:
     height + before * sin(tilt) - PALM_ALONG * cos(tilt).
     """
     return math.atan2(PALM_ALONG, before) - math.asin(min(1.0, height / math.hypot(PALM_ALONG, before)))
+
+
+def _carry_between(arm: Arm, inwards: Vec3, way: Vec3) -> Plan:
+    """Move a hand along a way [m] while it presses against what another hand holds from the other side."""
+    world, setpoint, rot = arm.world, arm.hand, arm.hand_rot
+    seconds = max(1.0, float(np.linalg.norm(way)) / 0.08)
+    end = world.time + seconds
+    while world.time < end:
+        setpoint = setpoint + Loop.PERIOD / seconds * way
+        yield steer(arm, setpoint + SQUEEZED * inwards, way / seconds, between(arm.hand_rot, rot), CLOSED)
