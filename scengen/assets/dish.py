@@ -21,7 +21,7 @@ class Dish(Turned):
     large dinner plates are 0.20, 0.22 and 0.25 m wide; 0.050 kg is moulded fibre.
     """
 
-    radius: float = param(0.110, "m", 0.080, 0.135)
+    radius: float = param(0.110, "m", 0.080, 0.130)
     """Outer one."""
     rim: float = param(0.033, "m", 0.020, 0.045)
     """Width of the sloping part, along the ground."""

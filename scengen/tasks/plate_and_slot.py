@@ -8,6 +8,7 @@
 """
 
 import math
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -37,9 +38,8 @@ AIR = 0.002
 """Between the plate's foot and the divider as it goes down [m]."""
 ALONG = 0.03
 """How far along the slot the plate may stand from its middle [m]: at an end a cup could pass the dividers outside."""
-DOWNWARDS, PATIENCE, FIRM = 0.05, 12.0, 2.0
-"""How fast the plate is lowered [m/s], when that is given up [s], and how much more than usual is asked of the hand
-against the friction of its joints: askew by 0.04 rad the plate has no room left in the slot."""
+DOWNWARDS, PATIENCE = 0.05, 12.0
+"""How fast the plate is lowered [m/s], and when that is given up [s]."""
 OVER = 0.02
 """Between the plate and the dividers before it is lowered [m]."""
 
@@ -48,6 +48,9 @@ class PlateAndSlot(Scenario):
     """A plate on the table and a shelf with a slot. Subclasses are dataclasses with these parameters."""
 
     HOLD = 0.5
+    FIRM: ClassVar[float] = 2.0
+    """How much more than usual is asked of the hand that lowers the plate, against the friction of its joints: askew by
+    0.04 rad the plate has no room left in the slot."""
 
     plate_x: float
     plate_y: float
@@ -139,8 +142,8 @@ class PlateAndSlot(Scenario):
             if world.time > end:
                 raise GaveUp(f"the plate was not down after {PATIENCE:g} s")
             aim = aim - DOWNWARDS * Loop.PERIOD * UP
-            turn = FIRM * between(np.eye(3), self.squared(world))
-            yield steer(arm, arm.hand + FIRM * (aim - self.middle(world)), -DOWNWARDS * UP, turn, CLOSED)
+            turn = self.FIRM * between(np.eye(3), self.squared(world))
+            yield steer(arm, arm.hand + self.FIRM * (aim - self.middle(world)), -DOWNWARDS * UP, turn, CLOSED)
 
     def bring(self, arm: Arm, pace: Pace) -> Plan:
         """Take the held plate over its seat, its axis across the slot."""

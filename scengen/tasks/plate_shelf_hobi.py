@@ -39,7 +39,7 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, rotation
+from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, rotation, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
@@ -47,7 +47,7 @@ from ..robots.jaw import FINGER, PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
-from ..skills.handover import CLOSING, GENTLY, OVERLAP, STAND_OFF, take_rim
+from ..skills.handover import CLOSING, OVERLAP, STAND_OFF, take_rim
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -63,7 +63,7 @@ from ..skills.motion import (
     together,
     until,
 )
-from .plate_and_slot import AIR, LEAN, LEFT, OVER, PlateAndSlot
+from .plate_and_slot import AIR, LEAN, LEFT, PlateAndSlot
 
 EDGE, LOW = 0.06, 0.010
 """How far from the table's edge the rim must stay [m], where a palm that passes the edge finds room for a grip, as long
@@ -86,6 +86,8 @@ LIFT, SLOWLY = 0.25, Pace(0.10, 0.01)
 """How high the plate is lifted before it is turned on edge [m], and how: it turns in the pinch."""
 ASIDE: Vec3 = np.array([-0.15, 0.35, TABLE_TOP + 0.35])
 """Where the left hand is out of the way [m]; the right one at its mirror image."""
+PROBING = Pace(0.06, 0.003, 1.5)
+"""How a single hand tries to get hold of the rim."""
 SQUEEZED = 0.02
 """How much nearer to each other than the plate allows two hands are sent that squeeze it [m]."""
 ENDS = 0.02
@@ -95,6 +97,8 @@ ENDS = 0.02
 @dataclass(frozen=True, kw_only=True)
 class PlateShelfHobi(PlateAndSlot):
     """A plate on the table and a shelf with a slot."""
+
+    FIRM = 1.0  # the slot leaves more room; a thin plate would swing in the pinch, until it falls
 
     plate_x: float = param(-0.15, "m", -0.3, 0.2)
     plate_y: float = param(-0.03, "m", -0.35, 0.35)
@@ -177,13 +181,14 @@ class PlateShelfHobi(PlateAndSlot):
         yield from go_to(arm, ASIDE * [1.0, -self.side, 1.0], pace=COARSE)
 
     def edgewise(self, arm: Arm) -> Mat3:
-        """The hand with the plate's upper face towards the robot: the rim slopes, and so the hand looks away from it.
+        """The hand with the plate upright, its upper face towards the robot: as the rim slopes, the hand looks away.
 
-        The other way round the arm would have to reach over the plate, as far as it goes.
+        The other way round the arm would have to reach over the plate, as far as it goes. Turned upright only on the
+        way to the slot, which is quicker, a thin plate slips out of the pinch.
         """
-        world = arm.world
-        turn = math.remainder(polar(-world.rot("shelf")[:, 0])[0] - polar(world.rot("plate")[:, 2])[0], 2 * math.pi)
-        return about_z(turn) @ arm.hand_rot
+        across, normal = -arm.world.rot("shelf")[:, 0], arm.world.rot("plate")[:, 2]
+        turn = about_z(math.remainder(polar(across)[0] - polar(normal)[0], 2 * math.pi))
+        return shortest(turn @ normal, across) @ turn @ arm.hand_rot
 
     def hand(self, tilt: float) -> Mat3:
         """A hand that points at the other arm, `tilt` below the level [rad], and closes up and down.
@@ -231,9 +236,8 @@ class PlateShelfHobi(PlateAndSlot):
         hand = self.hand(tilt)
         yield from alone(taker, go_to(taker, self.rim(world) - STAND_OFF * hand[:, 2], hand, STEADY, OPEN))
         with suppress(GaveUp):
-            yield from alone(taker, go_to(taker, self.rim(world) + OVERLAP * hand[:, 2], hand, GENTLY, OPEN))
-        yield from alone(taker, jaw.grasp(taker, CLOSING))
-        yield from self.deliver(taker)
+            yield from alone(taker, go_to(taker, self.rim(world) + OVERLAP * hand[:, 2], hand, PROBING, OPEN))
+        yield from self._go_on_with(taker)
 
     def _pry(self, world: World) -> Plan:
         """Put a finger under the rim, lift and level the hand, close."""
@@ -244,9 +248,15 @@ class PlateShelfHobi(PlateAndSlot):
             tilt = (1.0 - share) * self.flat_tilt + share * self.raised_tilt
             high = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
             with suppress(GaveUp):
-                yield from alone(taker, go_to(taker, high, self.hand(tilt), Pace(0.06, 0.003, 2.0), OPEN))
-        yield from alone(taker, jaw.grasp(taker, CLOSING))
-        yield from self.deliver(taker)
+                yield from alone(taker, go_to(taker, high, self.hand(tilt), PROBING, OPEN))
+        yield from self._go_on_with(taker)
+
+    def _go_on_with(self, arm: Arm) -> Plan:
+        """Close the jaw and lift; what it then holds, put in."""
+        yield from alone(arm, jaw.grasp(arm, CLOSING))
+        yield from alone(arm, retreat(arm, 0.05, SLOWLY))
+        if arm.world.touching(arm.label, "plate"):
+            yield from self.deliver(arm)
 
     def _slide(self, world: World) -> Plan:
         """Push the plate beyond the side of the table, where there is room for a palm, and take it there."""
@@ -333,9 +343,8 @@ class PlateShelfHobi(PlateAndSlot):
         yield require(force < HARDEST, "no hand presses so hard", force=force)
         grip, weight = plate.friction * pinch(plate.thickness), GRAVITY * plate.mass
         yield require(grip > HOLDS * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
-        presser, taker = panda.bases(2)[:: int(self.side)]
+        presser = panda.bases(2)[0 if self.side > 0 else 1]
         yield within_reach("the rim", self.start - plate.radius * self.outside, base=presser)
-        yield within_reach("the slot", self.foot + (shelf.top + 2 * plate.radius + OVER) * UP, base=taker)
 
     def features(self) -> Mapping[str, float]:
         plate = self.plate
