@@ -1,10 +1,10 @@
 r"""T05 plate-shelf-hobi: stand a plate on edge in the slot of a shelf, with two jaws.
 
-           press                 ___/ jaw
-             |               ___/  /
-             v           ___/     /          From the robot: the right arm presses the plate's rim to the table. The
-           _____     ___/                    plate turns about the edge of its foot, by the incline of its rim, and the
-    ------/_______\_/--------------------    other side comes up: there is room for the palm of the left hand.
+       jaw \
+            \__                   press    From the robot: the right arm presses the rim to the table. The plate turns
+                \___                |      about the edge of its foot, by the incline of its rim. The other side comes
+                     \___           v      up, and makes room for the palm of the left hand. The shelf stands behind.
+    ----------------------\________/----
 
 Bottleneck: no jaw takes the plate from the table, as the palm of a hand level with the rim would be under it. A second
 arm has to press it, has to go on until the first one holds the raised rim, and has to be gone before the plate is
