@@ -3,6 +3,7 @@
 import base64
 import io
 import itertools
+import math
 import os
 import sys
 from collections import defaultdict
@@ -100,7 +101,7 @@ MARGIN = 1.12
 CLOSEST = 0.55
 """It does not come closer than this [m], or one could not tell where on the table things are."""
 FALLEN = 0.1
-"""What is so far below the table top is not followed [m]."""
+"""What is so far below the table top is not followed [m], unless something stands fast down there."""
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 """Of the corners of a box, shape (8, 3)."""
 INSIDE = 0.8
@@ -155,7 +156,7 @@ def clearest(world: World, aspect: float, states: Sequence[State] = ()) -> MjvCa
     """
     held = [_corners(world) if number == 0 else _things(world) for number, _ in enumerate(_visited(world, states))]
     points = np.vstack(held)
-    points = points[points[:, 2] > TABLE_TOP - FALLEN]
+    points = points[points[:, 2] > min(TABLE_TOP - FALLEN, _foot(world))]
     views = [fitted(world, aspect, *where, points) for where in VIEWS]
     shown = np.array([[_shown(world, view) for view in views] for _ in _visited(world, states)]).mean(axis=0)
     best = int(shown.argmax())
@@ -214,6 +215,12 @@ def _corners(world: World) -> NDArray[np.float64]:
 def _things(world: World) -> NDArray[np.float64]:
     """The same without the hand."""
     return np.vstack([_box(world, geom) for geom in _geoms(world)])
+
+
+def _foot(world: World) -> float:
+    """A little below everything that stands fast in the scene [m]; inf if nothing does."""
+    fast = [geom for geom in _geoms(world) if world.model.body_weldid[world.model.geom_bodyid[geom]] == 0]
+    return min((float(_box(world, geom)[:, 2].min()) for geom in fast), default=math.inf) - 0.001
 
 
 def _geoms(world: World) -> list[int]:

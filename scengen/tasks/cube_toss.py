@@ -36,12 +36,13 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..assets.bin import Bin
 from ..assets.box import Cube
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, heading, quat, rotation
+from ..geometry import UP, Vec3, axes, heading, quat, rotation
 from ..params import param
 from ..physics import flight
 from ..predicates import seated, still
@@ -79,6 +80,13 @@ STILL = 0.02
 """Speed below which the cube counts as at rest [m/s]."""
 STRETCHED = 0.92
 """How far from its axis the arm is stretched for a drop [m]; farther out it trembles."""
+EYES = {"agentview": (2.0, 0.0, 1.9), "sideview": (1.9, 0.5, 2.1)}
+"""Where two of the arena's cameras stand, so that they see the floor on both sides of the table [m]. Elsewhere they see
+the table alone."""
+MIDDLE: Vec3 = np.array([0.1, 0.0, 0.45])
+"""What they look at [m]."""
+YELLOW = (0.95, 0.75, 0.20, 1.0)
+"""Of the tray, on a grey floor."""
 
 Opens = Callable[[float, float, float], bool]
 """Whether to open the jaw, asked with what is missing to the middle of the tray along the swing and across it [m], and
@@ -116,6 +124,9 @@ class CubeToss(Scenario):
             post = scene.worldbody.add_body(name="post", pos=self.spot - half * UP)
             solid(post, "post", [0.03, 0.03, half], rgba=self.tray.rgba)
         place(scene, self.tray, "tray", self.spot, math.radians(self.bearing + self.turn), free=False)
+        for name, eye in EYES.items():
+            camera = scene.camera(name)
+            camera.pos, camera.quat = eye, _towards(MIDDLE - np.array(eye))
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -287,7 +298,8 @@ class CubeToss(Scenario):
     @property
     def tray(self) -> Bin:
         """Lined, so that the cube does not slide; its floor is thicker than the cube comes in a time step."""
-        return Bin(width=self.opening, length=self.opening, depth=0.06, wall=0.010, floor=0.020, friction=1.0)
+        side = self.opening
+        return Bin(width=side, length=side, depth=0.06, wall=0.010, floor=0.020, friction=1.0, rgba=YELLOW)
 
     @property
     def spot(self) -> Vec3:
@@ -298,3 +310,11 @@ class CubeToss(Scenario):
     def start(self) -> Vec3:
         """Where the cube lies [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
+
+
+def _towards(ahead: Vec3) -> NDArray[np.float64]:
+    """Orientation (wxyz) of an upright camera that looks along a direction: down its own -z, its x to the right."""
+    back, turn = -ahead / np.linalg.norm(ahead), np.empty(4)
+    right = np.cross(UP, back)
+    mujoco.mju_mat2Quat(turn, axes(right / np.linalg.norm(right), back).ravel())
+    return turn
