@@ -1,0 +1,36 @@
+"""Peg: a square bar that stands on one end."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import Vec3
+from ..params import param
+from .box import Box
+from .prop import Rgba, show
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peg(Box):
+    """Stands along z. The paper gives no lengths and no mass: this one is of beech that has been bored out,
+    1100 kg/m^3 at the nominal numbers, and its width leaves the jaw 26 mm of air on either side."""
+
+    width: float = param(0.024, "m", 0.012, 0.04)
+    length: float = param(0.120, "m", 0.06, 0.20)
+    mass: float = param(0.080, "kg", 0.01, 0.3, hidden=True)
+    friction: float = param(0.6, "1", 0.05, 1.5, hidden=True)
+    rgba: Rgba = (0.80, 0.20, 0.15, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.width, self.width, self.length])
+
+    @property
+    def tipping_angle(self) -> float:
+        """Tilt at which the centre of mass passes over an edge of the foot [rad]."""
+        return math.atan2(self.width, self.length)
+
+
+if __name__ == "__main__":
+    show(Peg())
