@@ -1,4 +1,4 @@
-"""Peg: a square bar that stands on one end."""
+"""Peg: a square bar that stands on one end, and the plinth under it."""
 
 import math
 from dataclasses import dataclass
@@ -32,5 +32,21 @@ class Peg(Box):
         return math.atan2(self.width, self.length)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Plinth(Box):
+    """What a peg stands on, so that a level hand can take it near its foot: a square block, screwed down."""
+
+    width: float = param(0.030, "m", 0.01, 0.10)
+    height: float = param(0.030, "m", 0.005, 0.10)
+    mass: float = param(0.020, "kg", 0.001, 1.0)
+    friction: float = param(0.6, "1", 0.05, 1.5)
+    rgba: Rgba = (0.45, 0.33, 0.22, 1.0)
+
+    @property
+    def size(self) -> Vec3:
+        return np.array([self.width, self.width, self.height])
+
+
 if __name__ == "__main__":
-    show(Peg())
+    for box in (Peg(), Plinth()):
+        show(box)

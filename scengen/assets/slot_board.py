@@ -24,7 +24,14 @@ from scipy.optimize import brentq
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, shown, solid, table
 
-MESH = mujoco.mjtGeom.mjGEOM_MESH
+PLATE = 0.012
+"""Thickness of the front and of the back plate [m]."""
+INNER = 0.002
+"""Chamfer of the back window [m]."""
+SHELL = 0.004
+"""Thickness of the sides [m]."""
+DENSITY = 700.0
+"""Of beech [kg/m^3]."""
 LIFT = 0.002
 """Height of the lowest face above the ground [m]: nothing rubs."""
 ARM, PIN = 0.006, 0.012
@@ -42,7 +49,7 @@ class SlotBoard(Prop):
 
     slot: float = param(0.030, "m", 0.012, 0.06)
     """Width and height of the slot."""
-    depth: float = param(0.080, "m", 0.02, 0.12)
+    depth: float = param(0.070, "m", 0.02, 0.12)
     """Length of the slot, along x."""
     centre: float = param(0.070, "m", 0.04, 0.15)
     """Height of the slot's axis above the ground."""
@@ -50,10 +57,9 @@ class SlotBoard(Prop):
     """Thickness of what is above the slot. So thin that the palm of a hand that points down passes over it."""
     width: float = param(0.120, "m", 0.05, 0.30)
     """Along y."""
-    chamfer: float = param(0.004, "m", 0.0, 0.006)
+    chamfer: float = param(0.004, "m", 0.0, 0.0075)
     pivot: float = param(0.100, "m", -0.10, 0.20)
     """How far the pin is behind the mouth; negative before it."""
-    mass: float = param(0.40, "kg", 0.05, 2.0)
     friction: float = param(0.2, "1", 0.02, 1.5, hidden=True)
     """Of waxed wood, whatever touches it."""
     plugged: bool = False
@@ -66,52 +72,62 @@ class SlotBoard(Prop):
         return self.centre + self.slot / 2 + self.roof
 
     def steepest(self, width: float) -> float:
-        """Largest angle to the slot's axis at which a bar of a width [m] passes through it [rad]; 0 if it never fits."""
+        """Largest angle to the slot's axis at which a bar of a width [m] passes through [rad]; 0 if it never fits."""
         if width >= self.slot:
             return 0.0
         spare = lambda angle: self.slot - width * math.cos(angle) - self.depth * math.sin(angle)  # noqa: E731
         return float(brentq(spare, 0.0, math.pi / 2 - 1e-9)) if spare(math.pi / 2 - 1e-9) < 0.0 else math.pi / 2
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        body.add_joint(name="hinge", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1], damping=DAMPING, armature=ARMATURE)
-        half, side, end, cut = self.slot / 2, self.width / 2, self.slot / 2 + self.chamfer, self.chamfer
-        low, high = self.centre - half, self.centre + half
-        for name, sign in (("left", 1.0), ("right", -1.0)):
-            outline = self._wall(sign * half, sign * side, sign * cut)
-            self._piece(body, spec, name, [(x, y, z) for x, y in outline for z in (LIFT, self.top)])
-        for name, outline in (
-            ("bottom", self._wall(low, LIFT, -cut)),
-            ("roof", self._wall(high, self.top, min(cut, self.roof / 2))),
-        ):
-            self._piece(body, spec, name, [(x, y, z) for x, z in outline for y in (-end, end)])
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
+        body.add_joint(name="hinge", type=hinge, axis=[0, 0, 1], damping=DAMPING, armature=ARMATURE)
+        front, back, half = -self.pivot, self.depth - self.pivot, self.width / 2
+        self._window(body, spec, "front", front, self.chamfer)
+        self._window(body, spec, "back", back - PLATE, INNER)
+        middle, long = (front + back) / 2, self.depth / 2 - PLATE
+        for name, side in (("left", 1.0), ("right", -1.0)):
+            at = [middle, side * (half - SHELL / 2), (LIFT + self.top) / 2]
+            self._solid(body, f"side_{name}", [long, SHELL / 2, (self.top - LIFT) / 2], at)
+        thick = self.roof / 4
+        self._solid(body, "top", [long, half - SHELL, thick], [middle, 0.0, self.top - thick])
         if self.plugged:
-            self._solid(body, "plug", [self.depth / 2, half, half], [self.depth / 2 - self.pivot, 0.0, self.centre])
-        reach = abs(self.depth / 2 - self.pivot)
-        shown(body, "arm", STEEL, size=[reach / 2, PIN, ARM / 2], pos=[(self.depth / 2 - self.pivot) / 2, 0, LIFT + ARM / 2])
+            self._solid(body, "plug", [self.depth / 2, self.slot / 2, self.slot / 2], [middle, 0.0, self.centre])
+        arm = [middle / 2, 0.0, LIFT + ARM / 2]
+        shown(body, "arm", STEEL, size=[abs(middle) / 2, PIN, ARM / 2], pos=arm)
         cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
         shown(body, "pin", STEEL, type=cylinder, size=[PIN, ARM, 0.0], pos=[0, 0, LIFT + ARM])
 
-    def _wall(self, inner: float, outer: float, cut: float) -> list[tuple[float, float]]:
-        """Profile of a wall: x, and y or z from the slot to the outside, chamfered at the mouth [m]."""
-        front, back = -self.pivot, self.depth - self.pivot
-        return [(back, inner), (back, outer), (front, outer), (front, inner + cut), (front + abs(cut), inner)]
+    def _window(self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, front: float, cut: float) -> None:
+        """A plate with a square window: four convex walls, chamfered in front."""
+        half, side, end = self.slot / 2, self.width / 2, self.slot / 2 + cut
+        low, high = self.centre - half, self.centre + half
 
-    def _piece(
-        self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, corners: Sequence[tuple[float, float, float]]
-    ) -> None:
+        def profile(inner: float, outer: float) -> list[tuple[float, float]]:
+            """Of a wall: x, and y or z from the window to the outside [m]."""
+            off, back = math.copysign(cut, outer - inner), front + PLATE
+            return [(back, inner), (back, outer), (front, outer), (front, inner + off), (front + cut, inner)]
+
+        for wall, sign in (("left", 1.0), ("right", -1.0)):
+            corners = [(x, y, z) for x, y in profile(sign * half, sign * side) for z in (LIFT, self.top)]
+            self._mesh(body, spec, f"{name}_{wall}", corners)
+        for wall, inner, outer in (("bottom", low, LIFT), ("roof", high, self.top)):
+            corners = [(x, y, z) for x, z in profile(inner, outer) for y in (-end, end)]
+            self._mesh(body, spec, f"{name}_{wall}", corners)
+
+    def _mesh(self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, corners: Sequence[Sequence[float]]) -> None:
         spec.add_mesh(name=name, uservert=np.array(corners).ravel().tolist())
-        self._solid(body, name, (), (), MESH).meshname = name
+        self._solid(body, name, (), type=mujoco.mjtGeom.mjGEOM_MESH).meshname = name
 
     def _solid(
         self,
         body: mujoco.MjsBody,
         name: str,
         size: Sequence[float],
-        pos: Sequence[float],
+        pos: Sequence[float] = (0.0, 0.0, 0.0),
         type: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_BOX,
     ) -> mujoco.MjsGeom:
         look = {"friction": self.friction, "rgba": self.rgba, "priority": PRIORITY + 1}
-        return solid(body, name, size, pos or (0.0, 0.0, 0.0), type=type, mass=self.mass / 4, **look)
+        return solid(body, name, size, pos, type=type, density=DENSITY, **look)
 
 
 if __name__ == "__main__":
