@@ -260,7 +260,6 @@ class RecoverPegInsert(Scenario):
         return {
             "ignore_the_turn": Shortcut(lambda world: self._aim(world, 0.0, 0.0), to_rest=True),
             "shift_without_turning": Shortcut(lambda world: self._aim(world, 1.0, 0.0), to_rest=True),
-            "turn_without_shifting": Shortcut(lambda world: self._aim(world, 0.0, 1.0), to_rest=True),
             "turn_the_wrong_way": Shortcut(lambda world: self._aim(world, -1.0, -1.0)),
             "let_go_half_way": Shortcut(self._let_go),
             "put_it_there_upright": Shortcut(self._upright),
@@ -290,10 +289,11 @@ class RecoverPegInsert(Scenario):
     def _upright(self, world: World) -> Plan:
         """As if the slot were a place to put it: against the mouth as it stands, let go."""
         yield from self.take(world)
-        arm, (rot, mouth) = world.arm, self.slot(world)
-        yield from go_to(arm, mouth + arm.hand - world.com("peg") - 0.06 * rot[:, 0] + 0.03 * UP)
-        yield from push(arm, ENTERING * rot[:, 0], lambda: world.touching("peg", "board"))
-        yield from release(arm)
+        rot, mouth = self.slot(world)
+        held = world.arm.hand - world.com("peg")
+        yield from go_to(world.arm, mouth + held - 0.02 * rot[:, 0] + 0.03 * UP, pace=COARSE)
+        yield from release(world.arm)
+        yield from retreat(world.arm, 0.05)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_slot": self._scene(replace(self.board, plugged=True))}
