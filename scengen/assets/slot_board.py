@@ -1,16 +1,19 @@
 """A board with a level square slot right through it, on an arm that a servo turns about a pin behind it.
 
-          pin                     seen from above; x leads from the mouth through the slot,
-           o                      the origin is the pin's foot
-          | |  arm
-      ____|_|____
-     |    | |    |
-     |    | |    |  depth         the mouth is chamfered on all four sides
-     |____/ \\____|
-         mouth
+            o  pin
+            |  arm                   seen from above; x leads from the mouth through the slot,
+      ___   |   ___                  the origin is the foot of the pin
+     |   ---'---   |
+     |____     ____|  back window
+     |             |
+     |             |  depth          hollow between the windows, open below, covered above;
+     |____     ____|                 both windows are chamfered in front, on all four sides
+     |____\\   //____|  front window
+           mouth
 
-What is w wide fits a slot of the width W and the depth D, turned by psi against its axis and all the way through, if
-w cos psi + D sin psi <= W: a rectangle in a strip.
+A bar of the width w, turned by psi, passes two windows of the width W whose farthest edges are D apart if it is no
+wider than the strip of that direction between them, w <= W cos psi - D sin psi. What is turned farther comes through
+the first one and meets the second plate. In a channel instead the walls would square what the arm lets turn.
 """
 
 import math
@@ -19,7 +22,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
 
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, shown, solid, table
@@ -45,12 +47,12 @@ STEEL: Rgba = (0.30, 0.32, 0.36, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class SlotBoard(Prop):
-    """Four convex walls around a slot, whose chamfered mouth is wider by `chamfer` on each side."""
+    """Two plates with a window each, the mouth wider by `chamfer` on every side. The paper gives no sizes."""
 
     slot: float = param(0.030, "m", 0.012, 0.06)
     """Width and height of the slot."""
-    depth: float = param(0.070, "m", 0.02, 0.12)
-    """Length of the slot, along x."""
+    depth: float = param(0.070, "m", 0.03, 0.12)
+    """From the mouth to the back, along x."""
     centre: float = param(0.070, "m", 0.04, 0.15)
     """Height of the slot's axis above the ground."""
     roof: float = param(0.008, "m", 0.004, 0.03)
@@ -58,6 +60,7 @@ class SlotBoard(Prop):
     width: float = param(0.120, "m", 0.05, 0.30)
     """Along y."""
     chamfer: float = param(0.004, "m", 0.0, 0.0075)
+    """Of the front window, at 45 deg."""
     pivot: float = param(0.100, "m", -0.10, 0.20)
     """How far the pin is behind the mouth; negative before it."""
     friction: float = param(0.2, "1", 0.02, 1.5, hidden=True)
@@ -73,10 +76,9 @@ class SlotBoard(Prop):
 
     def steepest(self, width: float) -> float:
         """Largest angle to the slot's axis at which a bar of a width [m] passes through [rad]; 0 if it never fits."""
-        if width >= self.slot:
-            return 0.0
-        spare = lambda angle: self.slot - width * math.cos(angle) - self.depth * math.sin(angle)  # noqa: E731
-        return float(brentq(spare, 0.0, math.pi / 2 - 1e-9)) if spare(math.pi / 2 - 1e-9) < 0.0 else math.pi / 2
+        long = self.depth - self.chamfer
+        diagonal = math.hypot(self.slot, long)
+        return max(0.0, math.acos(min(1.0, width / diagonal)) - math.atan2(long, self.slot))
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         hinge = mujoco.mjtJoint.mjJNT_HINGE
