@@ -54,10 +54,9 @@ APART = 0.10
 """From that place to any way on which the ball comes by before, at least [m]."""
 AFTER, BEFORE = 0.10, 0.15
 """How long after a bounce and before the next one it can be taken [s]."""
-CORNER = 2.5
-"""How far from a corner, and from the end of a wall, it must meet that wall, in radii."""
-PASSED = 0.020
-"""How far a ball has rolled on that fingers do not get hold of any more [m]."""
+ENDS = 2.0
+"""How far from the end of a wall it must meet that wall or pass it before it is caught, in radii. In a corner two walls
+throw it back one after the other, or at once: each takes its own part of the velocity."""
 MIRRORED = 0.03
 """How far beside the place of a mirror image the ball must pass, so that the hand misses it [m]."""
 SLOWEST = 0.05
@@ -208,15 +207,15 @@ class BounceIntercept(LaunchedBall):
         yield require(seen[0] < -self.ball.radius, "the ball starts between the walls", inside=seen[0])
         ways = self._foreseen()
         yield require(len(ways) > 1, "the ball meets no wall")
-        nearest = min(*(self._from_ends(way.at) for way in ways[1:]), *map(self._beside_ends, ways))
-        near = CORNER * self.ball.radius
-        near_end = "the ball meets a corner, or the end of a wall"
-        yield require(nearest >= near, near_end, nearest=max(nearest, -1.0), near=near)
         slowest = min(float(np.linalg.norm(way.velocity)) for way in ways)
         yield require(slowest > SLOWEST, "the ball comes back too slowly", speed=slowest)
         met = self.met(ways, READY, spare=2.5 * SPARE)
         late = "the hand comes too late to every place on the ball's way"
         yield require(met is not None, late, speed=self.speed, hand=HAND_SPEED)
+        until = [way for way in ways if way.begins < (met[1] if met else math.inf)]
+        nearest = min(*(float(self._seen(way.at)[0]) for way in until[1:]), *map(self._beside_ends, until))
+        near = ENDS * self.ball.radius
+        yield require(nearest >= near, "the ball meets the end of a wall", nearest=max(nearest, -1.0), near=near)
 
     def features(self) -> Mapping[str, float]:
         """The ball's speed before and after its walls as a share of the hand's, how far the wall turns its way off the
@@ -321,16 +320,10 @@ class BounceIntercept(LaunchedBall):
         beside = math.hypot(max(0.0, -seen[0]), wall.width / 2 - abs(seen[1]))
         return min(beside, wall.depth - seen[0])
 
-    def _from_ends(self, at: Vec3) -> float:
-        """How far along a wall a ball that touches it is from the corner, or the end [m]."""
-        seen, wall = self._seen(at), self.enclosure
-        at_back = wall.depth - seen[0] < wall.width / 2 - abs(seen[1])
-        return float(wall.width / 2 - abs(seen[1]) if at_back else min(seen[0], wall.depth - seen[0]))
-
     def _beside_ends(self, way: Way) -> float:
-        """How far beside the ends of the side walls a way goes in or out [m]; inf if it does neither."""
+        """How far beside the ends of the side walls a way goes in [m]; inf if it does not."""
         at, velocity = self._seen(way.at), about_z(self.turned).T @ way.velocity
-        if at[0] * velocity[0] >= 0.0:
+        if at[0] >= 0.0 or velocity[0] <= 0.0:
             return math.inf
         return self.enclosure.width / 2 - abs(float(at[1] - at[0] / velocity[0] * velocity[1]))
 
