@@ -89,6 +89,7 @@ attacks: setup
 # docs/api.md, and a page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
 docs: setup
 	$(BIN)/python tools/api_page.py
+	$(BIN)/python tools/paper_page.py
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # README, docs, axis cards and reports as plain HTML in SITE.

@@ -23,12 +23,12 @@ def test_the_page_is_up_to_date(tool):
 
 def test_every_move_predicate_and_asset_is_on_the_page_with_its_signature(tool):
     """By the modules themselves, not by the parser that writes the page."""
-    from scengen import predicates
+    from scengen import physics, predicates
     from scengen.assets.kits import kits
-    from scengen.skills import grip, hook, jaw, motion, suction
+    from scengen.skills import grip, handover, hook, jaw, motion, suction
 
     page = tool.PAGE.read_text()
-    for module in (predicates, grip, hook, jaw, motion, suction):
+    for module in (predicates, physics, handover, grip, hook, jaw, motion, suction):
         own = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
         assert own and not [n for n in own if not n.startswith("_") and not re.search(rf"### (class )?`{n}[(`]", page)]
     assert not [kit.__name__ for kit in kits().values() if f"### class `{kit.__name__}(" not in page]

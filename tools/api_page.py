@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "api.md"
 MODULES = {
     "The family": ("scenario", "params", "symmetry", "orientation"),
-    "The world": ("sim.world", "sim.memory", "predicates", "geometry"),
-    "Moves": ("skills.motion", "skills.jaw", "skills.grip", "skills.suction", "skills.hook"),
+    "The world": ("sim.world", "sim.memory", "predicates", "geometry", "physics"),
+    "Moves": ("skills.motion", "skills.jaw", "skills.grip", "skills.suction", "skills.hook", "skills.handover"),
     "The robot": ("robots.jaw", "control.teleop"),
     "Distributions and draws": (
         "samplers.task",
