@@ -57,6 +57,7 @@ class Cup(Turned):
     rim_friction: float = param(0.25, "1", 0.05, 1.5)
     """Of the end face of the rim, on which the cup stands upside down."""
     handle_friction: float = param(0.8, "1", 0.05, 1.5)
+    """Of handle and bead, by which a cup is meant to be held."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
     @property
@@ -79,7 +80,7 @@ class Cup(Turned):
             self._ring("rim", top, end, edge, self.rim_friction, PRIORITY),
         ]
         if below < top:
-            parts.append(self._ring("bead", below, top, edge, self.friction, PRIORITY))
+            parts.append(self._ring("bead", below, top, edge, self.handle_friction, PRIORITY))
         return parts
 
     def _ring(self, name: str, low: float, high: float, wall: float | None, friction: float, priority: int) -> Section:
