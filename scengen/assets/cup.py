@@ -58,6 +58,8 @@ class Cup(Turned):
     """Of the end face of the rim, on which the cup stands upside down."""
     handle_friction: float = param(0.8, "1", 0.05, 1.5)
     """Of handle and bead, by which a cup is meant to be held."""
+    ribbed: bool = False
+    """Whether no suction cup holds on to the wall, for ribs too fine to be modelled; no parameter: a family decides."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
     @property
@@ -87,7 +89,8 @@ class Cup(Turned):
         """What lies between two heights, `wall` thick; None: a disc [m]."""
         a, b = self.outer(low), self.outer(high)
         inner = (0.0, 0.0) if wall is None else (a - wall, b - wall)
-        return Section(name, ((inner[0], low), (a, low), (b, high), (inner[1], high)), friction, priority)
+        corners = ((inner[0], low), (a, low), (b, high), (inner[1], high))
+        return Section(name, corners, friction, priority, leaky=self.ribbed and wall is not None)
 
     # --- handle ---------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..geometry import quat
 from ..params import check_bounds
+from ..robots.suction import LEAKY
 
 TABLE_TOP = 0.8
 """Height of the table top [m]: robosuite's TableArena, `table_offset`."""
@@ -66,6 +67,7 @@ def solid(
     solref: tuple[float, float] = STIFF,
     priority: int = PRIORITY,
     group: int = 0,
+    leaky: bool = False,
 ) -> mujoco.MjsGeom:
     """Add a geom that things collide with: stiff, with a sliding friction of its own against whatever touches it.
 
@@ -74,6 +76,7 @@ def solid(
         friction: sliding; torsion and rolling are MuJoCo's defaults.
         mass: of the geom [kg]; else its density [kg/m^3], else MuJoCo's 1000.
         condim: 4, so that a face resists turning on the spot; 3 where that costs time for nothing.
+        leaky: no suction cup holds on to it, see `robots.suction.LEAKY`.
     """
     geom = body.add_geom(name=name, type=type)
     full = np.zeros(3)
@@ -86,6 +89,8 @@ def solid(
         geom.mass = mass
     if density is not None:
         geom.density = density
+    if leaky:
+        geom.userdata = [LEAKY]
     return geom
 
 

@@ -53,6 +53,8 @@ class Section:
     """Sliding friction of its surface; None: the whole solid's."""
     priority: int = PRIORITY
     """Of its contacts; see `prop.PRIORITY`."""
+    leaky: bool = False
+    """Whether no suction cup holds on to it."""
 
     @property
     def reaches_axis(self) -> bool:
@@ -134,6 +136,7 @@ class Turned(Prop):
         friction = self.friction if section.friction is None else section.friction
         for i in range(1 if section.reaches_axis else SECTORS):
             turn = quat("z", 2 * math.pi * i / SECTORS)
-            wedge = solid(body, f"{section.name}_{i}", (), type=MESH, quat=turn, friction=friction, mass=0.0)
+            name, leaky = f"{section.name}_{i}", section.leaky
+            wedge = solid(body, name, (), type=MESH, quat=turn, friction=friction, mass=0.0, leaky=leaky)
             wedge.meshname, wedge.priority = section.name, section.priority
             wedge.rgba = np.array(self.rgba, np.float32)

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from ..robots import panda
+from ..robots import panda, suction
 from ..robots.panda import FINGERS, HOME, JOINTS
 from . import native, osc
 
@@ -112,6 +112,7 @@ class Loop:
         self._scene = np.zeros(1, SCENE)
         _fill_scene(self._scene[0], model, data, self.substeps)
         self._owner = _owners(model, names)
+        self._tight = _tight(model)
         labels = model.nbody + len(names) + 1
         self._latches = np.zeros((2, labels, labels), np.uint8)
         self.touched, self.touching = self._latches
@@ -141,7 +142,7 @@ class Loop:
         if given.shape != (self.size,):
             raise ValueError(f"an action has shape ({self.size},), not {given.shape}")
         self._action[:] = given
-        warnings = _step(self._scene, self._arms, self._owner, self._latches, self._action)
+        warnings = _step(self._scene, self._arms, self._owner, self._tight, self._latches, self._action)
         if warnings < 0:
             raise ValueError(f"an action must be finite, not {given.tolist()}")
         return warnings
@@ -162,7 +163,7 @@ class Loop:
             record, wanted = ctrl_out, (len(actions) * self.substeps, self.model.nu)
             if record.shape != wanted or record.dtype != np.float64 or not record.flags.c_contiguous:
                 raise ValueError(f"ctrl_out must be a C-contiguous float64 array of shape {wanted}")
-        return _replay(self._scene, self._arms, self._owner, self._latches, actions, record)
+        return _replay(self._scene, self._arms, self._owner, self._tight, self._latches, actions, record)
 
     def watch(self, first: bool) -> None:
         """Latch the contacts of a physics step that somebody else makes, between its mj_step1 and mj_step2.
@@ -170,7 +171,7 @@ class Loop:
         A suction cup that is switched on but not sealed is switched off for this step, and a jammed gripper opened.
         `first`: whether the step begins a control period.
         """
-        _watch(self._scene, self._arms, self._owner, self._latches, first)
+        _watch(self._scene, self._arms, self._owner, self._tight, self._latches, first)
 
     def jam(self, arm: int, on: bool) -> None:
         """Force the gripper of an arm open from the next physics step on, or leave it to its commands again.
@@ -237,8 +238,15 @@ def _owners(model: mujoco.MjModel, names: Sequence[panda.Names]) -> NDArray[np.i
     return labels[model.geom_bodyid].astype(np.int32)
 
 
+def _tight(model: mujoco.MjModel) -> NDArray[np.uint8]:
+    """1 for every geom on which the lip of a suction cup closes, 0 for those that are `suction.LEAKY`; (ngeom,)."""
+    if model.nuser_geom == 0:
+        return np.ones(model.ngeom, np.uint8)
+    return (model.geom_user[:, 0] != suction.LEAKY).astype(np.uint8)
+
+
 @njit(nogil=True, cache=True)
-def _step(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, action: NDArray) -> int:
+def _step(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, action: NDArray) -> int:
     """One control period; the number of warnings, or -1 and nothing done for an action that is not finite."""
     for i in range(action.shape[0]):
         if not np.isfinite(action[i]):
@@ -246,20 +254,22 @@ def _step(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, acti
     scene = scenes[0]
     _begin(latches)
     for k in range(scene.substeps):
-        _substep(scene, arms, owner, latches, action, k == 0)
+        _substep(scene, arms, owner, tight, latches, action, k == 0)
     native.kinematics(scene.model, scene.data)
     return native.warnings(scene.warning, scene.warning_stride, scene.warning_kinds)
 
 
 @njit(nogil=True, cache=True)
-def _replay(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, actions: NDArray, record: NDArray) -> int:
+def _replay(
+    scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, actions: NDArray, record: NDArray
+) -> int:
     """One control period per row of `actions`, filling `record` with the controls unless it has no rows."""
     scene = scenes[0]
     ctrl = native.float64s(scene.ctrl, record.shape[1])
     for t in range(actions.shape[0]):
         _begin(latches)
         for k in range(scene.substeps):
-            _substep(scene, arms, owner, latches, actions[t], k == 0)
+            _substep(scene, arms, owner, tight, latches, actions[t], k == 0)
             if record.shape[0] > 0:
                 record[t * scene.substeps + k] = ctrl
         # Not needed for the physics, but the same bits as ticks under any integrator are promised.
@@ -268,7 +278,7 @@ def _replay(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, ac
 
 
 @njit(nogil=True, cache=True)
-def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, first: bool) -> None:
+def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, first: bool) -> None:
     """What `_substep` does besides controlling the arms."""
     scene = scenes[0]
     if first:
@@ -278,12 +288,14 @@ def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, latches: NDArray, fir
         at = arms[i].at
         if at.cup == osc.NONE:
             osc.force_open(at, arms[i].state)
-        elif arms[i].state.jammed != 0.0 or _pads_in_contact(scene, at.pad) < osc.SEAL:
+        elif arms[i].state.jammed != 0.0 or _pads_in_contact(scene, tight, at.pad) < osc.SEAL:
             native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
 
 
 @njit
-def _substep(scene: np.record, arms: NDArray, owner: NDArray, latches: NDArray, action: NDArray, first: bool) -> None:
+def _substep(
+    scene: np.record, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, action: NDArray, first: bool
+) -> None:
     """One physics step under control. The first of a period moves the goals, from the poses just computed."""
     native.step1(scene.model, scene.data)
     for i in range(arms.shape[0]):
@@ -295,7 +307,7 @@ def _substep(scene: np.record, arms: NDArray, owner: NDArray, latches: NDArray, 
     for i in range(arms.shape[0]):
         at = arms[i].at
         if at.cup != osc.NONE:
-            osc.suck(at, arms[i].state, _pads_in_contact(scene, at.pad))
+            osc.suck(at, arms[i].state, _pads_in_contact(scene, tight, at.pad))
     native.step2(scene.model, scene.data)
 
 
@@ -319,8 +331,8 @@ def _latch(scene: np.record, owner: NDArray, latches: NDArray) -> None:
 
 
 @njit
-def _pads_in_contact(scene: np.record, first: int) -> int:
-    """How many of the four geoms from `first` on touch something now."""
+def _pads_in_contact(scene: np.record, tight: NDArray, first: int) -> int:
+    """How many of the four geoms from `first` on touch something tight now."""
     count = native.int32s(scene.ncon, 1)[0]
     contact = native.int64s(scene.contact, 1)[0]
     seen = 0
@@ -328,7 +340,7 @@ def _pads_in_contact(scene: np.record, first: int) -> int:
         if native.float64s(contact + scene.dist, 1)[0] <= 0.0:
             geoms = native.int32s(contact + scene.geom, 2)
             for i in range(2):
-                if 0 <= geoms[i] - first < 4:
+                if 0 <= geoms[i] - first < 4 and (geoms[1 - i] < 0 or tight[geoms[1 - i]]):
                     seen |= 1 << (geoms[i] - first)
         contact += scene.stride
     return (seen & 1) + (seen >> 1 & 1) + (seen >> 2 & 1) + (seen >> 3)

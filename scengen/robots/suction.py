@@ -29,6 +29,8 @@ REACHES = (PITCH + PAD) / 2
 TORQUE = PULL / 2 * (REACHES + ((PITCH - PAD) / 2) ** 2 / REACHES)
 """What peels the cup off [N m]. The pull acts on every corner of a pad alike; under a torque the pressure falls evenly
 across the cup, until it is gone at its edge. Corners that have come off no longer pull, and the others follow."""
+LEAKY = 1.0
+"""First user number of geoms on which no lip closes, as they are ribbed or porous: the cup presses on them in vain."""
 TUBE = 0.011
 """Radius of the tube between flange and bellows [m]."""
 MASS = 0.3

@@ -1,7 +1,30 @@
-"""T04 cup-inversion."""
+"""T04 cup-inversion: turn a cup that stands upside down, and put it upright on a square, with suction and a jaw.
+
+        ______                 suction ]==|      |<==[ jaw               \\      /
+       /      \\                          |______|                        \\____/
+    --/________\\-------                                               ----=======--
+
+Bottleneck: neither hand can do it alone. The jaw finds nothing to hold: the cup is wider than it opens, and the rim is
+on the table. Suction holds the base, but a cup that is to stand has its base down, where no hand fits between it and
+the table. So the suction hand lifts the cup and turns it until the jaw gets at the rim, the jaw takes it, suction lets
+go, and the jaw puts it down upright.
+
+Decisions, where the paper (App. B, T04) is silent:
+
+* "The jaw cannot grasp the smooth rim", and yet "grabs it by the rim": it cannot on the table, it can in the air.
+* Each hand turns the cup by a quarter. In the paper suction turns it by half; here a hand points up only where the cup
+  is 0.28 m and more above the table, and the level hands get by with less.
+* The wall is smooth and leans: two hands that press from both sides, of which each can roll by half a turn, slip off
+  where its friction is less than its slope. Upright it could be lifted that way, upside down it cannot. Suction does
+  not hold on it either: the cup's flat pads touch a round wall along two edges, and peel off as soon as they pull.
+* "Toppling is not a reliable option since the cup just slides out": the rim's friction on the table is less than its
+  radius over the cup's height. A cup that touches the table askew, or comes down faster than a hand lowers it, is lost:
+  else it could be laid down for the jaw, or be dropped from a hand that points up.
+* In the region means that the whole base is on the square, upright within 8 deg, and let go.
+"""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -10,20 +33,20 @@ import numpy as np
 from ..assets.cup import Cup
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Mat3, Vec3, corners, gap, quat, shortest
+from ..geometry import UP, Mat3, Vec3, between, corners, gap, quat, rotation, shortest
 from ..params import param
+from ..physics import GRAVITY
 from ..predicates import fallen
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, pinch
-from ..robots.suction import REACHES
+from ..robots.jaw import OPENING, PAD, PALM_ACROSS, SPAN, TIP, pinch
+from ..robots.suction import PULL, REACHES, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
-from ..skills.handover import hand_over
+from ..skills.handover import OVERLAP, STAND_OFF, hand_over
 from ..skills.motion import (
     CLOSED,
     COARSE,
-    FINE,
     OPEN,
     STEADY,
     Pace,
@@ -32,20 +55,36 @@ from ..skills.motion import (
     facing_down,
     go_to,
     hold,
-    push,
     retreat,
+    steer,
     together,
     turn_to,
-    until,
 )
 
-UPRIGHT = math.radians(8.0)
+TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True)
+"""86 mm wide where it is narrowest, and polished but for its bead."""
+STANDING = math.radians(8.0)
+"""Largest tilt of a cup that counts as upright [rad]."""
 LYING = (math.radians(25.0), math.radians(155.0))
+"""Tilts at which a cup that touches the table is neither upright nor upside down [rad]."""
+DROPPED = 0.5
+"""Speed of a fall by which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
+looked at every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
 TURNED_OVER = quat("x", math.pi)
+LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
+"""From the arm with suction to the one with the jaw."""
 OUT: Mat3 = facing(math.pi / 2, 0.0)
-SIDEWAYS: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+"""The suction hand, level, points at the other arm."""
+IN: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+"""The jaw's hand, level, points at the other arm; it closes up and down. Upside down it would run into joint 6."""
 MEETING: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
-ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
+"""Where the middle of the base is when the cup changes hands [m]; the palm is then 0.09 m above the table at least."""
+ASIDE: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
+"""Where the suction hand is out of the way [m]."""
+OVER = 0.06
+"""Height at which the cup is brought over the square, and put upright [m]."""
+SLIP = 0.75
+"""Share of the slope of the wall that its friction may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,86 +96,291 @@ class CupInversion(Scenario):
     x: float = param(-0.05, "m", -0.4, 0.4)
     y: float = param(-0.10, "m", -0.4, 0.4)
     goal_x: float = param(0.0, "m", -0.4, 0.4)
-    goal_y: float = param(0.12, "m", -0.4, 0.4)
-    cup: Cup = Cup(height=0.09, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8)
+    goal_y: float = param(0.14, "m", -0.4, 0.4)
+    cup: Cup = TUMBLER
     patch: Patch = Patch(size=0.14)
+
+    # --- scene ----------------------------------------------------------------------------
 
     def build(self) -> mujoco.MjSpec:
         return self._scene(self.cup)
 
     def _scene(self, cup: Cup) -> mujoco.MjSpec:
         scene = table()
-        scene.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        scene.option.solver = mujoco.mjtSolver.mjSOL_NEWTON  # a cup in a jaw takes conjugate gradients twice the time
         place(scene, cup, "cup", self.start + cup.height * UP, turn=TURNED_OVER)
         place(scene, self.patch, "patch", self.goal, free=False)
         return scene
 
+    # --- goal -----------------------------------------------------------------------------
+
     def success(self, world: World) -> bool:
-        off = np.abs(world.pos("cup") - self.goal)[:2].max()
-        stands = world.touching("cup", "table") and not world.touching(ROBOT, "cup")
-        return stands and world.tilt("cup") < UPRIGHT and bool(off < self.room)
+        let_go = world.touching("cup", "table") and not world.touching(ROBOT, "cup")
+        off = float(np.abs(world.pos("cup") - self.goal)[:2].max())
+        return let_go and world.tilt("cup") < STANDING and off < self.patch.size / 2 - self.cup.base
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "cup"):
             return "the cup fell off the table"
-        low, high = LYING
-        if world.touching("cup", "table") and low < world.tilt("cup") < high:
-            return "the cup was knocked over"
-        return None
+        if world.velocity("cup")[5] < -DROPPED and not world.touching(ROBOT, "cup"):
+            return "the cup was dropped"
+        askew = LYING[0] < world.tilt("cup") < LYING[1]
+        return "the cup was knocked over" if askew and world.touching("cup", "table") else None
+
+    # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
+        """Hold the cup out with the suction hand, hand it over to the jaw, put it down upright.
+
+        Every target is computed from where the cup is when its move begins, so that each makes up for what the one
+        before has left.
+        """
         giver, taker = world.arms
         yield from together(world, self.present(giver), self.wait_beside(taker))
-        yield from hand_over(giver, taker, lambda: self.rim(world), SIDEWAYS)
-        yield from alone(giver, self.leave(giver))
+        yield from hand_over(giver, taker, lambda: self.rim(world), IN)
+        yield from together(world, self.leave(giver), hold(taker, 0.0))
         yield from alone(taker, self.set_down(taker))
 
     def present(self, arm: Arm) -> Plan:
+        """Lift the cup, turn its opening to the other arm, and hold it out."""
         yield from self.lift(arm)
-        yield from turn_to(arm, OUT, 1.0, grip=CLOSED)
-        rot = shortest(arm.world.rot("cup")[:, 2], np.array([0, 1.0, 0])) @ arm.world.rot("cup")
-        yield from suction.carry_to(arm, "cup", MEETING, rot, Pace(0.2, 0.004))
+        yield from turn_to(arm, OUT, 1.0)
+        level = shortest(arm.world.rot("cup")[:, 2], LEFT) @ arm.world.rot("cup")
+        yield from suction.carry_to(arm, "cup", MEETING, level, Pace(0.20, 0.004))
 
     def lift(self, arm: Arm) -> Plan:
-        base = arm.world.pos("cup")
-        down = facing_down(math.pi / 2)
+        """Suck the cup in the middle of its base and lift it."""
+        base, down = arm.world.pos("cup"), facing_down(math.pi / 2)
         yield from go_to(arm, base + 0.03 * UP, down, STEADY, OPEN)
         yield from suction.suck(arm, base, down)
-        yield from go_to(arm, arm.hand + 0.15 * UP, pace=Pace(0.15, 0.02))
+        yield from retreat(arm, 0.15, Pace(0.15, 0.02))
 
     def rim(self, world: World) -> Vec3:
+        """The uppermost point of the rim while the cup lies in the air, in the middle of the bead [m]."""
         along = world.rot("cup")[:, 2]
         up = UP - along[2] * along
-        return world.pos("cup") + self.cup.height * along + (self.cup.rim - self.cup.bead / 2) * up / np.linalg.norm(up)
+        return world.pos("cup") + self.cup.height * along + self.held * up / np.linalg.norm(up)
 
     def wait_beside(self, arm: Arm) -> Plan:
-        at = MEETING + [0.0, self.cup.height + 0.10, self.cup.rim]
-        yield from go_to(arm, at, SIDEWAYS, STEADY, OPEN)
+        """Bring the open jaw beside the place where the rim is going to be."""
+        away = self.cup.height + STAND_OFF + 0.04
+        yield from go_to(arm, MEETING + away * LEFT + self.held * UP, IN, STEADY, OPEN)
 
     def leave(self, arm: Arm) -> Plan:
+        """Back, and out of the way."""
         yield from go_to(arm, arm.hand - 0.08 * arm.hand_rot[:, 2], pace=COARSE)
+        yield from go_to(arm, ASIDE, pace=COARSE)
 
     def set_down(self, arm: Arm) -> Plan:
-        world = arm.world
+        """Tip the hand down, so that the cup hangs under it; turn the cup upright, put it on the square, let go."""
+        world, com = arm.world, self.goal + self.cup.inertial()[0][2] * UP
         yield from turn_to(arm, facing_down(), 0.8)
-        com = world.com("cup") - world.pos("cup")
-        rot = shortest(world.rot("cup")[:, 2], UP) @ world.rot("cup")
-        height = self.cup.inertial()[0][2]
-        yield from jaw.carry(arm, "cup", self.goal + (height + 0.06) * UP, rot, STEADY)
-        yield from jaw.put(arm, "cup", self.goal + height * UP, "table", hover=0.04)
+        yield from go_to(arm, [*arm.hand[:2], self.goal[2] + self.cup.height + 2 * OVER], pace=STEADY)
+        for pace in (STEADY, Pace(0.10, 0.005)):  # once more: what hangs in the pinch has swung
+            upright = shortest(world.rot("cup")[:, 2], UP) @ world.rot("cup")
+            yield from jaw.carry(arm, "cup", com + OVER * UP, upright, pace)
+        yield from jaw.put(arm, "cup", com, "table", hover=OVER / 2)
         yield from retreat(arm)
 
+    # --- what must not work ---------------------------------------------------------------
+
+    def shortcuts(self) -> Mapping[str, Shortcut]:
+        return {
+            "topple_it": Shortcut(self._topple, to_rest=True),
+            "put_down_as_it_is": Shortcut(self._as_it_is, to_rest=True),
+            "jaw_from_above": Shortcut(self._from_above),
+            "let_go_without_partner": Shortcut(self._let_go),
+            "turn_it_up_and_drop_it": Shortcut(self._drop),
+            "squeeze_and_roll": Shortcut(self._squeeze),
+            "suck_the_wall_and_roll": Shortcut(self._by_its_wall),
+        }
+
+    def _topple(self, world: World) -> Plan:
+        """Push the cup near its base, which is up, as fast as the jaw's hand goes."""
+        arm, along = world.arms[1], np.array([1.0, 0.0, 0.0])
+        beside = world.pos("cup") - 0.01 * UP - (self.cup.rim + 0.03) * along
+        pushed = jaw.poke(arm, beside, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.16)
+        yield from alone(arm, pushed)
+
+    def _as_it_is(self, world: World) -> Plan:
+        """Put the cup into the square upside down."""
+        arm = world.arms[0]
+
+        def plan() -> Plan:
+            yield from self.lift(arm)
+            at = self.goal + (self.cup.height + 0.002) * UP
+            yield from suction.carry_to(arm, "cup", at, world.rot("cup"), Pace(0.15, 0.003))
+            yield from suction.let_go(arm)
+
+        yield from alone(arm, plan())
+
+    def _from_above(self, world: World) -> Plan:
+        """Take the cup across its base with the jaw, turn it over in the air, put it down."""
+        arm = world.arms[1]
+
+        def plan() -> Plan:
+            yield from jaw.pick(arm, world.pos("cup") - 0.015 * UP, LEFT, lift=0.25)
+            yield from turn_to(arm, IN)
+            yield from jaw.put(arm, "cup", self.goal + self.cup.rim * UP, "table")
+
+        yield from alone(arm, plan())
+
+    def _let_go(self, world: World) -> Plan:
+        """Hold the cup out over the square, low above it, and let go while nobody has it."""
+        arm = world.arms[0]
+
+        def plan() -> Plan:
+            yield from self.lift(arm)
+            yield from turn_to(arm, OUT, 1.0)
+            yield from go_to(arm, self.goal - self.cup.height / 2 * LEFT + (self.cup.rim + 0.01) * UP, OUT)
+            yield from suction.let_go(arm)
+
+        yield from alone(arm, plan())
+
+    def _drop(self, world: World) -> Plan:
+        """Turn the opening up with the suction hand, go down as far as it goes, pull the hand away below the cup."""
+        arm = world.arms[0]
+
+        def plan() -> Plan:
+            yield from self.lift(arm)
+            yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.45], pace=Pace(0.15, 0.02))
+            for up in (0.0, 0.5, 1.0, math.pi / 2):
+                yield from turn_to(arm, facing(math.pi / 2, -up), 1.0, within=0.05)
+            yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.30], pace=Pace(0.10, 0.02))
+            yield from go_to(arm, arm.hand - [0.15, 0.0, 0.15], pace=COARSE, grip=OPEN)
+
+        yield from alone(arm, plan())
+
+    def _squeeze(self, world: World) -> Plan:
+        """Press both hands on the wall, half way up, lift the cup, roll both by half a turn, put it down."""
+        middle, far = self.start + self.cup.height / 2 * UP, self.goal + (self.cup.height / 2 + 0.003) * UP
+        beside, high = self.cup.outer(self.cup.height / 2), 0.2 * UP
+
+        def both(seconds: float, pose: Callable[[float], tuple[Vec3, float, float]]) -> Plan:
+            """Place between the hands, way from there to each, and roll, against the share of the time."""
+            start = world.time
+            while world.time < start + seconds:
+                at, way, roll = pose((world.time - start) / seconds)
+                actions = []
+                for arm, side, rot, tip in zip(
+                    world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0, TIP), strict=True
+                ):
+                    turn = 2.0 * between(arm.hand_rot, rotation(math.pi * roll * LEFT) @ rot)
+                    actions.append(steer(arm, at + side * (way + tip) * LEFT, np.zeros(3), turn, CLOSED))
+                yield np.concatenate(actions)
+
+        tight = beside - 0.02
+        yield from both(1.5, lambda t: (middle + high, beside + 0.06, 0.0))
+        yield from both(2.0, lambda t: (middle + (1 - t) * high, beside + 0.05 - 0.02 * t, 0.0))
+        yield from both(1.5, lambda t: (middle, beside + 0.03 - 0.05 * t, 0.0))
+        yield from both(2.0, lambda t: (middle + t * high, tight, 0.0))
+        yield from both(4.0, lambda t: (middle + high, tight, t))
+        yield from both(3.0, lambda t: ((1 - t) * middle + t * far + high, tight, 1.0))
+        yield from both(4.0, lambda t: (far + (1 - t) * high, tight, 1.0))
+        yield from both(1.0, lambda t: (far, tight + 0.07 * t, 1.0))
+
+    def _by_its_wall(self, world: World) -> Plan:
+        """Suck the wall, with the jaw's hand as a stop behind the cup, lift it, roll by half a turn, put it down."""
+        arm, stop = world.arms
+        high = self.cup.height / 2 + 0.01
+        spot = self.start + high * UP - self.cup.outer(self.cup.height - high) * LEFT
+        rot = facing(math.pi / 2, math.atan(self.slope))
+
+        def behind() -> Plan:
+            at = self.start + (self.cup.rim + PALM_ACROSS + 0.002) * LEFT + 0.045 * UP
+            yield from go_to(stop, at + 0.1 * UP + 0.05 * LEFT, facing_down(math.pi / 2), STEADY, CLOSED)
+            yield from go_to(stop, at)
+
+        def plan() -> Plan:
+            yield from go_to(arm, spot - 0.15 * LEFT + 0.1 * UP, rot, STEADY, OPEN)
+            yield from go_to(arm, spot - 0.03 * LEFT, rot, STEADY)
+            yield from suction.suck_upright(arm, spot, rot)
+            yield from retreat(arm, 0.05, Pace(0.05, 0.005))
+            yield from retreat(arm, 0.10, STEADY)
+            start, way = arm.hand_rot, -math.copysign(1.0, float(arm.joint_pos[6]))
+            for part in (1, 2):
+                yield from turn_to(arm, rotation(way * part * math.pi / 2 * start[:, 2]) @ start)
+            yield from go_to(arm, self.goal + (self.cup.height - high) * UP - self.cup.rim * LEFT)
+            yield from suction.let_go(arm)
+
+        yield from together(world, plan(), behind())
+
+    def ablations(self) -> Mapping[str, mujoco.MjSpec]:
+        """A cup without its base, of which suction finds nothing, and one whose bead is as smooth as its wall."""
+        ring = self.build()
+        for geom in list(ring.body("cup").geoms):
+            if geom.name.startswith(("cup/bottom", "cup/floor", "cup/foot")):
+                ring.delete(geom)
+        return {"no_base": ring, "smooth_rim": self._scene(replace(self.cup, handle_friction=self.cup.friction))}
+
+    # --- what must hold -------------------------------------------------------------------
+
     def constraints(self) -> Iterator[Refutation | None]:
-        yield on_table("the cup", corners(self.start, 0.0, 2 * [2 * self.cup.rim]))
+        cup, weight = self.cup, GRAVITY * self.cup.mass
+        around = corners(self.start, 0.0, 2 * [2 * cup.rim])
+        square = corners(self.goal, 0.0, 2 * [self.patch.size])
+        yield require(not cup.has_handle, "the cup has a handle", handle=cup.handle)
+        yield on_table("the cup", around)
+        yield on_table("the square", square)
+        apart = gap(around, square)
+        yield require(apart > 0.0, "the cup stands on the square", apart=apart)
+        room = self.patch.size / 2 - cup.base
+        yield require(room > 0.015, "the base does not fit on the square", room=room)
+        width = 2 * min(cup.base, cup.rim)
+        yield require(width > OPENING + 0.002, "the jaw can span the cup", width=width, jaw=OPENING)
+        room = 2 * self.held - cup.bead / 2 - SPAN / 2
+        yield require(room > 0.005, "the open jaw does not fit into the mouth", room=room)
+        flat = cup.base - math.sqrt(2.0) * REACHES
+        yield require(flat > 0.01, "suction finds no room on the base", room=flat)
+        topples = cup.rim / cup.height
+        yield require(cup.rim_friction < 0.7 * topples, "a push topples the cup", friction=cup.rim_friction, at=topples)
+        most = SLIP * self.slope
+        yield require(cup.friction < most, "two hands can lift the cup by its wall", friction=cup.friction, most=most)
+        shear = cup.friction * PULL
+        yield require(shear > 2.2 * weight, "a level suction hand does not hold the cup", shear=shear, weight=weight)
+        lever = weight * cup.inertial()[0][2]
+        yield require(lever < TORQUE / 2, "the cup peels off the suction hand", torque=lever, most=TORQUE)
+        grip = cup.handle_friction * pinch(cup.bead)
+        yield require(grip > 2 * weight, "the jaw does not hold the cup", grip=grip, weight=weight)
+        yield require(self.droop < 1.5, "the cup turns in the jaw", droop=self.droop)
+        right, left = panda.bases(2)
+        yield within_reach("the cup", self.start + cup.height * UP, base=right)
+        yield within_reach("the square", self.goal + (cup.height + 2 * OVER) * UP, base=left)
+
+    def features(self) -> Mapping[str, float]:
+        return {
+            "droop": self.droop,
+            "height": self.cup.height,
+            "side": self.y - panda.bases(2)[0][1],
+            "goal_side": self.goal_y - panda.bases(2)[1][1],
+            "carried": math.dist(self.start, self.goal),
+            "friction_over_slope": self.cup.friction / self.slope,
+        }
+
+    # --- geometry -------------------------------------------------------------------------
 
     @property
     def start(self) -> Vec3:
+        """On the table, in the middle of the cup [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
     def goal(self) -> Vec3:
+        """Middle of the square [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
 
     @property
-    def room(self) -> float:
-        return self.patch.size / 2 - self.cup.base
+    def held(self) -> float:
+        """Distance from the cup's axis of what the jaw takes: the middle of the bead [m]."""
+        return self.cup.rim - self.cup.bead / 2
+
+    @property
+    def slope(self) -> float:
+        """By how much the wall leans."""
+        return (self.cup.rim - self.cup.base) / self.cup.height
+
+    @property
+    def droop(self) -> float:
+        """Torque of the level cup's weight about the pads, over what they resist: above 1 it turns between them."""
+        lever = self.cup.height - OVERLAP - self.cup.inertial()[0][2]
+        return GRAVITY * self.cup.mass * lever / (pinch(self.cup.bead) * PAD / 2)
