@@ -108,6 +108,21 @@ def test_it_pulls_only_while_three_of_its_four_pads_find_a_face(pads):
     assert lifted > 0.03 or lifted < 0.001
 
 
+@pytest.mark.parametrize("leaky", [False, True])
+def test_it_pulls_on_a_ribbed_face_in_vain(leaky):
+    scene = table()
+    block = scene.worldbody.add_body(name="block", pos=[0.0, 0.0, TABLE_TOP + 0.02])
+    block.add_freejoint()
+    solid(block, "block", [0.03, 0.03, 0.02], mass=0.1, leaky=leaky)
+    world = World.load(scene_text.emit(scene)[0], SUCTION)
+    play(world, go_to(world.arm, [0.0, 0.0, TABLE_TOP + 0.05], facing_down(), STEADY, CLOSED))
+    play(world, push(world.arm, -0.05 * UP, until=lambda: world.touching(ROBOT, "block")))
+    play(world, hold(world.arm, 0.3))
+    assert world.touching(ROBOT, "block") and world.arm.sealed != leaky
+    play(world, retreat(world.arm, 0.04, STEADY))
+    assert (world.pos("block")[2] > TABLE_TOP + 0.05) != leaky
+
+
 def test_what_it_lets_go_falls_freely():
     world = put_on(4)
     height, start = world.pos("piece")[2], world.time
