@@ -16,8 +16,8 @@ PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
 HEAD = """# Where the tasks differ from the paper
 
 The paper ([sources](../CONTRIBUTING.md#sources)) tells most tasks in a few sentences, gives few numbers, and
-contradicts itself in places. What each task decides there, and where it leaves the paper, is written at the head of its family, and
-gathered here by `tools/paper_page.py`.
+contradicts itself in places. What each task decides there, and where it leaves the paper, is written at the head of
+its family, and gathered here by `tools/paper_page.py`.
 
 What holds for all of them:
 
