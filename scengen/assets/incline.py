@@ -1,0 +1,95 @@
+"""Incline: a slab on a hinge at its lower edge, which a servo tilts; what lies on it slides down over that edge.
+
+                     ___---
+               ___---              seen from the side; the lower edge, the lip, is towards the robot
+       lip  o--
+            | posts at both ends    x goes up the slope, the origin is on the ground below the lip
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..geometry import UP, Mat3, Vec3, about_y, quat
+from ..params import param
+from .prop import Prop, Rgba, servo, show, shown, solid
+
+POST, AIR = 0.016, 0.004
+"""Width of the posts, and room between them and the slab [m]."""
+THICK = 0.010
+"""Of the slab [m]."""
+STIFFNESS, DAMPING, ARMATURE = 1000.0, 20.0, 0.05
+"""Of the servo [N m/rad], of the hinge [N m s/rad], and of the servo's rotor [kg m^2]: 20 N at the far end turn it by
+0.2 degrees, and it follows its goal 20 ms late."""
+SMOOTH = 0.05
+"""Friction of the slab, less than of anything that lies on it: of two frictions MuJoCo takes the larger one."""
+GREY: Rgba = (0.35, 0.37, 0.40, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Incline(Prop):
+    """Its hinge `hinge` reads 0 at the least angle, where it starts.
+
+    Angles: paper, App. B, T15 ("an incline tilts from 10 to 55 deg"); it gives nothing else.
+    """
+
+    length: float = param(0.18, "m", 0.10, 0.30)
+    """Along the slope."""
+    width: float = param(0.36, "m", 0.10, 0.60)
+    """Along the lip."""
+    lip: float = param(0.115, "m", 0.05, 0.20)
+    """Height of the lip."""
+    least: float = param(10.0, "deg", 0.0, 20.0)
+    most: float = param(55.0, "deg", 30.0, 70.0)
+    mass: float = param(0.5, "kg", 0.1, 2.0)
+    rgba: Rgba = (0.72, 0.70, 0.64, 1.0)
+
+    @property
+    def turns(self) -> float:
+        """By how much the hinge turns [rad]."""
+        return math.radians(self.most - self.least)
+
+    def axes(self, turned: float = 0.0) -> Mat3:
+        """Up the slope, along the lip, out of the slab, when the hinge has turned so far [rad]."""
+        return about_y(-math.radians(self.least) - turned)
+
+    def on_slab(self, away: float, along: float, turned: float = 0.0) -> Vec3:
+        """The point of the slab's face [m] so far up from the lip and along it [m], in the axes of the incline."""
+        return self.lip * UP + self.axes(turned) @ np.array([away, along, 0.0])
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        beside = self.width / 2 + AIR + POST / 2
+        for y in (-beside, beside):
+            solid(body, "", [POST / 2, POST / 2, self.lip / 2], [0, y, self.lip / 2], condim=3, rgba=GREY)
+        slab = body.add_body(name="slab", pos=[0, 0, self.lip], quat=quat("y", -math.radians(self.least)))
+        slab.add_joint(
+            name="hinge",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, -1, 0],
+            damping=DAMPING,
+            armature=ARMATURE,
+            range=[-0.01, self.turns + 0.01],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        )
+        half = np.array([self.length, self.width, THICK]) / 2
+        solid(slab, "slab", half, [half[0], 0, -half[2]], mass=self.mass, friction=SMOOTH, rgba=self.rgba)
+        axle = mujoco.mjtGeom.mjGEOM_CYLINDER
+        pos, turn = [0, 0, -THICK / 2], quat("x", math.pi / 2)
+        shown(slab, "", GREY, type=axle, size=[THICK / 2, beside, 0], pos=pos, quat=turn)
+
+
+def driven(scene: mujoco.MjSpec, name: str) -> str:
+    """Give an incline of a scene its servo.
+
+    Returns:
+        The name by which events drive it.
+    """
+    hinge = f"{name}/hinge"
+    servo(scene, hinge, STIFFNESS)
+    return hinge
+
+
+if __name__ == "__main__":
+    show(Incline())
