@@ -26,7 +26,7 @@ class CatchBin(Prop):
     keeps the palm, which reaches 32 mm across, out of what falls into the bin.
     """
 
-    bin: Bin = Bin(width=0.10, length=0.070, depth=0.070, wall=0.005, floor=0.004, friction=0.25)
+    bin: Bin = Bin(width=0.10, length=0.060, depth=0.082, wall=0.005, floor=0.004, friction=0.25)
     reach: float = param(0.050, "m", 0.03, 0.10)
     """How far the handle stands out."""
     grip: float = param(0.020, "m", 0.005, 0.06)

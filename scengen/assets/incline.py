@@ -37,9 +37,9 @@ class Incline(Prop):
 
     length: float = param(0.18, "m", 0.10, 0.30)
     """Along the slope."""
-    width: float = param(0.36, "m", 0.10, 0.60)
+    width: float = param(0.40, "m", 0.10, 0.60)
     """Along the lip."""
-    lip: float = param(0.115, "m", 0.05, 0.20)
+    lip: float = param(0.125, "m", 0.05, 0.20)
     """Height of the lip."""
     least: float = param(10.0, "deg", 0.0, 20.0)
     most: float = param(55.0, "deg", 30.0, 70.0)

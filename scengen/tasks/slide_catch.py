@@ -42,13 +42,13 @@ from ..physics import slid, slips_at
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import pick
-from ..skills.motion import Condition, Pace, facing_down, go_to, hold, stay
+from ..skills.jaw import pick, release
+from ..skills.motion import Condition, Pace, facing_down, go_to, hold, retreat, stay
 
 COUNT = 3
 ORDERS = tuple(permutations(range(COUNT)))
 """Lanes, counted from the left, of the lowest, the middle and the highest block."""
-MASS = 0.03
+MASS = 0.02
 """Of a block [kg]."""
 PALE, DARK = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
 """Colours of what has no friction and of what has `ROUGHEST`; between them, in proportion."""
@@ -60,14 +60,16 @@ SUNK, REST = 0.005, 0.02
 TIPPED = math.radians(20.0)
 """Tilt at which the bin counts as tipped over."""
 HAND_SPEED, BEGIN = 0.27, 0.25
-"""Of a hand with the bin, at most [m/s], and what a change of lanes takes besides [s]; measured."""
+"""At which a hand draws the bin [m/s], and what a change of lanes takes besides [s]; measured."""
+FASTEST, LAG = 0.29, 0.08
+"""Of a hand that is asked for all it can [m/s], and how much later it is everywhere than at that speed [s]; measured."""
 FETCH = 2.6
 """From the start until the bin stands at a lane [s]; measured."""
 FALL = 0.12
 """From the lip to below the rim [s]."""
 UNSURE = 0.10
 """By what share the friction of a block may differ from what is known of it: the jitter of certificates."""
-SEEN = 0.003
+SEEN = 0.002
 """How far a block has moved when it is seen to slide [m]."""
 BRISK = Pace(0.30, 0.004)
 """How the bin is drawn."""
@@ -101,16 +103,16 @@ class SlideCatch(Scenario):
 
     order: int = param(0, "", 0, len(ORDERS) - 1)
     """Which of `ORDERS` they lie in."""
-    low: Load = Load(friction=0.315, away=0.028)
-    middle: Load = Load(friction=0.59, away=0.042)
-    high: Load = Load(friction=1.0, away=0.056)
-    edge: float = param(0.030, "m", 0.02, 0.04)
+    low: Load = Load(friction=0.30, away=0.022)
+    middle: Load = Load(friction=0.59, away=0.032)
+    high: Load = Load(friction=1.03, away=0.042)
+    edge: float = param(0.026, "m", 0.02, 0.04)
     """Of the blocks."""
     rate: float = param(5.0, "deg/s", 2.0, 12.0)
     """At which the ramp tilts (9.6 s for the mean demonstration: paper, App. B.1)."""
     start: float = param(1.8, "s", 0.3, 4.0)
     """When it begins to."""
-    lane: float = param(0.135, "m", 0.08, 0.18)
+    lane: float = param(0.160, "m", 0.08, 0.20)
     """Distance of neighbouring lanes."""
     x: float = param(0.12, "m", 0.0, 0.2)
     """Of the lip."""
@@ -192,16 +194,21 @@ class SlideCatch(Scenario):
         yield from pick(world.arm, at, world.rot("bin")[:, 1], above=0.05, lift=0.0, pace=BRISK)
 
     def catch_all(self, world: World, blocks: Iterable[str]) -> Plan:
-        """Wait for one block after the other, and hold still in the end."""
+        """Wait for one block after the other, and let go of the bin in the end."""
         for block in blocks:
             yield from self.wait_at(world, world.pos(block)[1], lambda block=block: self.caught(world, block))
-        yield from hold(world.arm, 1.0 + self.HOLD)
+        yield from release(world.arm)
+        yield from retreat(world.arm, 0.05)
 
     def wait_at(self, world: World, y: float, until: Condition) -> Plan:
         """Draw the bin to a place at the lip, square to it, and keep it there until something happens."""
         arm, turn = world.arm, about_z(-yaw_of(world.rot("bin")))
         there = self.below(y) + turn @ (arm.hand - world.pos("bin"))
         yield from stay(arm, there, facing_down(), until, BRISK)
+
+    def up(self, world: World, block: str) -> float:
+        """How far up the ramp from the lip the middle of a block is [m]."""
+        return float((world.rot("incline/slab").T @ (world.com(block) - self.lip))[0])
 
     def by_friction(self, world: World) -> list[str]:
         """The blocks, the slickest first."""
@@ -247,7 +254,7 @@ class SlideCatch(Scenario):
             y = world.pos(block)[1]
             yield from self.wait_at(world, y, lambda block=block: world.com(block)[2] < self.rim)
             left.remove(block)
-        yield from hold(world.arm, 1.0)
+        yield from release(world.arm)
 
     def _sweep(self, world: World) -> Plan:
         """Draw the bin to and fro along the whole lip."""
@@ -363,7 +370,7 @@ class SlideCatch(Scenario):
     def reached(self, lane: int) -> float:
         """How far the bin comes from when a block is seen to slide until it is below the rim [m]."""
         seconds = self.slides_for(lane, self.loads[lane].away) - self.slides_for(lane, SEEN) + FALL
-        return HAND_SPEED * (seconds - BEGIN / 2)
+        return FASTEST * (seconds - LAG)
 
     # --- geometry -------------------------------------------------------------------------
 
