@@ -14,6 +14,8 @@ TAKEN = 0.010
 """How far below the top of the handle it is taken hold of [m]: the palm, 31 mm above that, stays over the rim."""
 
 
+CLEAR = 0.03
+"""From the ground to the handle [m]."""
 RUBBER = 1.0
 """Friction of the handle."""
 
@@ -35,8 +37,8 @@ class CatchBin(Prop):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         self.bin.fill(body, spec)
-        size, high = np.array([self.reach, self.grip, self.rim]), self.rim / 2
-        middle = [-self.bin.outer[0] / 2 - self.reach / 2, 0.0, high]
+        size = np.array([self.reach, self.grip, self.rim - CLEAR])
+        middle = [-self.bin.outer[0] / 2 - self.reach / 2, 0.0, (self.rim + CLEAR) / 2]
         mass = PLASTIC * float(np.prod(size)) / 2  # hollow
         solid(body, "handle", size / 2, middle, mass=mass, friction=RUBBER, rgba=self.rgba)
 

@@ -52,7 +52,7 @@ MASS = 0.02
 """Of a block [kg]."""
 PALE, DARK = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
 """Colours of what has no friction and of what has `ROUGHEST`; between them, in proportion."""
-ROUGHEST = 1.25
+ROUGHEST = 1.0
 UNDER = 0.014
 """How far the bin's inside reaches under the lip [m], so that nothing falls behind it."""
 SUNK, REST = 0.005, 0.02
@@ -103,12 +103,12 @@ class SlideCatch(Scenario):
 
     order: int = param(0, "", 0, len(ORDERS) - 1)
     """Which of `ORDERS` they lie in."""
-    low: Load = Load(friction=0.30, away=0.022)
-    middle: Load = Load(friction=0.59, away=0.032)
-    high: Load = Load(friction=1.03, away=0.042)
+    low: Load = Load(friction=0.277, away=0.022)
+    middle: Load = Load(friction=0.53, away=0.032)
+    high: Load = Load(friction=0.87, away=0.040)
     edge: float = param(0.026, "m", 0.02, 0.04)
     """Of the blocks."""
-    rate: float = param(5.0, "deg/s", 2.0, 12.0)
+    rate: float = param(4.3, "deg/s", 2.0, 12.0)
     """At which the ramp tilts (9.6 s for the mean demonstration: paper, App. B.1)."""
     start: float = param(1.8, "s", 0.3, 4.0)
     """When it begins to."""
@@ -308,6 +308,8 @@ class SlideCatch(Scenario):
         least, most = (math.radians(angle) for angle in (self.incline.least, self.incline.most))
         yield require(slick > least + 0.02, "a block slides before the ramp moves", slips=slick, least=least)
         yield require(rough < most - 0.02, "a block never slides", slips=rough, most=most)
+        topples = math.radians(45.0)
+        yield require(rough < topples, "a block topples before it slides", slips=rough, topples=topples)
         apart, width = self.lane, self.bin.bin.length + self.edge
         yield require(apart > width, "one place of the bin serves two lanes", apart=apart, width=width)
         room, needs = self.bin.bin.length - self.edge, 0.02
