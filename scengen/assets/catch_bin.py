@@ -1,4 +1,4 @@
-"""A bin with a handle: deep enough that what falls in stays in, and light enough to be drawn over the table by a jaw."""
+"""A bin with a handle: so deep that what falls in stays in, so light that a jaw draws it over the table."""
 
 from dataclasses import dataclass
 
@@ -7,13 +7,14 @@ import numpy as np
 
 from ..geometry import UP, Vec3
 from ..params import param
-from .bin import PLASTIC, Bin
 from .prop import Prop, Rgba, show, solid
 
 TAKEN = 0.010
 """How far below the top of the handle it is taken hold of [m]: the palm, 31 mm above that, stays over the rim."""
 
 
+PLASTIC, HOLLOW = 1000.0, 500.0
+"""Density of the bin, and of the handle [kg/m^3]."""
 CLEAR = 0.03
 """From the ground to the handle [m]."""
 RUBBER = 1.0
@@ -28,7 +29,14 @@ class CatchBin(Prop):
     keeps the palm, which reaches 32 mm across, out of what falls into the bin.
     """
 
-    bin: Bin = Bin(width=0.10, length=0.060, depth=0.082, wall=0.005, floor=0.004, friction=0.25)
+    width: float = param(0.100, "m", 0.04, 0.20)
+    """Inside, along x."""
+    length: float = param(0.060, "m", 0.03, 0.20)
+    """Inside, along y."""
+    depth: float = param(0.082, "m", 0.02, 0.15)
+    wall: float = param(0.005, "m", 0.002, 0.02)
+    floor: float = param(0.004, "m", 0.002, 0.02)
+    friction: float = param(0.25, "1", 0.05, 1.0)
     reach: float = param(0.050, "m", 0.03, 0.10)
     """How far the handle stands out."""
     grip: float = param(0.020, "m", 0.005, 0.06)
@@ -36,21 +44,36 @@ class CatchBin(Prop):
     rgba: Rgba = (0.85, 0.55, 0.15, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        self.bin.fill(body, spec)
+        half_x, half_y, deep = self.width / 2, self.length / 2, self.depth / 2
+        outer_x, outer_y, thick = half_x + self.wall, half_y + self.wall, self.wall / 2
+        middle = self.floor + deep
+        parts = {  # it stands on its floor alone: walls down to the ground would touch it beside that
+            "floor": ((outer_x, outer_y, self.floor / 2), (0.0, 0.0, self.floor / 2)),
+            "left": ((outer_x, thick, deep), (0.0, half_y + thick, middle)),
+            "right": ((outer_x, thick, deep), (0.0, -half_y - thick, middle)),
+            "near": ((thick, half_y, deep), (-half_x - thick, 0.0, middle)),
+            "far": ((thick, half_y, deep), (half_x + thick, 0.0, middle)),
+        }
+        for name, (size, pos) in parts.items():
+            solid(body, name, size, pos, density=PLASTIC, friction=self.friction, condim=3, rgba=self.rgba)
         size = np.array([self.reach, self.grip, self.rim - CLEAR])
-        middle = [-self.bin.outer[0] / 2 - self.reach / 2, 0.0, (self.rim + CLEAR) / 2]
-        mass = PLASTIC * float(np.prod(size)) / 2  # hollow
-        solid(body, "handle", size / 2, middle, mass=mass, friction=RUBBER, rgba=self.rgba)
+        pos = [-outer_x - self.reach / 2, 0.0, (self.rim + CLEAR) / 2]
+        solid(body, "handle", size / 2, pos, density=HOLLOW, friction=RUBBER, rgba=self.rgba)
+
+    @property
+    def outer(self) -> tuple[float, float]:
+        """Full length of the bin along x and y, walls included, the handle not [m]."""
+        return self.width + 2 * self.wall, self.length + 2 * self.wall
 
     @property
     def rim(self) -> float:
         """Height of the rim [m]."""
-        return self.bin.floor + self.bin.depth
+        return self.floor + self.depth
 
     @property
     def handle(self) -> Vec3:
         """Where the handle is taken hold of, in the bin's axes [m]."""
-        return np.array([-self.bin.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - TAKEN) * UP
+        return np.array([-self.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - TAKEN) * UP
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """Incline: a slab on a hinge at its lower edge, which a servo tilts; what lies on it slides down over that edge.
 
-                     ___---
-               ___---              seen from the side; the lower edge, the lip, is towards the robot
-       lip  o--
-            | posts at both ends    x goes up the slope, the origin is on the ground below the lip
+              ___---
+        ___---              seen from the side; the lower edge, the lip, is towards the robot
+lip  o--
+     | posts at both ends    x goes up the slope, the origin is on the ground below the lip
 """
 
 import math

@@ -40,7 +40,7 @@ from ..geometry import UP, Vec3, about_z, yaw_of
 from ..params import check_bounds, param
 from ..physics import slid, slips_at
 from ..predicates import fallen, still
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import Condition, Pace, facing_down, go_to, hold, retreat, stay
@@ -59,14 +59,17 @@ SUNK, REST = 0.005, 0.02
 """How far below the rim the middle of a block must lie [m], and how slow it must be [m/s]."""
 TIPPED = math.radians(20.0)
 """Tilt at which the bin counts as tipped over."""
-HAND_SPEED, BEGIN = 0.27, 0.25
+HAND_SPEED, BEGIN = 0.27, 0.12
 """At which a hand draws the bin [m/s], and what a change of lanes takes besides [s]; measured."""
 FASTEST, LAG = 0.29, 0.08
-"""Of a hand that is asked for all it can [m/s], and how much later it is everywhere than at that speed [s]; measured."""
-FETCH = 2.6
+"""Of a hand that is asked for all it can [m/s], and how much later than that it is everywhere [s]; measured."""
+FETCH = 2.4
 """From the start until the bin stands at a lane [s]; measured."""
-FALL = 0.12
-"""From the lip to below the rim [s]."""
+FALL = 0.16
+"""From when its middle is over the lip until a block is in the bin [s]: it tips over first; 0.13 to 0.17 measured."""
+SOONER = 0.9
+"""Share of the time by the law of sliding that a cube takes to the lip: 0.86 to 0.93 measured. It leans on its lower
+edge, and tips before its middle is there."""
 UNSURE = 0.10
 """By what share the friction of a block may differ from what is known of it: the jitter of certificates."""
 SEEN = 0.002
@@ -173,7 +176,7 @@ class SlideCatch(Scenario):
     def caught(self, world: World, block: str, sunk: float = 0.0) -> bool:
         """Whether the middle of a block is inside the bin, so far below its rim [m]."""
         x, y, z = np.abs(world.rot("bin").T @ (world.com(block) - world.pos("bin")))
-        inner = self.bin.bin
+        inner = self.bin
         return bool(x < inner.width / 2 and y < inner.length / 2 and z < self.bin.rim - sunk)
 
     def on_ramp(self, world: World, block: str) -> bool:
@@ -222,7 +225,6 @@ class SlideCatch(Scenario):
             "park_in_the_middle": Shortcut(self._park),
             "the_other_way_round": Shortcut(lambda world: self._in_order(world, self.sequence[::-1])),
             "wait_for_the_slide": Shortcut(self._react),
-            "sweep_along_the_lip": Shortcut(self._sweep),
             "herd_them_together": Shortcut(self._herd),
             "take_them_by_hand": Shortcut(self._by_hand),
         }
@@ -256,20 +258,12 @@ class SlideCatch(Scenario):
             left.remove(block)
         yield from release(world.arm)
 
-    def _sweep(self, world: World) -> Plan:
-        """Draw the bin to and fro along the whole lip."""
-        yield from self.take(world)
-        while self.pending(world):
-            for lane in (0, COUNT - 1):
-                y = self.spot(lane)[1]
-                yield from self.wait_at(world, y, lambda y=y: abs(world.pos("bin")[1] - y) < 0.02)
-
     def _herd(self, world: World) -> Plan:
         """Lift the bin onto the ramp, and push the outer blocks beside the middle one with its wall."""
         yield from self.take(world)
         over = world.arm.hand - world.pos("bin") + (self.incline.lip + 0.03) * UP
-        for lane, side in ((0, 1), (COUNT - 1, -1)):
-            beside = self.lip + np.array([0.0, side * (self.lane + self.bin.bin.outer[1]), 0.0])
+        for side in (1, -1):
+            beside = self.lip + np.array([0.0, side * (self.lane + self.bin.outer[1]), 0.0])
             beside[2] = TABLE_TOP
             yield from go_to(world.arm, beside + over + 0.05 * UP, facing_down(), BRISK)
             yield from go_to(world.arm, beside + over, facing_down(), BRISK)
@@ -293,13 +287,11 @@ class SlideCatch(Scenario):
         return Answer(numbers, act, lambda number: ORDERS[round(number)] == self.sequence, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """The same scene to the eye, with the frictions of the lowest and the highest exchanged; a hinge that sticks."""
+        """The same scene to the eye, with the frictions of the lowest and the highest block exchanged."""
         lowest, _, highest = ORDERS[self.order]
         exchanged = list(self.loads)
         exchanged[lowest], exchanged[highest] = exchanged[highest], exchanged[lowest]
-        stuck = self.build()
-        stuck.joint("incline/hinge").range = [-0.01, 0.01]
-        return {"frictions_exchanged": self._scene(exchanged), "hinge_stuck": stuck}
+        return {"frictions_exchanged": self._scene(exchanged)}
 
     # --- constraints ------------------------------------------------------------------------
 
@@ -310,26 +302,28 @@ class SlideCatch(Scenario):
         yield require(rough < most - 0.02, "a block never slides", slips=rough, most=most)
         topples = math.radians(45.0)
         yield require(rough < topples, "a block topples before it slides", slips=rough, topples=topples)
-        apart, width = self.lane, self.bin.bin.length + self.edge
+        apart, width = self.lane, self.bin.length + self.edge
         yield require(apart > width, "one place of the bin serves two lanes", apart=apart, width=width)
-        room, needs = self.bin.bin.length - self.edge, 0.02
+        room, needs = self.bin.length - self.edge, 0.02
         yield require(room >= needs, "the bin is too narrow", room=room, needs=needs)
         fetched = self.over_lip(self.first, -UNSURE)
         yield require(fetched > FETCH, "the first block comes before the bin", comes=fetched, fetched=FETCH)
         spare = min(self.spare(one, other) for one, other in pairwise(self.sequence))
         yield require(spare > 0.0, "two blocks come so soon after each other that the bin serves one", spare=spare)
-        late = max(self.reached(lane) for lane in range(COUNT))
-        missed = self.lane - room / 2
-        yield require(late < missed, "who waits for the slide comes in time", comes=late, needs=missed)
         outside = max(load.away for load in self.loads) + self.edge / 2
         yield require(outside < self.incline.length, "a block stands out over the ramp", out=outside)
         wide = COUNT * self.lane - self.lane + self.edge
         yield require(wide < self.incline.width, "a lane is beside the ramp", wide=wide, ramp=self.incline.width)
-        beyond = self.bin_x + self.bin.bin.outer[0] / 2
+        beyond = self.bin_x + self.bin.outer[0] / 2
         yield require(beyond < self.x - 0.01, "the bin stands under the ramp", reaches=beyond, lip=self.x)
-        yield on_table("the ramp", self.lip + np.array([[self.incline.length, side * self.half, 0] for side in (-1, 1)]))
+        yield on_table(
+            "the ramp", self.lip + np.array([[self.incline.length, side * self.half, 0] for side in (-1, 1)])
+        )
         hands = [self.below(self.spot(lane)[1]) + self.bin.handle for lane in range(COUNT)]
         yield within_reach("the bin", *hands, np.array([self.bin_x, self.bin_y, TABLE_TOP]) + self.bin.handle)
+        late = max(self.reached(lane) for lane in range(COUNT))
+        missed = self.lane - room / 2
+        yield require(late < missed, "who waits for the slide comes in time", comes=late, needs=missed)
 
     def features(self) -> Mapping[str, float]:
         """How much time is left between two slides [s], the slope at which the first block goes [rad], by how much the
@@ -358,7 +352,7 @@ class SlideCatch(Scenario):
     def slides_for(self, lane: int, way: float) -> float:
         """How long it takes to slide so far [s]."""
         load, rate = self.loads[lane], math.radians(self.rate)
-        return (way / slid(load.friction, rate, 1.0)[0]) ** (1 / 3)
+        return SOONER * (way / slid(load.friction, rate, 1.0)[0]) ** (1 / 3)
 
     def over_lip(self, lane: int, unsure: float = 0.0) -> float:
         """When its middle is over the lip [s]."""
@@ -424,4 +418,4 @@ class SlideCatch(Scenario):
 
     def below(self, y: float) -> Vec3:
         """Where the bin stands at the lip, ready for what comes down at `y` [m]."""
-        return np.array([self.x + UNDER - self.bin.bin.width / 2, y, TABLE_TOP])
+        return np.array([self.x + UNDER - self.bin.width / 2, y, TABLE_TOP])
