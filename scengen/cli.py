@@ -142,12 +142,17 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if verb not in (*VERBS, *COMPLETING):
         raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
 
+    from .task_files import ORIGINS
+    from .usage import usage
+
+    if {"-h", "--help"} & set(arguments) and verb in VERBS:
+        print(usage(verb, [a for a in arguments if not a.startswith("-")]), end="")
+        return OK
+
     # What follows takes seconds to import on a busy machine; nothing above needs it.
-    from . import config
     from .commands import out
     from .completion import BASH, completions
     from .control import native
-    from .usage import usage
 
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     if verb == "--completion":
@@ -160,14 +165,11 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         return OK
     if verb == "generate":  # several values are a sweep there, with Hydra's option or without it
         arguments = [a for a in arguments if a not in ("-m", "--multirun")]
-    if {"-h", "--help"} & set(arguments):
-        out.print(usage(verb, [a for a in arguments if not a.startswith("-")]), end="")
-        return OK
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOWING:
         return _show(verb, arguments)
     if flags:
-        known = "settings are key=value, options --help, --cfg job and --info " + "|".join(config.ORIGINS)
+        known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is no option; {known}; see scengen {verb} --help")
     command = import_module(f".commands.{verb}", __package__).command
     if signals:

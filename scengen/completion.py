@@ -7,7 +7,7 @@ from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.plugins.completion_plugin import DefaultCompletionPlugin
 
-from . import config
+from . import config, task_files
 from .errors import ScengenError
 from .pool import Pool
 
@@ -42,11 +42,11 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
     key, equals, _ = word.partition("=")
     with suppress(ScengenError):  # a line that is not right yet
         if equals and key == "split":
-            return _last(word, "+,", config.splits(_task(others), config.search_path(others)))
+            return _last(word, "+,", task_files.splits(_task(others), task_files.search_path(others)))
         if equals and key == "axis":
-            return _last(word, "", config.splits(_task(others), config.search_path(others))[1:])
+            return _last(word, "", task_files.splits(_task(others), task_files.search_path(others))[1:])
         if equals and key == "task":
-            return _last(word, ",", config.tasks(config.search_path(others))) if verb != "new" else []
+            return _last(word, ",", task_files.tasks(task_files.search_path(others))) if verb != "new" else []
         if equals and key == "id":
             names = [name for folder in _pools(others) for name in Pool.open(folder).names()]
             return _last(word, "", map(str, names)) or _last(word, "", (name.id for name in names))
@@ -71,9 +71,9 @@ def _last(word: str, separators: str, known: Iterable[str]) -> list[str]:
 
 def _settings(verb: str, words: Sequence[str], word: str) -> list[str]:
     """Hydra's own: keys of the composed configuration, and files of groups."""
-    groups = config.groups(verb)
+    groups = task_files.groups(verb)
     if "task" in groups and not _task(words):
-        words = [*words, f"task={config.tasks()[0]}"]  # its keys are those of all tasks, but for the parameters
+        words = [*words, f"task={task_files.tasks()[0]}"]  # its keys are those of all tasks, but for the parameters
     with initialize_config_dir(str(config.root(verb)), version_base="1.3", job_name="scengen"):
         plugin = DefaultCompletionPlugin(GlobalHydra.instance().config_loader())
         found = plugin._query(config.file(verb), " ".join([*words, word]))

@@ -7,9 +7,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,38 +21,15 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .parallel import cores
-from .samplers.split import ID
 from .samplers.task import Task, load
+from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path
+from .task_files import tasks as tasks  # for those who load them all
 from .validate.settings import CertifySettings
 
 T = TypeVar("T")
 
-PACKAGES = "scengen.tasks"
-"""Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder
-in it that holds `task/<task>.yaml`."""
-
-
 AUTO = "auto"
 """A number of workers: as many as there are cores to use."""
-
-
-@cache
-def conf_dir() -> Path:
-    """The folder of configuration files: inside an installed package, beside it in a checkout."""
-    return shipped("conf")
-
-
-def shipped(name: str) -> Path:
-    """A folder that comes with scengen: inside an installed package, beside it in a checkout.
-
-    Raises:
-        BadConfig: it is missing.
-    """
-    here = Path(__file__).parent
-    found = next((d for d in (here / name, here.parent / name) if d.is_dir()), None)
-    if found is None:
-        raise BadConfig(f"the {name}/ folder is missing from this installation; install scengen again")
-    return found
 
 
 def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
@@ -199,66 +173,6 @@ def _logging_kept() -> Iterator[None]:
         root_logger.setLevel(level)
 
 
-ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
-"""What Hydra's --info tells here: which file gives what, in order or as a tree; the folders; and all of it."""
-
-
-@cache
-def splits(name: str, search: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """The splits that the file of a task names, without a look at its family.
-
-    Raises:
-        ScengenError: there is no such file, or it is no YAML.
-    """
-    plain, _ = _composed("one_task", [f"task={name}", *search])
-    return (ID, *(plain["task"].get("axes") or ()))
-
-
-@cache
-def category(name: str) -> str:
-    """The category of a task, as its file names it."""
-    return str(_composed("one_task", [f"task={name}"])[0]["task"].get("category"))
-
-
-def certified() -> dict[str, dict[str, dict[str, float]]]:
-    """What certification came to when the tasks were measured: conf/certified.yaml.
-
-    Returns:
-        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] for each that was.
-    """
-    found: dict[str, dict[str, dict[str, float]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
-    return found
-
-
-def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
-    """Those overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`."""
-    return tuple(o for o in overrides if o.startswith("hydra.searchpath="))
-
-
-@cache
-def packages() -> tuple[str, ...]:
-    """Folders of configuration of installed packages that offer tasks (`PACKAGES`), as Hydra writes them.
-
-    Raises:
-        BadConfig: a package offers a folder that is not there.
-    """
-    return tuple(sorted(f"file://{_offered(point)}" for point in entry_points(group=PACKAGES)))
-
-
-def _offered(point: EntryPoint) -> str:
-    """The folder that an entry point names."""
-    try:
-        found = find_spec(point.value)
-    except (ImportError, ValueError):
-        found = None
-    folders = (found and found.submodule_search_locations) or ()
-    for folder in folders:
-        if Path(folder, "task").is_dir():
-            return folder
-    whose = point.dist.name if point.dist else point.name
-    raise BadConfig(f"the package {whose} offers tasks in {point.value}/task, which is not there; mend or remove it")
-
-
 def _with_packages(overrides: Sequence[str]) -> list[str]:
     """Overrides in which Hydra also searches installed packages, behind the folders that they name themselves."""
     named, others = search_path(overrides), [o for o in overrides if not o.startswith("hydra.searchpath=")]
@@ -267,14 +181,6 @@ def _with_packages(overrides: Sequence[str]) -> list[str]:
     given = [override.value() for text in named if (override := _parsed(text))]
     folders = [folder for each in given for folder in (each if isinstance(each, list) else [each])]
     return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
-
-
-def tasks(search: Sequence[str] = ()) -> list[str]:
-    """Names of all task files, those of other packages included (`packages`, `search_path`)."""
-    with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="scengen"):
-        loader = GlobalHydra.instance().config_loader()
-        overrides = _with_packages(search)
-        return sorted(set(loader.get_group_options("task", config_name="command/tasks", overrides=overrides)))
 
 
 def task(name: str, search: Sequence[str] = ()) -> Task:
@@ -510,11 +416,6 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
         seen.append(part)
         node = node[part]
     return None
-
-
-def groups(verb: str) -> list[str]:
-    """Groups from which a command line may choose a file, such as `task`."""
-    return re.findall(r"^ +- /(\w+):", (conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
 
 
 def _first_lines(text: str) -> str:

@@ -11,7 +11,7 @@ import scengen
 
 LAYERS = (
     ("errors", "statistics", "geometry", "certificate", "printed", "versions"),
-    ("names", "orientation", "params", "physics", "symmetry", "targets"),
+    ("names", "orientation", "params", "physics", "symmetry", "targets", "task_files"),
     ("robots",),
     ("control",),
     ("log", "parallel", "sim"),

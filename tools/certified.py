@@ -15,6 +15,7 @@ import yaml
 from scengen import config
 from scengen.runs.generate import Settings, generate
 from scengen.samplers.split import ID
+from scengen.task_files import certified
 
 FILE = Path(__file__).parent.parent / "conf" / "certified.yaml"
 HEAD = """# What certification came to: by task and split the draws tried, those certified among them at level quick,
@@ -36,7 +37,7 @@ def measured(task: str, split: str, n: int) -> dict[str, float]:
 
 def main() -> None:
     n, names = int(sys.argv[1]), sys.argv[2:] or config.tasks()
-    every = config.certified()
+    every = certified()
     for name in names:
         every[name] = {split: measured(name, split, n) for split in (ID, *config.task(name).axes)}
         print(name, every[name], flush=True)

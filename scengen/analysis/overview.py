@@ -67,7 +67,7 @@ def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Over
     """Look at every pool, and at every two of one task.
 
     Args:
-        search: folders of other packages with tasks, see `config.search_path`.
+        search: folders of other packages with tasks, see `task_files.search_path`.
     """
     known = [(pool, task_of(pool, search)) for pool in pools]
     held = [(pool, task, scenarios_of(task, pool)) for pool, task in known]

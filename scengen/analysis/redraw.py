@@ -29,7 +29,7 @@ def task_of(pool: Pool, search: Sequence[str] = ()) -> Task:
     """The task as it was when the pool was made: its numbers from the manifest, its family from the installed file.
 
     Args:
-        search: overrides that add folders of other packages, see `config.search_path`.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
         ScengenError: there is no such task, or the family is another one or has changed so that the task does not fit.

@@ -9,13 +9,14 @@ from .. import config
 from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig
 from ..pictures.report import attack_table
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..targets import try_file, try_folder
+from ..task_files import search_path
 from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
 
 

@@ -9,10 +9,11 @@ from ..analysis.bias import Bias, acceptance_map, bias
 from ..analysis.redraw import Redrawn, redrawn
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
-from ..config import read, search_path
+from ..config import read
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
+from ..task_files import search_path
 from . import OK, Arguments, err, one, out, say, write_json
 
 

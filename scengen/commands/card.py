@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..attack.check import attacked
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, PoolError, at_least, cut
 from ..export.hub import Part, check_parts, check_target, own_license, publish
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report
 from . import OK, Arguments, err, say, several

@@ -11,12 +11,13 @@ from ..analysis.distance import energy, near_duplicates, per_parameter
 from ..analysis.redraw import redrawn, scenarios_of, task_of
 from ..analysis.space import of_features
 from ..analysis.tables import pairs_table
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..targets import try_file
+from ..task_files import search_path
 from . import FAILED, OK, Arguments, names, out, say, several, write_json
 
 

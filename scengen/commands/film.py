@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .. import config
 from ..attack.evidence import Hit
-from ..config import read, search_path
+from ..config import read
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
@@ -13,6 +13,7 @@ from ..pictures.render import encode
 from ..runs.progress import ProgressBar
 from ..sim import scene_text
 from ..targets import try_file
+from ..task_files import search_path
 from ..validate.playable import check_row
 from . import OK, Arguments, chosen, err, holder, say, write
 

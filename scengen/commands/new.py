@@ -11,6 +11,7 @@ from .. import config
 from ..conformance import SNAKE_CASE
 from ..errors import BadConfig, cut
 from ..targets import try_folder, write
+from ..task_files import shipped
 from . import OK, Arguments, say
 
 TASK, PACKAGE = "push_off", "my_tasks"
@@ -50,7 +51,7 @@ def command(arguments: Arguments) -> int:
     if folder.is_dir() and any(folder.iterdir()):
         raise BadConfig(f"{cut(str(folder))} is not empty; name a new folder with to=FOLDER")
     names = _names(settings.task, settings.package)
-    example = config.shipped("example")
+    example = shipped("example")
     for path in sorted(example.rglob("*")):
         if path.is_file() and path.suffix in SUFFIXES:
             write(folder / _renamed(str(path.relative_to(example)), names), _renamed(path.read_text(), names))

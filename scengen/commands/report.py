@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.overview import gather, page, plain
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig
 from ..pool import Pool
 from ..targets import try_file
+from ..task_files import search_path
 from . import OK, Arguments, remark, say, several, write_json
 
 

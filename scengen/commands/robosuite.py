@@ -5,12 +5,13 @@ from dataclasses import asdict, dataclass
 
 from rich.table import Table
 
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, at_least
 from ..parallel import Limits
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
+from ..task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
 
 

@@ -5,13 +5,14 @@ from pathlib import Path
 
 from .. import config
 from ..analysis.redraw import task_of
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
 from ..pictures.sheet import contact_sheet
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
+from ..task_files import search_path
 from ..validate.playable import check_row
 from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from ..analysis.coverage import farthest_points
 from ..analysis.redraw import scenarios_of, task_of
 from ..analysis.space import of_parameters
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
 from ..targets import try_folder
+from ..task_files import search_path
 from . import OK, Arguments, one, say
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from .. import config
 from ..errors import UnknownName
 from ..pictures.report import axes_table, task_tables, tasks_table
+from ..task_files import certified
 from . import OK, Arguments, out
 
 PAPER = "paper"
@@ -27,7 +28,7 @@ def command(arguments: Arguments) -> int:
     if settings.axes:
         out.print(axes_table([(task, axis) for task in tasks for axis in task.axes.values() if task.of_paper(axis)]))
     elif name is None:
-        out.print(tasks_table(tasks, config.certified()))
+        out.print(tasks_table(tasks, certified()))
     else:
         for table in task_tables(tasks[0]):
             out.print(table)

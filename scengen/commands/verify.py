@@ -14,13 +14,14 @@ from .. import config
 from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
-from ..config import read, search_path
+from ..config import read
 from ..errors import BadConfig, at_least
 from ..parallel import Limits, WorkerDied, apart
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..targets import try_file
+from ..task_files import search_path
 from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
@@ -98,7 +99,7 @@ def verified(pool: Pool, options: Options, search: Sequence[str], progress: Call
     """Check every claim of a pool, those about attacks on it included.
 
     Args:
-        search: overrides that add folders of other packages, see `config.search_path`.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
         progress: told how many scenarios have been checked.
     """
     task = config.task(pool.task, search)

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from .. import config
-from ..config import read, search_path
+from ..config import read
 from ..pictures.view import check_display, view
+from ..task_files import search_path
 from ..validate.playable import check_row
 from . import OK, Arguments, chosen, holder
 

@@ -51,7 +51,7 @@ def compare_all(
 
     Args:
         progress: told how many scenarios have been compared.
-        search: folders of other packages with tasks, see `config.search_path`.
+        search: folders of other packages with tasks, see `task_files.search_path`.
         limits: of every scenario; None to work in this process.
 
     Raises:

@@ -66,7 +66,7 @@ class RobosuiteEnv(ManipulationEnv):
     NAME: ClassVar[str] = ""
     """Name of the task."""
     SEARCH: ClassVar[tuple[str, ...]] = ()
-    """Where else to look for its file, see `config.search_path`."""
+    """Where else to look for its file, see `task_files.search_path`."""
 
     sim: Any
     """robosuite's simulation."""
@@ -330,7 +330,7 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
 
     Args:
         task: name of the task.
-        search: folders of other packages, see `config.search_path`.
+        search: folders of other packages, see `task_files.search_path`.
 
     Raises:
         BadConfig: robosuite has another environment of that name.

@@ -109,7 +109,7 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None], search: S
 
     Args:
         progress: told how many rollouts are done and how many there are.
-        search: overrides that add folders of other packages, see `config.search_path`.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
         ScengenError: a pool, a policy or a setting is not as it must be.

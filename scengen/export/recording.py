@@ -134,7 +134,7 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
 
     Args:
         progress: told how many episodes are done and how many there are.
-        search: overrides that add folders of other packages, see `config.search_path`.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
         ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.

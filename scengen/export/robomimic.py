@@ -151,7 +151,7 @@ def environment(
         pools: folders of the pools.
         cameras: the paper's names of the cameras to be observed.
         size: width and height of the pictures [pixels].
-        search: folders of other packages with tasks, see `config.search_path`.
+        search: folders of other packages with tasks, see `task_files.search_path`.
     """
     kind, rate = env_class(task, search), round(1 / Loop.PERIOD)
     blind: dict[str, Any] = {

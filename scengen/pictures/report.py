@@ -112,7 +112,7 @@ def tasks_table(tasks: Sequence[Task], certified: Mapping[str, Mapping[str, Mapp
 
     Args:
         tasks: those of a category one after the other.
-        certified: what certification came to, see `config.certified`.
+        certified: what certification came to, see `task_files.certified`.
     """
     table = Table(title=f"{len(tasks)} tasks", title_justify="left")
     for column in ("", "code", "task", "hands"):

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from ..errors import BadConfig
-
-ID = "id"
-"""Name of the split that policies train on."""
+from ..task_files import ID as ID
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import pytest
 from helpers import REFERENCE
 from pools import QUICKLY, make
 
-from scengen import cli, config
+from scengen import cli, config, task_files
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
@@ -284,5 +284,5 @@ def test_a_scene_that_reaches_outside_itself_is_refused(text, says):
 
 
 def test_every_task_file_is_found_without_registration():
-    files = {path.stem for path in (config.conf_dir() / "task").glob("*.yaml")}
+    files = {path.stem for path in (task_files.conf_dir() / "task").glob("*.yaml")}
     assert set(config.tasks()) == files and "domino_single" in files

@@ -7,7 +7,7 @@ import pytest
 from helpers import REFERENCE
 from pools import make
 
-from scengen import cli, collection, config
+from scengen import cli, collection, config, task_files
 from scengen.envs.pools import rows_of
 from scengen.errors import PoolError
 from scengen.pool import Pool
@@ -85,13 +85,13 @@ def test_all_tasks_or_a_category_are_a_sweep():
     every = [one.swept["task"] for one in config.combinations("generate", ["task=all", "n=1"])]
     assert every == config.tasks()
     named = [one.swept["task"] for one in config.combinations("generate", ["task=P4,packing,tool_retrieve"])]
-    assert named == [*sorted(t for t in config.tasks() if config.category(t) == "P4"), "packing"]
+    assert named == [*sorted(t for t in config.tasks() if task_files.category(t) == "P4"), "packing"]
 
 
 def test_the_tasks_stand_by_category(capsys):
     _, out, _ = told(capsys, "tasks")
     codes = [word for line in out.splitlines() for word in line.split() if word[:1] in "TM" and word[1:].isdigit()]
-    categories = {config.task(name).code: config.category(name) for name in config.tasks()}
+    categories = {config.task(name).code: task_files.category(name) for name in config.tasks()}
     order = [categories[code] for code in codes]
     assert order == sorted(order, key=lambda c: (c == "M", c))
     assert len(codes) == len(categories)

@@ -10,7 +10,7 @@ import yaml
 from helpers import REFERENCE
 from pools import QUICKLY
 
-from scengen import cli, config
+from scengen import cli, config, task_files
 from scengen.commands import generate
 from scengen.completion import BASH, completions
 from scengen.errors import BadConfig
@@ -110,7 +110,7 @@ def test_info_tells_where_it_comes_from(capsys):
         "command/generate:\n    task: packing"
         in said(capsys, "generate", "--info=defaults-tree", "task=packing")[1].out
     )
-    assert f"file://{config.conf_dir()}" in said(capsys, "generate", "task=packing", "-i", "searchpath")[1].out
+    assert f"file://{task_files.conf_dir()}" in said(capsys, "generate", "task=packing", "-i", "searchpath")[1].out
 
 
 @pytest.mark.parametrize(
@@ -140,9 +140,9 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
     assert (program, given) == ("scengen", verb)
     for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
         config.shown(verb, getattr(one, "overrides", one))
-    takes_task = "task" in config.groups(verb)
+    takes_task = "task" in task_files.groups(verb)
     assert takes_task == ("stout_starter turned_slab" in text) == ("+task.axes.NAME" in text)
-    assert ("certify.robust.runs=4" in text) == ("certify" in config.groups(verb))
+    assert ("certify.robust.runs=4" in text) == ("certify" in task_files.groups(verb))
     assert ("hydra.searchpath=" in text) == (takes_task or bool(re.search("^(pool|hits):", text, re.M)))
 
 

@@ -4,7 +4,7 @@ import random
 import re
 from pathlib import Path
 
-from scengen import cli, config
+from scengen import cli, task_files
 
 LONG = 10_000
 """Letters of the longest names."""
@@ -158,7 +158,7 @@ PATHS_IN = ["pool", "to", "json", "junit", "mesh"]
 """Settings that name files and folders."""
 
 SETTINGS = {
-    verb: re.findall(r"^(\w+):", (config.conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
+    verb: re.findall(r"^(\w+):", (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
     for verb in cli.VERBS
 }
 """Settings of every command, from its file."""

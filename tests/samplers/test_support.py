@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import config, task_files
 from scengen.errors import BadConfig, OutOfBounds
 from scengen.ood.features import at_most, departure, sampled, unseen
 from scengen.params import Parameter, parameters, values
@@ -255,7 +255,7 @@ def test_every_recorded_limit_belongs_to_a_parameter_of_an_axis_with_one_path_to
 
 def test_recorded_limits_are_found_beside_the_task_files_of_any_package(tmp_path):
     for group, text in (
-        ("task", (config.conf_dir() / "task" / "domino_single.yaml").read_text()),
+        ("task", (task_files.conf_dir() / "task" / "domino_single.yaml").read_text()),
         ("limits", "wide_gaps:\n  gap_ratio: 1.55\n"),
     ):
         (tmp_path / group).mkdir()

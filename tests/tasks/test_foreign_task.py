@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from foreign.push_block import PushBlock
 
-from scengen import cli, config, conformance
+from scengen import cli, config, conformance, task_files
 from scengen.conformance import Nonconformity
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, UnknownName
@@ -73,10 +73,10 @@ def installed(tmp_path, monkeypatch):
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: foreign\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.conf\n")
     monkeypatch.syspath_prepend(tmp_path)
-    config.packages.cache_clear()
+    task_files.packages.cache_clear()
     yield about
     monkeypatch.undo()
-    config.packages.cache_clear()
+    task_files.packages.cache_clear()
 
 
 def test_an_installed_package_offers_its_tasks_to_every_command(installed, tmp_path, capsys):
@@ -84,7 +84,7 @@ def test_an_installed_package_offers_its_tasks_to_every_command(installed, tmp_p
     assert config.task("push_block").family is PushBlock
     assert cli.run(("tasks", "task=push_bloc")) == 2 and "did you mean 'push_block'" in capsys.readouterr().err
     (installed / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.config\n")
-    config.packages.cache_clear()
+    task_files.packages.cache_clear()
     assert cli.run(("tasks",)) == 2
     assert "package foreign offers tasks in foreign.config/task, which is not there" in capsys.readouterr().err
 
