@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from ..errors import BadConfig, Infeasible
 from ..params import values
@@ -108,12 +108,12 @@ def departure(feature: str, training: list[float], here: list[float]) -> Departu
 
 def at_most(hits: int, draws: int) -> float:
     """One-sided Clopper-Pearson upper bound of a share at 95 % confidence."""
-    return float(beta.ppf(CONFIDENCE, hits + 1, draws - hits)) if hits < draws else 1.0
+    return float(betaincinv(hits + 1, draws - hits, CONFIDENCE)) if hits < draws else 1.0
 
 
 def unseen(draws: int) -> float:
     """Largest share of a distribution outside the ends of a sample, at 95 % confidence: Beta(2, n - 1), Wilks 1941."""
-    return float(beta.ppf(CONFIDENCE, 2, draws - 1)) if draws > 1 else 1.0
+    return float(betaincinv(2, draws - 1, CONFIDENCE)) if draws > 1 else 1.0
 
 
 def _twins(task: Task, split: str, draws: int, seed: int) -> list[tuple[Scenario, Scenario]]:

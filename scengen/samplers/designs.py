@@ -13,7 +13,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ..errors import BadConfig, nearest
 from .dists import Choice, Dist, Fixed, Integer
@@ -162,6 +161,8 @@ _BLOCK = 1024
 @cache
 def _sobol(dimensions: int, block: int) -> NDArray[np.int64]:
     """Points `block * _BLOCK` and following of the plain sequence as whole numbers of 53 bits, (_BLOCK, dimensions)."""
+    from scipy.stats import qmc  # whose import takes as long as all else that a command needs
+
     sequence = qmc.Sobol(dimensions, scramble=False, bits=30)
     if block:  # scipy cannot go forward by nothing
         sequence.fast_forward(block * _BLOCK)

@@ -7,7 +7,7 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
@@ -332,7 +332,7 @@ def no_ablations(scenario: Scenario) -> str:
 
 def lower_bound(successes: int, runs: int) -> float:
     """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
-    return float(beta.ppf(1 - CONFIDENCE, successes, runs - successes + 1)) if successes else 0.0
+    return float(betaincinv(successes, runs - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
 
 
 def _outcome(episode: Rollout) -> dict[str, Any]:

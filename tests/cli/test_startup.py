@@ -12,7 +12,10 @@ MOST = 250
 COUNT = "import json, sys; from scengen import cli; print(json.dumps([cli.run({}), list(sys.modules)]))"
 
 
-@pytest.mark.parametrize(("given", "status"), [([], 0), (["--help"], 0), (["--version"], 0), (["generat"], 2), (["generate", "--help"], 0)])
+@pytest.mark.parametrize(
+    ("given", "status"),
+    [([], 0), (["--help"], 0), (["--version"], 0), (["generat"], 2), (["generate", "--help"], 0)],
+)
 def test_what_asks_for_little_loads_little(given, status):
     done = subprocess.run([sys.executable, "-c", COUNT.format(given)], capture_output=True, text=True, check=True)
     told, modules = json.loads(done.stdout.splitlines()[-1])
