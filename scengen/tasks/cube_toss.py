@@ -23,6 +23,8 @@ Decisions, where the paper (App. B, T10) is silent or contradicts itself:
 * It gives no distances, and speaks of a goal zone. All of the table is within reach, so the zone is on the floor; and
   as a cube that falls from 1.1 m tumbles on where it lands, it is a tray with walls, which faces the robot.
 * There is one throw: the floor, on which a cube is lost, is out of reach.
+* On an axis of ours the tray rides on a rail around the robot, from a moment that nobody knows beforehand: the same
+  throw, to where the tray is going to be. "Comes to rest inside the goal zone" then means relative to the tray.
 
 The oracle foresees in every period where the cube would come down if it were let go, and steers not the hand but that
 place: sideways and outwards, by swinging faster or slower, until it stays in the middle of the tray. Then it opens the
@@ -31,8 +33,9 @@ later the jaw lets the cube land within 1 cm of the same place.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -42,13 +45,13 @@ from ..assets.bin import Bin
 from ..assets.box import Cube
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, axes, heading, quat, rotation
+from ..geometry import UP, Vec3, about_z, axes, heading, polar, quat, rotation
 from ..params import param
 from ..physics import flight
-from ..predicates import seated, still
+from ..predicates import seated
 from ..robots import jaw
 from ..robots.panda import BASE, REACH
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.grip import take
 from ..skills.jaw import release
@@ -85,6 +88,10 @@ EYES = {"agentview": (2.0, 0.0, 1.9), "sideview": (1.9, 0.5, 2.1)}
 the table alone."""
 MIDDLE: Vec3 = np.array([0.1, 0.0, 0.45])
 """What they look at [m]."""
+RAIL, RAISED = "rail", 0.01
+"""Hinge on which a tray rides around the robot, and how far over the floor [m]."""
+LEAD, ENDS = 3.2, 6.5
+"""How long after it has been picked up the cube comes down, about, and when at the latest it does [s]."""
 YELLOW = (0.95, 0.75, 0.20, 1.0)
 """Of the tray, on a grey floor."""
 
@@ -109,6 +116,10 @@ class CubeToss(Scenario):
     """Of the tray, against facing the robot."""
     opening: float = param(0.095, "m", 0.06, 0.20)
     """Of the tray: the length of its inner sides."""
+    rate: float = param(0.0, "deg/s", -10.0, 10.0)
+    """At which the tray rides on a rail around the robot, once it does, away from straight ahead."""
+    launch: float = param(2.0, "s", 0.5, 4.0)
+    """When."""
     x: float = param(-0.10, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
@@ -124,18 +135,29 @@ class CubeToss(Scenario):
             post = scene.worldbody.add_body(name="post", pos=self.spot - half * UP)
             solid(post, "post", [0.03, 0.03, half], rgba=self.tray.rgba)
         place(scene, self.tray, "tray", self.spot, math.radians(self.bearing + self.turn), free=False)
+        if self.rate:
+            to_axis = about_z(-math.radians(self.turn)) @ [-self.distance, 0.0, 0.0]
+            scene.body("tray").add_joint(name=RAIL, type=mujoco.mjtJoint.mjJNT_HINGE, axis=UP, pos=to_axis)
         for name, eye in EYES.items():
             camera = scene.camera(name)
             camera.pos, camera.quat = eye, _towards(MIDDLE - np.array(eye))
         return scene
 
+    def events(self, world: World) -> None:
+        if self.rate and world.passes(self.launch):
+            world.spin(RAIL, math.copysign(1.0, self.bearing) * math.radians(self.rate))
+
+    def pending(self, world: World) -> bool:
+        return bool(self.rate) and world.time < self.launch + Loop.PERIOD / 2
+
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
         tray, half = self.tray, self.opening / 2
-        middle = self.spot + (tray.floor + tray.depth / 2) * UP
+        middle = world.pos("tray") + (tray.floor + tray.depth / 2) * UP
         lies = seated(world, "cube", "tray", middle, math.sqrt(2) * half, tray.depth / 2)
-        return lies and still(world, "cube", STILL)
+        slips = world.velocity("cube")[3:] - world.velocity("tray")[3:]
+        return lies and math.sqrt(slips @ slips) < STILL
 
     def failure(self, world: World) -> str | None:
         return "the cube fell on the floor" if world.touching("cube", "world") else None
@@ -144,16 +166,22 @@ class CubeToss(Scenario):
 
     def oracle(self, world: World) -> Plan:
         """Pick up the cube, wind up, swing, and let go when it will come down in the middle of the tray."""
-        yield from self.wind_up(world)
-        yield from self.swing(world, self._bound)
+        aim = yield from self.wind_up(world)
+        yield from aim.swing(world, aim.bound)
 
-    def wind_up(self, world: World) -> Plan:
-        """Pick up the cube and bring it to where the swing begins, the fingers on either side of the swing."""
-        arm, at = world.arm, AXIS + WOUND[0] * self.u + WOUND[1] * UP
+    def wind_up(self, world: World) -> Generator[Action, None, Self]:
+        """Pick up the cube and bring it to where the swing begins, the fingers on either side of the swing.
+
+        Returns:
+            The scenario, with the tray's bearing at the time when the cube will come down.
+        """
+        arm = world.arm
         yield from take(arm, "cube", lift=WOUND[1] - TABLE_TOP - self.cube.edge / 2)
-        rot = facing_down(math.radians(self.bearing))
+        aim = self if not self.rate else replace(self, bearing=math.degrees(polar(self.target(world, LEAD) - AXIS)[0]))
+        at, rot = AXIS + WOUND[0] * aim.u + WOUND[1] * UP, facing_down(math.radians(aim.bearing))
         yield from until(go_to(arm, at, rot, COARSE), lambda: math.dist(arm.hand, at) < ARRIVED)
         yield from hold(arm, CALM)
+        return aim
 
     def swing(self, world: World, opens: Opens, wrist: float = 1.0) -> Plan:
         """Swing the hand out and up so that the cube is bound to come down in the tray, and open the jaw on the way.
@@ -165,7 +193,8 @@ class CubeToss(Scenario):
         arm, short = world.arm, list[float]()
         begin, opened, fast = world.time, math.inf, 1.0 / float(np.abs(self.u).max())
         while world.time < opened + FOLLOW:
-            miss = self.spot - self.foreseen(world) + LOST * self.u
+            seconds, place = self.foreseen(world)
+            miss = self.target(world, seconds) - place + LOST * self.u
             short.append(float(miss @ self.u))
             aside = float(miss @ self.across)
             closes = (short[-1 - SLOPE :][0] - short[-1]) / (SLOPE * Loop.PERIOD)
@@ -181,40 +210,48 @@ class CubeToss(Scenario):
             action[6] = CLOSED if opened == math.inf else OPEN
             yield np.clip(action, -1.0, 1.0)
 
-    def _bound(self, short: float, aside: float, closes: float) -> bool:
+    def bound(self, short: float, aside: float, closes: float) -> bool:
         """Whether the cube is bound to come down in the middle of the tray once the jaw lets go, or gets no farther."""
         there = abs(short - closes * self.opens) < EXACT[0] and abs(closes) < STEADY and abs(aside) < EXACT[1]
         return there or closes <= 0.0 < short
 
-    def foreseen(self, world: World) -> Vec3:
-        """Where the cube would come down if it were let go now [m]."""
-        height = self.stand + self.tray.floor + self.cube.edge / 2
-        return flight(world.com("cube"), world.velocity("cube")[3:], height)[1]
+    def foreseen(self, world: World) -> tuple[float, Vec3]:
+        """When and where the cube would come down if it were let go now [s, m]."""
+        return flight(world.com("cube"), world.velocity("cube")[3:], self.height)
+
+    def target(self, world: World, seconds: float) -> Vec3:
+        """Where the tray will be [m] after some time [s]."""
+        if not self.rate:
+            return self.spot
+        return AXIS + about_z(world.hinge(RAIL)[1] * seconds) @ (world.pos("tray") - AXIS)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        return {
+        plans = {
             "drop_it_at_full_stretch": Shortcut(self._stretch),
             "throw_without_the_wrist": Shortcut(self._stiff),
-            "throw_it_straight_ahead": Shortcut(replace(self, bearing=0.0).oracle),
+            "throw_it_straight_ahead": Shortcut(replace(self, bearing=0.0, rate=0.0).oracle),
         }
+        if self.rate:
+            plans["throw_it_where_the_tray_was"] = Shortcut(replace(self, rate=0.0).oracle)
+        return plans
 
     def _stretch(self, world: World) -> Plan:
         """Hold the cube out towards the tray as far as the arm goes, and let go."""
-        yield from self.wind_up(world)
-        arm, end = world.arm, world.time + 6.0
+        aim = yield from self.wind_up(world)
+        arm, end = world.arm, world.time + 4.5
         yield from go_to(arm, arm.hand + 0.2 * UP)
-        yield from turn_to(arm, rotation(-0.6 * self.across) @ arm.hand_rot, give_up=2.0)
-        out = push(arm, 0.08 * self.u, lambda: world.time > end, give_up=8.0)
-        yield from until(out, lambda: float((arm.hand - AXIS) @ self.u) > STRETCHED)
+        yield from turn_to(arm, rotation(-0.6 * aim.across) @ arm.hand_rot, give_up=2.0)
+        out = push(arm, 0.08 * aim.u, lambda: world.time > end, give_up=8.0)
+        yield from until(out, lambda: float((arm.hand - AXIS) @ aim.u) > STRETCHED)
         yield from hold(arm, 0.3)
         yield from release(arm)
 
     def _stiff(self, world: World) -> Plan:
         """Throw with the hand pointing down throughout."""
-        yield from self.wind_up(world)
-        yield from self.swing(world, self._bound, wrist=0.0)
+        aim = yield from self.wind_up(world)
+        yield from aim.swing(world, aim.bound, wrist=0.0)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """A wall in the air, beyond the hand and before the tray: what flies there strikes it."""
@@ -239,15 +276,19 @@ class CubeToss(Scenario):
         seconds, farthest = self.farthest
         needed = self.distance - half + edge
         yield require(needed < farthest, "the tray is too far away", needed=needed, farthest=farthest)
-        within = abs(self.bearing) <= SWUNG
-        yield require(within, "no throw was measured in that direction", bearing=abs(self.bearing), farthest=SWUNG)
-        over = AXIS + self.distance * self.u - THROWN[0] * (seconds - self.passing) * self.u
-        beside = float(np.abs(over[:2]).max()) - TABLE_HALF
+        bearings = abs(self.bearing), abs(self.bearing) + self.rate * max(0.0, ENDS - self.launch)
+        widest = max(bearings)
+        yield require(widest <= SWUNG, "no throw was measured in that direction", bearing=widest, farthest=SWUNG)
+        over = self.distance - THROWN[0] * (seconds - self.passing)
+        beside = min(float(np.abs((AXIS + over * heading(b))[:2]).max()) - TABLE_HALF for b in bearings)
         yield require(beside > edge, "the table is in the way", beside=beside, least=edge)
+        stands = not (self.rate and self.stand)
+        yield require(stands, "a tray on a post does not ride", rate=self.rate, stand=self.stand)
 
     def features(self) -> Mapping[str, float]:
         """Its flight as a share of the farthest throw's, how long that one takes [s], the room for it in the tray, how
-        far to the side it goes and how the tray is turned [rad], and what the fingers need to let go [s]."""
+        far to the side it goes and how the tray is turned [rad], what the fingers need to let go [s], and how fast the
+        tray is [m/s]."""
         seconds, farthest = self.farthest
         return {
             "share_of_the_farthest_throw": (self.distance - RADIUS) / (farthest - RADIUS),
@@ -256,6 +297,7 @@ class CubeToss(Scenario):
             "to_the_side": math.radians(abs(self.bearing)),
             "tray_turned_by": math.radians(abs(self.turn)),
             "opening_time": self.opens,
+            "tray_speed": abs(math.radians(self.rate)) * self.distance,
         }
 
     # --- mechanics and geometry ---------------------------------------------------------------
@@ -268,7 +310,7 @@ class CubeToss(Scenario):
     @property
     def farthest(self) -> tuple[float, float]:
         """How long the cube flies in a full swing [s], and how far from the robot's axis it comes down [m]."""
-        return self._thrown(self.stand + self.tray.floor + self.cube.edge / 2)
+        return self._thrown(self.height)
 
     @property
     def passing(self) -> float:
@@ -278,6 +320,11 @@ class CubeToss(Scenario):
     def _thrown(self, height: float) -> tuple[float, float]:
         seconds, place = flight(RADIUS * heading(0.0) + HEIGHT * UP, np.array([THROWN[0], 0.0, THROWN[1]]), height)
         return seconds, float(place[0])
+
+    @property
+    def height(self) -> float:
+        """Of the middle of a cube that lies in the tray [m]."""
+        return float(self.spot[2]) + self.tray.floor + self.cube.edge / 2
 
     @property
     def extent(self) -> float:
@@ -304,7 +351,7 @@ class CubeToss(Scenario):
     @property
     def spot(self) -> Vec3:
         """Middle of the foot of the tray [m]."""
-        return AXIS + self.distance * self.u + self.stand * UP
+        return AXIS + self.distance * self.u + (RAISED if self.rate else self.stand) * UP
 
     @property
     def start(self) -> Vec3:
