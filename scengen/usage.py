@@ -46,7 +46,7 @@ def _more(verb: str, groups: Sequence[str], plays: bool, overrides: Sequence[str
         for name in _tasks(overrides, search):
             yield from _wrapped(f"#   {name:<20}", task_files.splits(name, search))
         if verb == "generate":
-            yield "# task=all          pools of every task, and an index; task=P3: of a category; task=P3,packing: of these"
+            yield "# task=all          pools of all tasks, and an index; also task=P3, a category, or task=P3,packing"
         yield "# task.*           any number of the task's file, as in task.horizon=20 or task.id.x=[uniform,0,0.1]"
         yield "# +task.axes.NAME='{why: ..., replace: {tile: {friction: [uniform, 0.2, 0.3]}}}'   an axis of your own"
     if "certify" in groups:
