@@ -17,6 +17,9 @@ BEAD = 0.012
 class Bowl(Turned):
     """A bowl that stands on the middle of its foot, which is flush with the shell: no ring stands out to be gripped.
 
+    Suction holds on to the flat of the foot alone, inside or outside: on a sphere of 77 mm a flat lip 27 mm wide stands
+    off by 1.2 mm at its edge.
+
     Radius: paper, App. C ("2 sizes", no lengths): 0.065 and 0.080 m are a cereal and a soup bowl.
     """
 
@@ -74,8 +77,8 @@ class Bowl(Turned):
         shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(BANDS)]
         edge = [(self.radius, self.depth), (self.radius - self.bead, self.depth)]
         bead = [outside[-1], *edge, self._corner(self.outer - self.bead, angles[-1])]
-        walls = [Section(f"shell_{i}", corners) for i, corners in enumerate(shell)]
-        return [Section("bottom", tuple(bottom)), *walls, Section("bead", tuple(bead))]
+        walls = [Section(f"shell_{i}", corners, leaky=True) for i, corners in enumerate(shell)]
+        return [Section("bottom", tuple(bottom)), *walls, Section("bead", tuple(bead), leaky=True)]
 
     @property
     def _first(self) -> float:

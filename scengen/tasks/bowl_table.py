@@ -14,7 +14,8 @@ about a right angle. What is done wrong costs the episode.
 Decisions, where the paper (App. B, T07) says no more than "bowl", "rack" and "goal position":
 
 * The rack is a ring, made to measure: 4 mm of room around the rim, and so high that no finger gets in beside the dome.
-  The foot is flush with the dome: a ring underneath could be pinched.
+  The foot is flush with the dome: a ring underneath could be pinched. The cup does not hold on to the dome, on whose
+  side it would have a right angle more to turn.
 * The goal position is a green square, in which the bowl's foot is to stand, upright within 8 deg, let go.
 * "Some failed handovers accidentally invert the bowl and still lead to successful upright placement" (App. J): put
   down on its side a bowl rocks upright by itself. Here such an accident loses the episode: nothing but hands may
@@ -50,6 +51,7 @@ from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
 from ..skills.handover import STAND_OFF, hand_over
 from ..skills.motion import (
+    CLOSED,
     COARSE,
     FINE,
     OPEN,
@@ -61,6 +63,7 @@ from ..skills.motion import (
     facing,
     facing_down,
     go_to,
+    hold,
     push,
     retreat,
     together,
@@ -221,6 +224,7 @@ class BowlTable(Scenario):
             "cup_tips_it_over": Shortcut(self._tip_over),
             "cup_flings_it": Shortcut(self._fling),
             "cup_rights_it_in_the_rack": Shortcut(self._right_in_the_rack),
+            "cup_on_the_dome": Shortcut(lambda world: alone(world.arms[0], self._by_the_dome(world.arms[0]))),
             "jaw_on_the_dome": Shortcut(
                 lambda world: alone(world.arms[1], self._on_the_dome(world.arms[1])), to_rest=True
             ),
@@ -260,6 +264,18 @@ class BowlTable(Scenario):
             yield from suction.let_go(arm)
 
         yield from alone(arm, plan())
+
+    def _by_the_dome(self, arm: Arm) -> Plan:
+        """Take the bowl by the right side of its dome, so that there is more of a turn left, and turn it upright."""
+        out = (UP - LEFT) / math.sqrt(2.0)
+        spot = arm.world.pos("bowl") - self.bowl.centre * UP + self.bowl.outer * out
+        yield from go_to(arm, spot + 0.04 * out, facing(math.pi / 2, math.pi / 4), STEADY, OPEN)
+        yield from until(push(arm, -DOWNWARDS * out, lambda: arm.sealed, CLOSED), _after(arm.world, 2.0))
+        yield from hold(arm, 0.3, CLOSED)
+        yield from go_to(arm, arm.hand + 0.25 * UP, pace=CARRYING)
+        yield from turn_to(arm, facing_down(), 0.6)
+        yield from until(turn_to(arm, facing(-math.pi / 2, 0.0), 0.6, give_up=7.0), _after(arm.world, 6.0))
+        yield from self._lower(arm, self.goal)
 
     def _right_in_the_rack(self, world: World) -> Plan:
         """Lay the bowl on the rack on its side: it would rock upright there. Bring it to the square by its inside."""

@@ -135,6 +135,12 @@ def test_pads_hold_the_dome_from_the_friction_of_a_textbook(share, holds):
     assert (math.dist(world.pos("bowl"), scenario.start) > 0.02) == holds
 
 
+def test_the_cup_does_not_hold_on_to_the_dome():
+    world = load(TASK, NOMINAL)
+    assert not play_shortcut(TASK, NOMINAL, "cup_on_the_dome", world).solved
+    assert world.touched("robot0", "bowl") and world.touching("bowl", "rack")
+
+
 def test_both_arms_touch_the_bowl_in_the_solution_and_never_each_other():
     rollout, world = solution(TASK, NOMINAL), load(TASK, NOMINAL)
     assert replay(NOMINAL, world, rollout.actions, TASK.horizon).solved
