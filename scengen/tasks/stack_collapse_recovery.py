@@ -49,7 +49,7 @@ from ..sim.memory import remember
 from ..sim.world import World
 from ..skills.grip import Grip, directions, extent, grips
 from ..skills.jaw import carry, pick, put, release
-from ..skills.motion import FINE, OPEN, Pace, closing_along, go_to, retreat, wait
+from ..skills.motion import FINE, OPEN, Pace, facing_down, go_to, hand_yaw, retreat, wait
 
 CALM, RESTED = 0.01, 0.2
 """Speed below which a cube counts as at rest [m/s], and for how long all must be so before the oracle acts [s]."""
@@ -57,6 +57,10 @@ OVER = 0.03
 """How far a cube is carried over the top of the tower, and the hand rises over one that it has let go [m]."""
 CLEAR = 0.008
 """Of the finger tips over a cube before they go down beside it [m]."""
+ROOM = 0.010
+"""Air beside the open jaw that is enough [m]: moves are exact to 3 mm."""
+UNWOUND = 1.7
+"""Angle of joint 7 up to which a wrist can be turned on the way to any place [rad]: it ends at 2.9."""
 BEYOND = 0.004
 """How far over the edge a cube's middle is let go by who does not look for the one below [m]."""
 LEVEL = Pace(0.30, 0.008)
@@ -193,14 +197,33 @@ class StackCollapseRecovery(Scenario):
         yield from retreat(world.arm, self.cubes[name].edge / 2 + OVER)
 
     def take(self, world: World, name: str) -> Plan:
-        """Take a cube by those sides beside which the open jaw has most room, and lift it over the tower."""
-        best = max(grips(world, name), key=lambda grip: self.room(world, name, grip))
-        high = max(extent(world, other, UP)[1] for other in NAMES) + self.cubes[name].edge / 2 + OVER - best.at[2]
-        above, rise = best.at + high * UP, self.cubes[name].edge / 2 + TIP + CLEAR
-        yield from go_to(world.arm, above, pace=LEVEL, grip=OPEN)  # there it is seen which way the wrist can turn
-        yield from go_to(world.arm, above, closing_along(world.arm, best.closing))  # a turn drags the hand along
-        yield from go_to(world.arm, best.at + rise * UP, pace=FINE)  # the arm swings on when it comes near the robot
-        yield from pick(world.arm, best.at, best.closing, above=rise, lift=high)
+        """Take a cube by two of its sides, and lift it over the tower."""
+        arm, half, at = world.arm, self.cubes[name].edge / 2, grips(world, name)[0].at
+        high = max(extent(world, other, UP)[1] for other in NAMES) + half + OVER - at[2]
+        rise = half + TIP + CLEAR
+        yield from go_to(arm, at + high * UP, pace=LEVEL, grip=OPEN)  # there it is seen how far the wrist can turn
+        closing, turn = self.sides(world, name)
+        rot = facing_down(hand_yaw(arm) + turn)
+        yield from go_to(arm, at + high * UP, rot)  # a turn drags the hand along
+        yield from go_to(arm, at + rise * UP, rot, FINE)  # the arm swings on when it comes near the robot
+        yield from pick(arm, at, closing, above=rise, lift=high)
+
+    def sides(self, world: World, name: str) -> tuple[Vec3, float]:
+        """Along what to close the jaw on a cube, and by how much to turn the hand for that [rad].
+
+        The least turn after which the wrist is not wound up, by sides that have room for the jaw beside them; by those
+        that have most, if none has enough.
+        """
+        air = {tuple(grip.closing): self.room(world, name, grip) for grip in grips(world, name)}
+        enough = [np.array(closing) for closing, room in air.items() if room >= min(ROOM, max(air.values()))]
+        yaw, wrist = hand_yaw(world.arm), float(world.arm.joint_pos[6])
+        turns = [
+            (math.remainder(math.atan2(-x, y) + flip - yaw, 2 * math.pi), np.array([x, y, 0.0]))
+            for x, y, _ in enough
+            for flip in (0.0, math.pi)
+        ]
+        turn, closing = min(turns, key=lambda one: (abs(wrist - one[0]) > UNWOUND, abs(one[0])))
+        return closing, turn
 
     def room(self, world: World, name: str, grip: Grip) -> float:
         """Air between the open jaw around a cube and the other cubes, as seen from above [m]."""
