@@ -121,8 +121,8 @@ class RecoverPegInsert(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        middle = sum(self.ends(world)) / 2
-        within = np.abs(middle[1:]).max() < self.board.slot / 2
+        foot, top = self.ends(world)
+        within = np.abs(foot + top)[1:].max() < self.board.slot  # the middle's two distances, doubled
         return bool(world.memory["turned"] and within and DEEP <= self.progress(world) <= FLUSH)
 
     def failure(self, world: World) -> str | None:
