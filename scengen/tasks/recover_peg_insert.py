@@ -322,12 +322,13 @@ class RecoverPegInsert(Scenario):
         yield within_reach("the peg or the mouth", *over)
 
     def features(self) -> Mapping[str, float]:
-        """How far off the old way is after the turn, room in the slot, its direction [rad], and when it turns [m]."""
+        """How far the turn exceeds what passes, room in the slot, how far the mouth moves per angle [m], the slot's
+        direction [rad], how much of the peg the slot leaves out, and when the board turns [m]."""
         steepest = self.board.steepest(self.peg.width)
         return {
-            "turn_over_steepest": math.radians(self.turn) / steepest,
+            "turn_over_steepest": abs(math.radians(self.turn)) / steepest,
             "clearance_over_width": self.board.slot / self.peg.width - 1.0,
-            "shift_of_the_mouth": self.board.pivot * math.sin(math.radians(self.turn)),
+            "shift_per_turn": self.board.pivot,
             "azimuth_of_the_slot": self._azimuth,
             "peg_over_slot": self.peg.length / self.board.depth,
             "distance_at_the_turn": self.distance,
