@@ -24,8 +24,8 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
   wider than the middle one and has its weight on one side, which is dark: middle over middle it tips. Where it comes to
   lie with that side up or down the middle will do; such scenarios are refuted by a shortcut.
 
-There is no hurry but for the horizon: 18 s are enough for two cubes, of 32 s. A cube may be put down half the edge of the one
-below from its middle, 20 mm and more, and the oracle does so within 3 mm; the jaw has 12 mm to either side of a cube.
+There is no hurry but for the horizon: 18 s are enough for two cubes, of 32 s. A cube may be put down half the edge of
+the one below from its middle, 20 mm and more; the oracle does so within 3 mm. The jaw has 12 mm on either side of a cube.
 """
 
 import math
