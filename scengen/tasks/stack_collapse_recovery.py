@@ -25,7 +25,7 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
   lie with that side up or down the middle will do; such scenarios are refuted by a shortcut.
 
 There is no hurry but for the horizon: 18 s are enough for two cubes, of 32 s. A cube may be put down half the edge of
-the one below from its middle, 20 mm and more; the oracle does so within 3 mm. The jaw has 12 mm on either side of a cube.
+the one below from its middle, 20 mm and more; the oracle does so within 3 mm. Each finger has 12 mm beside a cube.
 """
 
 import math
