@@ -46,7 +46,7 @@ from ..robots import panda
 from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, require
 from ..sim.memory import remember
 from ..sim.world import Arm, World
-from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, hold, stay, steer, until, wait
+from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, hold, steer, until, wait
 
 TRAINED = tuple("WORLD PLANT MUSIC FRUIT BREAD CHAIR HOUSE NIGHT QUICK JUMBO GHOST BLACK".split())
 UNSEEN = tuple("TABLE STONE CLOUD OCEAN TIGER LEMON SUGAR VIDEO PIANO ZEBRA WALTZ FLAME".split())
@@ -65,12 +65,16 @@ OVER = 0.10
 LOW, NEAR, ON = 0.02, 0.004, 0.010
 """The partner: how far under its way it counts as being down, how near to a key's middle it is when it begins to go
 down, and how far from there it may come while it is down [m]. From 12 mm on it would touch the neighbour."""
-DEEP = 0.020
-"""How far below the upper face of a cap the partner aims: it arrives at 0.08 m/s and presses with about 8 N [m]."""
-PRESS, ABOVE, SOFTLY = 0.012, 0.02, Pace(0.08, 0.0)
+DEEP = 0.010
+"""How far below the upper face of a cap the partner aims [m]. It arrives at 0.04 m/s and presses with about 4 N: the
+controller of a hand that is stopped from below pushes it aside too, the more the harder it presses."""
+PRESS, ABOVE, SOFTLY = 0.006, 0.02, Pace(0.08, 0.0, 20.0)
 """The agent's oracle: how far below that face it aims, from how far above it comes down slowly [m], and how."""
-PATIENCE, LONGER, STUBBORN = 20.0, 0.05, 4.0
-"""How long it waits for a turn; how much longer than needed shortcuts hold a key; how long one waits over it [s]."""
+PATIENCE, LINGER = 20.0, 0.10
+"""How long it waits for a turn at most, and stays on a key that has become bold [s]: who repeats what it did without
+looking may then be that much too short."""
+LONGER, STUBBORN = 0.05, 4.0
+"""How much longer than needed shortcuts hold a key, and how long one waits for its turn over it [s]."""
 NOWHERE: Vec3 = np.zeros(3)
 TIP_HALF, NARROWEST = 0.013, 0.006
 """Half of the closed finger tips along y, and the least free way to a neighbouring cap [m]."""
@@ -266,7 +270,9 @@ class KeyboardTyping(Scenario):
         def done() -> bool:
             return world.memory["typed"] > before or world.memory["held_0"] > seconds - 1e-9
 
-        yield from stay(arm, over - PRESS * UP, down, done, SOFTLY, grip)
+        yield from until(go_to(arm, over - PRESS * UP, down, SOFTLY, grip), done)
+        if world.memory["typed"] > before:
+            yield from hold(arm, LINGER, grip)
         yield from self._rise(world)
 
     # --- what must not work ---------------------------------------------------------------

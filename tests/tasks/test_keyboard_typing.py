@@ -172,6 +172,38 @@ def test_the_partner_waits_as_long_as_the_agent_is_in_its_way(world):
     assert np.linalg.norm(partner.hand - HOME) < 0.01 and world.memory["typed"] == 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Corners(KeyboardTyping):
+    """The four keys at the corners, all of them of one arm: of the agent where `mine` is 15, else of the partner."""
+
+    @property
+    def letters(self):
+        return "QPZM"
+
+
+@pytest.mark.parametrize("arm", [0, 1])
+def test_a_press_of_a_second_stays_well_within_its_key(arm):
+    """A hand that is stopped from below is pushed aside; 12 mm away is the neighbour, measured are up to 7."""
+    scenario = Corners(mine=0b1111 if arm == 0 else 0b10000, hold=1.0)
+    world, off = load(TASK, scenario), list[float]()
+    episode, hand = Episode(scenario, world), (*world.arms, *world.partners)[arm]
+
+    def plan():
+        if arm == 0:
+            for k in range(4):
+                yield from scenario.press(world, k)
+        else:
+            yield from scenario.make_room(world)
+            while world.memory["typed"] < 4:
+                yield world.idle
+
+    for action in plan():
+        assert episode.step(world.filter(action)) in (None, "success")
+        if key := int(world.memory[f"key_{arm}"]):
+            off.append(float(np.abs(hand.hand - world.pos(f"keyboard/key_{LETTERS[key - 1]}"))[:2].max()))
+    assert world.memory["typed"] == 4 and max(off) < 0.009
+
+
 # --- what must not work -------------------------------------------------------------------
 
 
