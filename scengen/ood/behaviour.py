@@ -287,7 +287,7 @@ def _faithful(scenario: Scenario, horizon: float, embodiment: str) -> bool:
 def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> Memory | None:
     world = _world(scenario, embodiment)
     rollout = run(scenario, world, scenario.oracle, horizon, until_settled=True)
-    return remember(world, rollout.actions) if rollout.solved else None
+    return remember(scenario, world, rollout.actions) if rollout.solved else None
 
 
 def _follows(memory: Memory, scenario: Scenario, horizon: float, embodiment: str) -> bool:

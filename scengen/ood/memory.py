@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ..attack.solids import held
 from ..control.loop import ACTION, Loop
-from ..episode import Actions
+from ..episode import Actions, Episode
 from ..errors import GaveUp
 from ..geometry import Mat3, Vec3, about_z, between
-from ..scenario import Plan
+from ..scenario import Plan, Scenario
 from ..sim.world import Arm, World
 from ..skills.motion import STEP, STIFFNESS, Pace, go_to, together
 
@@ -97,15 +97,16 @@ class Memory:
         yield from together(world, *(path.follow(arm) for path, arm in zip(self.paths, world.arms, strict=True)))
 
 
-def remember(world: World, actions: Actions) -> Memory:
-    """Play a solution again in its own world, and keep what an object-centric memory keeps."""
+def remember(scenario: Scenario, world: World, actions: Actions) -> Memory:
+    """Play a solution again in its own world, events included, and keep what an object-centric memory keeps."""
     world.reset()
+    episode = Episode(scenario, world)
     poses, bodies = list[dict[str, tuple[Vec3, Mat3]]](), _bodies(world)
     hands, every = list[list[tuple[Vec3, Mat3]]](), [_Aims(arm, bodies) for arm in world.arms]
     for action in actions:
         poses.append({body: (world.pos(body), world.rot(body)) for body in bodies})
         hands.append([(arm.hand, arm.hand_rot) for arm in world.arms])
-        world.apply(action)
+        episode.step(action)
         for aims in every:
             aims.look()
     paths = list[Path]()

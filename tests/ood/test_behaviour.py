@@ -56,8 +56,8 @@ def solved(split, index):
 
 
 def test_an_object_centric_memory_follows_its_body():
-    _, world, actions = solved(ID, 0)
-    memory = remember(world, actions)
+    scenario, world, actions = solved(ID, 0)
+    memory = remember(scenario, world, actions)
     assert [part.body for part in memory.paths[0].parts] == ["tile_0"] and memory.paths[0].parts[0].first == 0
     again, there, _ = solved("diagonal", 0)
     assert run(again, there, memory.follow, TASK.horizon, raw=True).solved
@@ -67,7 +67,7 @@ def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
     task = config.task("tool_retrieve")
     scenario = task.draw(ID, 0, 0).scenario
     world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
-    memory = remember(world, run(scenario, world, scenario.oracle, task.horizon).actions)
+    memory = remember(scenario, world, run(scenario, world, scenario.oracle, task.horizon).actions)
     assert [part.body for part in memory.paths[0].parts] == ["hook", "cube"]
     assert run(scenario, world, memory.follow, task.horizon, raw=True).solved, "its own scenario again"
 
