@@ -137,7 +137,7 @@ class Scenario(abc.ABC):
         """Events of the scene itself, called before every control period. Draws nothing: all values are parameters.
 
         What they must know of the episode so far is in `world.memory`, which nothing else may write: a family has no
-        state. Nor may anything else call `arm.jam`, `world.move`, `world.launch` or `world.spin`.
+        state. Nor may anything else call `arm.jam`, `arm.tell`, `world.move`, `world.launch` or `world.spin`.
         """
 
     def pending(self, world: World) -> bool:

@@ -36,9 +36,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
-    closed), at 100 Hz; shape (14,) for two arms, the right one's seven first. They go to the controller as they are,
-    clipped to [-1, 1], which is the paper's interface for policies; `action_filter="teleop"` puts the filter of people
-    and oracles in between (`scengen.control.teleop`).
+    closed), at 100 Hz; shape (14,) for two arms, the right one's seven first; none for an arm that belongs to the
+    scene. They go to the controller as they are, clipped to [-1, 1], which is the paper's interface for policies;
+    `action_filter="teleop"` puts the filter of people and oracles in between (`scengen.control.teleop`).
 
     Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
     `metadata["names"]` tells of each stream what its entries are. Nothing that a scenario hides is in any of them.

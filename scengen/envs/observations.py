@@ -1,7 +1,8 @@
 """What a policy may see: the paper's streams under robosuite's names, each read only if it is asked for.
 
 Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top. The
-table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name.
+table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name; one
+that the scene's events move has none, and is seen in pictures only.
 `robot0_eef_quat` is the orientation of the grip site, robosuite's `robot0_eef_quat_site`; what robosuite calls
 `robot0_eef_quat` is that of the body `right_hand`.
 

@@ -278,10 +278,12 @@ class KeyboardTyping(Scenario):
     # --- what must not work ---------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
+        again = [k for k in self.own[:-1] if not (self.owns(k + 1) and self.letters[k + 1] == self.letters[k])]
+        once_more = {"once_more": Shortcut(lambda world: self._once_more(world, again[0]))}
         return {
+            **(once_more if again else {}),
             "type_it_all": Shortcut(self._type_all),
             "mine_without_waiting": Shortcut(self._mine_at_once),
-            "once_more": Shortcut(self._once_more),
             "one_key_aside": Shortcut(self._one_aside),
             "short_taps": Shortcut(self._taps),
             "make_no_room": Shortcut(self._no_room),
@@ -298,9 +300,8 @@ class KeyboardTyping(Scenario):
         for k in self.own:
             yield from self.press(world, k, seconds=self.hold + LONGER)
 
-    def _once_more(self, world: World) -> Plan:
-        """Like the oracle up to an own letter, and that one again, where another one is next."""
-        again = next(k for k in self.own if self.letters[k : k + 2] != 2 * self.letters[k])
+    def _once_more(self, world: World, again: int) -> Plan:
+        """Like the oracle up to an own letter, and that one again, although it is not next, or not one's own."""
         for k in [k for k in self.own if k <= again]:
             yield from self.await_turn(world, k)
             yield from self.press(world, k)

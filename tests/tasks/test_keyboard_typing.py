@@ -224,6 +224,13 @@ def test_a_shortcut_fails_for_its_own_reason(name, reason):
     assert not ended.solved and reason in ended.reason and not ended.gave_up
 
 
+def test_a_letter_may_be_typed_once_more_where_that_is_the_word():
+    """HELLO: the second L is a mistake if it is the partner's, and right if it is one's own."""
+    hello = KeyboardTyping(word=WORDS.index("HELLO"), mine=0b10100)
+    assert play_shortcut(TASK, hello, "once_more").reason == MISTAKES[3]
+    assert "once_more" not in replace(hello, mine=0b01100).shortcuts()
+
+
 def test_with_dead_keys_for_the_partner_its_turn_never_ends():
     ((rollout, world),) = ablated(TASK, NOMINAL).values()
     assert not rollout.solved and world.memory["typed"] == 0
