@@ -189,7 +189,7 @@ class CupInversion(Scenario):
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
             "topple_it": Shortcut(self._topple, to_rest=True),
-            "put_down_as_it_is": Shortcut(self._as_it_is, to_rest=True),
+            "put_down_as_it_is": Shortcut(self._as_it_is),
             "jaw_from_above": Shortcut(self._from_above),
             "let_go_without_partner": Shortcut(self._let_go),
             "turn_it_up_and_drop_it": Shortcut(self._drop),
@@ -257,6 +257,7 @@ class CupInversion(Scenario):
         """Press both hands on the wall, half way up, lift the cup, roll both by half a turn, put it down."""
         middle, far = self.start + self.cup.height / 2 * UP, self.goal + (self.cup.height / 2 + 0.003) * UP
         beside, high = self.cup.outer(self.cup.height / 2), 0.2 * UP
+        hands = list(zip(world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0.0, TIP), strict=True))
 
         def both(seconds: float, pose: Callable[[float], tuple[Vec3, float, float]]) -> Plan:
             """Place between the hands, way from there to each, and roll, against the share of the time."""
@@ -264,9 +265,7 @@ class CupInversion(Scenario):
             while world.time < start + seconds:
                 at, way, roll = pose((world.time - start) / seconds)
                 actions = []
-                for arm, side, rot, tip in zip(
-                    world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0, TIP), strict=True
-                ):
+                for arm, side, rot, tip in hands:
                     turn = 2.0 * between(arm.hand_rot, rotation(math.pi * roll * LEFT) @ rot)
                     actions.append(steer(arm, at + side * (way + tip) * LEFT, np.zeros(3), turn, CLOSED))
                 yield np.concatenate(actions)
@@ -345,11 +344,15 @@ class CupInversion(Scenario):
         yield within_reach("the square", self.goal + (cup.height + 2 * OVER) * UP, base=left)
 
     def features(self) -> Mapping[str, float]:
+        right, left = panda.bases(2)
+        away, goal_away = (self.start - right)[:2], (self.goal - left)[:2]
         return {
             "droop": self.droop,
             "height": self.cup.height,
-            "side": self.y - panda.bases(2)[0][1],
-            "goal_side": self.goal_y - panda.bases(2)[1][1],
+            "side": float(away[1]),
+            "goal_side": float(goal_away[1]),
+            "reach": math.hypot(*away),
+            "goal_reach": math.hypot(*goal_away),
             "carried": math.dist(self.start, self.goal),
             "friction_over_slope": self.cup.friction / self.slope,
         }
