@@ -44,7 +44,7 @@ class Incline(Prop):
     least: float = param(10.0, "deg", 0.0, 20.0)
     most: float = param(55.0, "deg", 30.0, 70.0)
     mass: float = param(0.5, "kg", 0.1, 2.0)
-    rgba: Rgba = (0.72, 0.70, 0.64, 1.0)
+    rgba: Rgba = (0.36, 0.50, 0.66, 1.0)
 
     @property
     def turns(self) -> float:
