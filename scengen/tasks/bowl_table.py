@@ -39,6 +39,7 @@ from ..assets.bowl import Bowl
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, solid, table
 from ..assets.ring_rack import RingRack
+from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_y, corners, gap, shortest
 from ..params import param
 from ..physics import GRAVITY
@@ -272,6 +273,8 @@ class BowlTable(Scenario):
         yield from go_to(arm, spot + 0.04 * out, facing(math.pi / 2, math.pi / 4), STEADY, OPEN)
         yield from until(push(arm, -DOWNWARDS * out, lambda: arm.sealed, CLOSED), _after(arm.world, 2.0))
         yield from hold(arm, 0.3, CLOSED)
+        if not arm.sealed:
+            raise GaveUp("the cup did not get hold of the dome")
         yield from go_to(arm, arm.hand + 0.25 * UP, pace=CARRYING)
         yield from turn_to(arm, facing_down(), 0.6)
         yield from until(turn_to(arm, facing(-math.pi / 2, 0.0), 0.6, give_up=7.0), _after(arm.world, 6.0))
