@@ -108,6 +108,18 @@ def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
     assert ((best.azimuth, best.elevation) != (first.azimuth, first.elevation)) == hidden
 
 
+@pytest.mark.parametrize("free", [False, True])
+def test_on_the_floor_only_what_stands_fast_is_in_the_view(free):
+    """What is free down there has fallen off the table."""
+    scene = table()
+    place(scene, Cube(), "cube", [0.0, 0.0, TABLE_TOP])
+    place(scene, Cube(), "low", [0.3, 0.7, 0.0], free=free)
+    world = World.load(scene_text.emit(scene)[0])
+    low = world.com("low") + 0.025 * CORNERS
+    seen = np.abs(on_screen(world, render.clearest(world, 1.0), low, 1.0)).max() <= 1.0
+    assert seen == (not free)
+
+
 def test_the_view_is_chosen_over_all_states(row, scenario):
     """Of states that are all the start it is the view of the start; the world is left in the last of them."""
     world = World.load(row.scene_xml)
