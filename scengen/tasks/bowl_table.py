@@ -209,10 +209,10 @@ class BowlTable(Scenario):
     def put_down(self, arm: Arm) -> Plan:
         """Over the square, down until the foot is on the table; let go."""
         world = arm.world
-        for height, pace in ((0.18, CARRYING), (0.02, FINE)):
+        for height in (0.18, 0.02):
             level = shortest(world.rot("bowl")[:, 2], UP) @ world.rot("bowl")
             com = self.goal + (height + world.com("bowl")[2] - world.pos("bowl")[2]) * UP
-            yield from jaw.carry(arm, "bowl", com, level, pace)
+            yield from jaw.carry(arm, "bowl", com, level, CARRYING)
         yield from push(arm, -DOWNWARDS * UP, lambda: world.touching("bowl", "table"))
         yield from jaw.release(arm)
         yield from retreat(arm)
