@@ -274,7 +274,11 @@ class RecoverPegInsert(Scenario):
         pin = mouth + self.board.pivot * rot[:, 0]
         aim = about_z(turned * angle) @ rot, pin + about_z(shifted * angle) @ (mouth - pin)
         yield from self.guide(world, lambda: aim, -BEFORE[1])
-        yield from self.enter(world, lambda: aim)
+        blocked = world.time + 4.0  # half of that is enough for a peg that is not
+        ends = lambda: self._close(world, CLEAR) or world.time > blocked  # noqa: E731
+        yield from self.guide(world, lambda: aim, self.peg.length, ENTERING, ends)
+        yield from release(world.arm)
+        yield from retreat(world.arm, 0.05)
 
     def _let_go(self, world: World) -> Plan:
         """As the oracle, but as soon as half of it is in it is left to itself."""
