@@ -227,7 +227,7 @@ QUICK = {
 }  # fmt: skip
 
 EVERY = ("idle_not_listed", "shortcut_not_told", "rest_was_lenient", "ablation_not_told")
-WITHOUT_ABLATIONS = ("mirror_id", "slip_id", "stack_id", "ycb_id")
+WITHOUT_ABLATIONS = ("collapse_id", "mirror_id", "slip_id", "stack_id", "ycb_id")
 """Pools of families that have none: there is nothing to leave out."""
 
 

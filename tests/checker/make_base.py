@@ -53,6 +53,15 @@ TRAINING = {
     "extract_id": "cup_extract",
     "lids_id": "occluder_push",
     "stack_id": "shape_stack",
+    "peg_id": "recover_peg_insert",
+    "inverted_cup_id": "cup_inversion",
+    "shelf_by_jaws_id": "plate_shelf_hobi",
+    "bowl_id": "bowl_table",
+    "toss_id": "cube_toss",
+    "bounce_id": "bounce_intercept",
+    "slide_id": "slide_catch",
+    "collapse_id": "stack_collapse_recovery",
+    "typing_id": "keyboard_typing",
 }
 """A pool of the training split of every task but the first, by its name."""
 
