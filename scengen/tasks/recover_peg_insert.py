@@ -259,7 +259,7 @@ class RecoverPegInsert(Scenario):
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
             "ignore_the_turn": Shortcut(lambda world: self._aim(world, 0.0, 0.0), to_rest=True),
-            "shift_without_turning": Shortcut(lambda world: self._aim(world, 1.0, 0.0), to_rest=True),
+            "shift_without_turning": Shortcut(lambda world: self._aim(world, 1.0, 0.0)),
             "turn_the_wrong_way": Shortcut(lambda world: self._aim(world, -1.0, -1.0)),
             "let_go_half_way": Shortcut(self._let_go),
             "put_it_there_upright": Shortcut(self._upright),
