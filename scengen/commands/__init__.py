@@ -58,7 +58,7 @@ def holder(pool: str | list[str] | None, name: str) -> Pool:
     found = [Pool.open(folder) for folder in several(pool or "")]
     if len(found) == 1:
         return found[0].check()
-    asked = find(name, (each for one in found for each in one.names()), "these pools").id
+    asked = find(name, dict.fromkeys(each for one in found for each in one.names()), "these pools").id
     return next(one for one in found if any(each.id == asked for each in one.names())).check()
 
 

@@ -45,7 +45,7 @@ from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
-from .launched_ball import EDGE, HAND_SPEED, READY, SEEN, SPARE, LaunchedBall
+from .launched_ball import EDGE, HAND_SPEED, LONGEST, READY, SEEN, SPARE, LaunchedBall
 
 MIDDLE = 0.10
 """How far before the middle of the table the middle of the enclosure is [m]."""
@@ -55,6 +55,8 @@ ROOM = 0.085
 """From the place of an open hand to the walls at least [m]: half its width, and some air."""
 APART = 0.10
 """From that place to any way on which the ball comes by before, at least [m]."""
+COMING = 2.0
+"""How long before the ball's last way the hand may have come there [s]."""
 AFTER, BEFORE = 0.10, 0.15
 """How long after a bounce and before the next one it can be taken [s]."""
 ENDS = 2.0
@@ -209,7 +211,7 @@ class BounceIntercept(LaunchedBall):
         seen = self._seen(self.start)
         yield require(seen[0] < -self.ball.radius, "the ball starts between the walls", inside=seen[0])
         ways = self._foreseen()
-        yield require(len(ways) > 1, "the ball meets no wall")
+        yield require(len(ways) > 1, "the ball meets no wall", aim=self.aim)
         slowest = min(float(np.linalg.norm(way.velocity)) for way in ways)
         yield require(slowest > SLOWEST, "the ball comes back too slowly", speed=slowest)
         met = self.met(ways, READY, spare=2.5 * SPARE)
@@ -250,15 +252,17 @@ class BounceIntercept(LaunchedBall):
             thrown: whether the first of them already begins at a wall.
         """
 
+        times = np.arange(0.0, LONGEST, 0.05)
+        passed = np.array([place_on(ways, t)[:2] for t in times])
+
         def way(seconds: float) -> Vec3 | None:
             k, now = on(ways, seconds)
             ends = ways[k + 1].begins if k + 1 < len(ways) else math.inf
             if (k == 0 and not thrown) or seconds < now.begins + AFTER * (k > 0) or seconds > ends - BEFORE:
                 return None
             at = place_on(ways, seconds)
-            before = np.arange(max(0.0, now.begins - 2.0), now.begins, 0.05)
-            by = (place_on(ways, t) for t in before)
-            if self._to_walls(at) < ROOM or any(math.dist(at, other) < APART for other in by):
+            by = passed[(times > now.begins - COMING) & (times < now.begins)]
+            if self._to_walls(at) < ROOM or (len(by) and np.hypot(*(by - at[:2]).T).min() < APART):
                 return None
             return at
 

@@ -36,6 +36,7 @@ def test_full_certificates_tell_of_an_attack_and_quick_ones_that_there_was_none(
         certify(scenario, TASK.horizon, settings)
 
 
+@pytest.mark.slow
 def test_an_attack_in_a_certificate_refutes_where_there_is_a_way_around(subject):
     """Without the rule on carrying, the first tile itself can be used on the slab."""
     settings = replace(QUICK, attack=60, robust=Robust(runs=1, bound=0.04))

@@ -17,6 +17,7 @@ def test_mangled_command_lines_end_in_order():
     assert not bad, "\n".join(f"{' '.join(line)[:300]}\n    {wrong}" for line, wrong in bad)
 
 
+@pytest.mark.slow
 def test_runs_that_are_killed_lose_nothing():
     assert not kills.run(2, seed=1, each=2)
 

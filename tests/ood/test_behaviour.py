@@ -72,6 +72,7 @@ def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
     assert run(scenario, world, memory.follow, task.horizon, raw=True).solved, "its own scenario again"
 
 
+@pytest.mark.slow
 def test_a_stout_first_tile_breaks_replay_and_a_light_one_does_not(tmp_path):
     rungs, oracle = climb(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, 4, 0)
     assert oracle.value == 1.0 and (rungs[0].training.value, rungs[0].here.value) == (1.0, 0.0)
@@ -90,6 +91,7 @@ def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
     assert climb(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0) == first
 
 
+@pytest.mark.slow
 def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     far = "task.id.x=[uniform,0.0,0.2]"  # with a stout first tile the chain of index 1 leaves the table
     argv = ("axis", "task=domino_single", "axis=stout_starter", "n=2", "any_n=0", "rounds=1", far, f"to={tmp_path}")
