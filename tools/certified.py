@@ -1,9 +1,9 @@
 """Certify the first draws of every split of some tasks, and write what came of it into conf/certified.yaml.
 
-    python tools/certified.py N [TASK ...]
+    python tools/certified.py N [split=SPLIT] [TASK ...]
 
-N draws of a split are tried, at level quick. Measure with nothing else running: beside other work processor time
-doubles. Lines of tasks that are not named stay.
+N draws of every split, or of the one that is named, are tried at level quick. Measure with nothing else running: beside
+other work processor time doubles. What is not measured stays as it was.
 """
 
 import sys
@@ -35,15 +35,17 @@ def measured(task: str, split: str, n: int) -> dict[str, float]:
     return {"indices": made.indices, "certified": made.certified, "cpu": each}
 
 
-def main() -> None:
-    n, names = int(sys.argv[1]), sys.argv[2:] or config.tasks()
-    every = certified()
-    for name in names:
-        every[name] = {split: measured(name, split, n) for split in (ID, *config.task(name).axes)}
-        print(name, every[name], flush=True)
+def main(n: str, *others: str) -> None:
+    """Measure, and write after every task, so that two processes may share the tasks."""
+    only = [other.partition("=")[2] for other in others if other.startswith("split=")]
+    for name in [other for other in others if "=" not in other] or config.tasks():
+        found = {split: measured(name, split, int(n)) for split in only or (ID, *config.task(name).axes)}
+        print(name, found, flush=True)
+        every = certified()
+        every[name] = {**every.get(name, {}), **found}
         lines = yaml.safe_dump({name: every[name] for name in sorted(every)}, default_flow_style=None, sort_keys=False)
         FILE.write_text(HEAD + lines)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])
