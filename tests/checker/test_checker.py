@@ -37,12 +37,14 @@ def test_the_corpus_is_large_and_covers_every_task():
         assert {POOLS[case.base][0] for case in corpus if case.expect == expect} == {f"task={task}" for task in tasks}
 
 
+@pytest.mark.slow
 def test_every_pool_gets_the_verdict_that_it_deserves_and_the_reason(report):
     wrong = {o["name"]: (o["why"], o["text"][-400:]) for o in report["outcomes"]["scengen"] if o["why"]}
     assert not wrong
     assert len(report["outcomes"]["scengen"]) >= 40
 
 
+@pytest.mark.slow
 def test_no_control_does_well(report):
     """Else the corpus would not test what verification is for."""
     scores = {score["checker"]: score for score in report["scores"]}

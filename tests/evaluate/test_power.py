@@ -97,6 +97,7 @@ def test_an_analysis_that_makes_no_sense_is_refused(wrong):
         replace(PowerAnalysis(), **wrong)
 
 
+@pytest.mark.slow
 def test_the_command_answers_both_ways(tmp_path, capsys):
     told = tmp_path / "power.json"
     arguments = ("seeds=8", "rollouts=12", "correlation=0", "success=0.7", "drop=0.2", f"json={told}")

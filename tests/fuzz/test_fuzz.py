@@ -12,6 +12,7 @@ from scengen import cli
 COUNT, SEED = 200, 1
 
 
+@pytest.mark.slow
 def test_mangled_command_lines_end_in_order():
     bad = run.run(COUNT, SEED)
     assert not bad, "\n".join(f"{' '.join(line)[:300]}\n    {wrong}" for line, wrong in bad)

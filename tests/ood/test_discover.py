@@ -98,6 +98,7 @@ def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
     assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole, "nothing is tried twice"
 
 
+@pytest.mark.slow
 def test_two_workers_try_what_one_does_also_after_a_kill_in_the_middle(planted, tmp_path):
     def tried(folder):
         return sorted(line.split('"outcome"')[0] for line in (folder / "trials.jsonl").read_text().splitlines()[1:])

@@ -94,6 +94,7 @@ def test_a_memorised_motion_serves_no_other_hook_and_no_other_place(split):
     assert not replayed(TASK, trained, moved).solved
 
 
+@pytest.mark.slow
 def test_a_memorised_motion_serves_at_most_a_tenth_of_other_training_scenes():
     scenes = [TASK.draw("id", 0, index).scenario for index in range(6)]
     pairs = [(one, other) for one in scenes for other in scenes if one is not other]

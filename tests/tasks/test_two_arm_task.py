@@ -162,6 +162,7 @@ def test_a_policy_for_one_arm_is_told_so_in_one_line(folder, rows, known, monkey
         PolicyPlayer(Evaluation(pool=str(folder), policy="idle"))(RolloutId("push_pair", str(folder), rows[0].id, 0))
 
 
+@pytest.mark.slow
 def test_recordings_hold_the_actions_of_both_arms(folder, rows, tmp_path):
     made = tmp_path / "made"
     cameras = "[robot1_rgb_gripper_cam]" if pictures_are_possible() else "none"
