@@ -195,10 +195,11 @@ class BounceIntercept(LaunchedBall):
         yield from self.catch(world)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the back wall nothing comes back."""
+        """Without walls nothing comes back."""
         scene = self.build()
-        scene.delete(scene.geom("enclosure/back"))
-        return {"no_back_wall": scene}
+        for geom in list(scene.body("enclosure").geoms):
+            scene.delete(geom)
+        return {"no_walls": scene}
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -111,8 +111,9 @@ def test_a_mirror_image_is_beside_it():
     assert not play_shortcut(TASK, dead, "expect_a_mirror_image").solved
 
 
-def test_without_the_back_wall_it_does_not_come_back():
-    ((ended, world),) = ablated(TASK, BACK).values()
+@pytest.mark.parametrize("aim", [12.0, 45.0])
+def test_without_walls_it_does_not_come_back(aim):
+    ((ended, world),) = ablated(TASK, replace(BACK, aim=aim)).values()
     assert not ended.solved and world.memory["bounces"] == 0
 
 
