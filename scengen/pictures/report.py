@@ -129,7 +129,9 @@ def tasks_table(tasks: Sequence[Task], certified: Mapping[str, Mapping[str, Mapp
         table.add_row(
             task.category, task.code, *cells, end_section=after is not None and after.category != task.category
         )
-    table.caption = "certified: of the draws tried (conf/certified.yaml); CPU s: for one certificate in training, level quick"
+    table.caption = (
+        "certified: of the draws tried (conf/certified.yaml); CPU s: for one certificate in training, level quick"
+    )
     table.caption_justify = "left"
     return table
 
