@@ -62,7 +62,7 @@ AFTER, BEFORE = 0.10, 0.15
 ENDS = 2.0
 """How far from the end of a wall it must meet that wall or pass it before it is caught, in radii. In a corner two walls
 throw it back one after the other, or at once: each takes its own part of the velocity."""
-MIRRORED = 0.03
+MIRRORED = 0.06
 """How far beside the place of a mirror image the ball must pass, so that the hand misses it [m]."""
 SLOWEST = 0.05
 """Speed below which a ball is not waited for [m/s]."""
