@@ -60,11 +60,7 @@ def _read(folder: Path) -> dict[str, str]:
     """Names and hashes of the pools of an index."""
     path = folder / INDEX
     try:
-        if why := schema.why_no_plain_file(path):
-            raise ValueError(f"it {why}")
-        if (size := path.stat().st_size) > schema.LARGEST_MANIFEST:
-            raise ValueError(f"it has {size} bytes")
-        index = schema.read_json(path.read_text(), schema.LARGEST_MANIFEST)
+        index = schema.read_file(path)
         if index["format"] != FORMAT:
             raise ValueError(f"format {index['format']!r:.20}, this scengen reads {FORMAT}")
         found = {str(name): str(about["sha256"]) for name, about in index["pools"].items()}

@@ -122,11 +122,7 @@ class Pool:
             )
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
-            if why := schema.why_no_plain_file(path):
-                raise ValueError(f"it {why}")
-            if (size := path.stat().st_size) > schema.LARGEST_MANIFEST:
-                raise ValueError(f"it has {size} bytes")
-            manifest = schema.read_json(path.read_text(), schema.LARGEST_MANIFEST)
+            manifest = schema.read_file(path)
             version = manifest["format"]
             if version == FORMAT:
                 schema.check_manifest(manifest)

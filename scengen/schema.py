@@ -188,6 +188,20 @@ def why_no_plain_file(path: Path) -> str:
     return "" if stat.S_ISREG(mode) else "is no plain file"
 
 
+def read_file(path: Path) -> Any:
+    """What a JSON file beside the shards says: a manifest, or an index.
+
+    Raises:
+        ValueError: it is no plain file, too large, or no strict JSON.
+        OSError: it cannot be read.
+    """
+    if why := why_no_plain_file(path):
+        raise ValueError(f"it {why}")
+    if (size := path.stat().st_size) > LARGEST_MANIFEST:
+        raise ValueError(f"it has {size} bytes")
+    return read_json(path.read_text(), LARGEST_MANIFEST)
+
+
 @contextmanager
 def memory_bounded(more: int = MEMORY) -> Iterator[None]:
     """Let this process take only so many bytes more than it has, while something unknown is unpacked."""

@@ -44,10 +44,11 @@ def command(arguments: Arguments) -> int:
         pools = [Pool.open(folder).check() for folder in several(settings.pool)]
         if len(pools) > TOLD:
             out.print(report.pools_table(pools))
-        for pool in pools if len(pools) <= TOLD else ():
-            out.print(report.pool_table(pool))
-            out.print(report.funnel_table(pool.funnel, pool.reasons))
-            say(f"pool sha256: {pool.sha256}")
+        else:
+            for pool in pools:
+                out.print(report.pool_table(pool))
+                out.print(report.funnel_table(pool.funnel, pool.reasons))
+                say(f"pool sha256: {pool.sha256}")
         if target:
             with ProgressBar(err, "contact sheet", 1) as bar:
                 made = [(pool, task_of(pool, search_path(arguments))) for pool in pools]

@@ -6,6 +6,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ class Settings:
     action_filter: str | None = None
     action_repeat: int = 1
 
-    @property
+    @cached_property
     def folders(self) -> list[str]:
         """The pools to evaluate on."""
         return collection.folders(self.pool)

@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
@@ -67,7 +67,7 @@ class Settings:
     width: int = 640
     height: int = 480
 
-    @property
+    @cached_property
     def folders(self) -> list[str]:
         """The pools to record."""
         return collection.folders(self.pool)
