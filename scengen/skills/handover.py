@@ -2,12 +2,20 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from ..geometry import Mat3, Vec3
 from ..scenario import Plan
 from ..sim.world import Arm
 from .jaw import grasp
 from .motion import OPEN, STEADY, Pace, alone, go_to, hold
 
+LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
+"""From the right arm to the left one."""
+SIDEWAYS: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+"""The left arm's hand, level, points at the right arm; it closes up and down. Upside down it would run into joint 6."""
+FORWARDS: Mat3 = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""The right arm's hand, level, looks away from the robot; of four rolls the one with which it gets farthest."""
 STAND_OFF, OVERLAP = 0.06, 0.010
 """Distance of the open jaw from a rim before it moves in, and how far the rim then is beyond the grip site [m]."""
 GENTLY = Pace(0.06, 0.002)

@@ -50,7 +50,7 @@ from ..robots.suction import REACHES, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
-from ..skills.handover import STAND_OFF, hand_over
+from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -81,14 +81,8 @@ ROOM, BESIDE = 0.004, 0.012
 """Between rim and ring, and between dome and ring at the ring's upper edge [m]; a finger is 15 mm thick at its tip."""
 LOWEST = 0.008
 """Least height of the ring [m]: twice the room, so that the rim stays in it however the bowl is pushed along."""
-LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
-"""From the arm with the cup to the one with the jaw."""
-SIDEWAYS: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
-"""The jaw's hand, level, points at the other arm; it closes up and down. Upside down it would run into joint 6."""
 AWAY: Vec3 = np.array([1.0, 0.0, 0.0])
 """From the robot."""
-FORWARDS: Mat3 = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""The cup's hand, level, looks away from the robot; of four rolls the one with which it gets farthest."""
 UPWARDS: Mat3 = about_y(-math.radians(20.0)) @ FORWARDS
 """The same, 20 deg up."""
 MEETING: Vec3 = np.array([-0.10, -0.03, TABLE_TOP + 0.32])

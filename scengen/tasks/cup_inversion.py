@@ -44,7 +44,7 @@ from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
-from ..skills.handover import OVERLAP, STAND_OFF, hand_over
+from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -72,12 +72,8 @@ DROPPED = 0.5
 """Speed of a fall by which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
 looked at every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
 TURNED_OVER = quat("x", math.pi)
-LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
-"""From the arm with suction to the one with the jaw."""
 OUT: Mat3 = facing(math.pi / 2, 0.0)
 """The suction hand, level, points at the other arm."""
-IN: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
-"""The jaw's hand, level, points at the other arm; it closes up and down. Upside down it would run into joint 6."""
 MEETING: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
 """Where the middle of the base is when the cup changes hands [m]; the palm is then 0.09 m above the table at least."""
 ASIDE: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
@@ -139,7 +135,7 @@ class CupInversion(Scenario):
         giver, taker = world.arms
         yield from alone(taker, self.wait_beside(taker))
         yield from alone(giver, self.present(giver))
-        yield from hand_over(giver, taker, lambda: self.rim(world), IN)
+        yield from hand_over(giver, taker, lambda: self.rim(world), SIDEWAYS)
         yield from together(world, self.leave(giver), hold(taker, 0.0))
         yield from alone(taker, self.set_down(taker))
 
@@ -166,7 +162,7 @@ class CupInversion(Scenario):
     def wait_beside(self, arm: Arm) -> Plan:
         """Bring the open jaw beside the place where the rim is going to be, and where the cup comes up."""
         away = max(MEETING[1] + self.cup.height, self.y + self.cup.rim) + STAND_OFF + 0.04
-        yield from go_to(arm, [MEETING[0], away, MEETING[2] + self.held], IN, STEADY, OPEN)
+        yield from go_to(arm, [MEETING[0], away, MEETING[2] + self.held], SIDEWAYS, STEADY, OPEN)
 
     def leave(self, arm: Arm) -> Plan:
         """Back, and out of the way."""
@@ -222,7 +218,7 @@ class CupInversion(Scenario):
 
         def plan() -> Plan:
             yield from jaw.pick(arm, world.pos("cup") - 0.015 * UP, LEFT, lift=0.25)
-            yield from turn_to(arm, IN)
+            yield from turn_to(arm, SIDEWAYS)
             yield from jaw.put(arm, "cup", self.goal + self.cup.rim * UP, "table")
 
         yield from alone(arm, plan())

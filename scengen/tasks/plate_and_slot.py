@@ -30,8 +30,6 @@ LEAN = math.radians(10.0)
 """Largest angle between the plate's axis and the level, and between it and the slot's normal [rad]."""
 DEEP = 0.005
 """Largest height of the rim's lowest point above the slot's floor [m]."""
-LEFT: Vec3 = np.array([0.0, 1.0, 0.0])
-"""From the right arm to the left one."""
 BREAKS = 0.35
 """Speed of a fall that the plate does not survive [m/s]."""
 AIR = 0.002

@@ -34,7 +34,7 @@ import numpy as np
 
 from ..assets.plate import Plate
 from ..assets.prop import TABLE_TOP
-from ..geometry import UP, Mat3, Vec3, about_z, corners, gap
+from ..geometry import UP, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
@@ -43,7 +43,7 @@ from ..robots.suction import REACHES, TUBE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw, suction
-from ..skills.handover import OVERLAP, STAND_OFF, hand_over
+from ..skills.handover import FORWARDS, LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import (
     COARSE,
     OPEN,
@@ -60,12 +60,8 @@ from ..skills.motion import (
     turn_to,
     until,
 )
-from .plate_and_slot import AIR, DEEP, LEFT, OVER, PlateAndSlot
+from .plate_and_slot import AIR, DEEP, OVER, PlateAndSlot
 
-SIDEWAYS: Mat3 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
-"""The jaw's hand, level, points at the other arm; it closes up and down. Upside down it would run into joint 6."""
-FORWARDS: Mat3 = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""The cup's hand, level, points away from the robot; of four rolls the one with which it gets farthest."""
 MEETING: Vec3 = np.array([-0.15, 0.0, TABLE_TOP + 0.22])
 """Where the plate changes hands [m]. The palm of a level hand that closes up and down reaches 0.104 m below the lip."""
 ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])

@@ -47,7 +47,7 @@ from ..robots.jaw import FINGER, PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
-from ..skills.handover import CLOSING, OVERLAP, STAND_OFF, take_rim
+from ..skills.handover import CLOSING, LEFT, OVERLAP, STAND_OFF, take_rim
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -63,7 +63,7 @@ from ..skills.motion import (
     together,
     until,
 )
-from .plate_and_slot import AIR, LEAN, LEFT, PlateAndSlot
+from .plate_and_slot import AIR, LEAN, PlateAndSlot
 
 EDGE, LOW = 0.06, 0.010
 """How far from the table's edge the rim must stay [m], where a palm that passes the edge finds room for a grip, as long

@@ -80,6 +80,13 @@ def ablated(task: Task, scenario: Scenario) -> dict[str, tuple[Rollout, World]]:
     return ends
 
 
+def parked(task: Task, scenario: Scenario, arm: int) -> tuple[Rollout, World]:
+    """What the witness does while one of two arms stays where it is, with an open hand, and the world afterwards."""
+    actions, world = solution(task, scenario).actions.copy(), load(task, scenario)
+    actions[:, 7 * arm : 7 * arm + 7] = [0, 0, 0, 0, 0, 0, -1]
+    return replay(scenario, world, actions, task.horizon, until_settled=True), world
+
+
 # --- families with one part changed ---------------------------------------------------------
 
 
