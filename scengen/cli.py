@@ -152,8 +152,9 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     # What follows takes seconds to import on a busy machine; nothing above needs it.
     from .commands import out
     from .completion import BASH, completions
-    from .control import native
+    from .control import compilation, native
 
+    compilation.announce()
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     if verb == "--completion":
         if arguments != ["bash"]:

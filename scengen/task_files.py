@@ -5,6 +5,7 @@ Files of tasks lie in conf/task, in installed packages that offer some, and in f
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -13,13 +14,15 @@ from typing import Any
 
 import yaml
 
-from .errors import BadConfig, UnknownName
+from .errors import BadConfig, UnknownName, cut
 
 PACKAGES = "scengen.tasks"
 """Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder
 in it that holds `task/<task>.yaml`."""
 ID = "id"
 """Name of the split that policies train on."""
+EMBODIMENT = "panda_jaw"
+"""The robot of a task whose file names none: one arm with a jaw."""
 ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
 """What Hydra's --info tells here: which file gives what, in order or as a tree; the folders; and all of it."""
 
@@ -90,6 +93,47 @@ def splits(name: str, search: Sequence[str] = ()) -> tuple[str, ...]:
         BadConfig: it is no YAML.
     """
     return (ID, *(_head(name, tuple(search)).get("axes") or ()))
+
+
+@dataclass(frozen=True)
+class About:
+    """What the file of a task says of it in words; fields as in `samplers.task.Task`."""
+
+    name: str
+    code: str
+    category: str
+    instruction: str
+    embodiment: str
+    axes: tuple[str, ...]
+    paper_axes: tuple[str, ...]
+    """Those of them that are the paper's, see `paper_source`."""
+
+
+def about(name: str, search: Sequence[str] = ()) -> About:
+    """What the file of a task says of it. Whether that makes sense, shows when the task is loaded.
+
+    Raises:
+        UnknownName: there is no such file.
+        BadConfig: it is no YAML, or lacks something.
+    """
+    head = _head(name, tuple(search))
+    words = {key: head.get(key) for key in ("code", "category", "instruction")}
+    if missing := [key for key, value in words.items() if value is None]:
+        raise BadConfig(f"task {name} lacks {', '.join(missing)}; give it")
+    axes = head.get("axes") or {}
+    if not isinstance(axes, Mapping):
+        raise BadConfig(f"{name}.axes = {cut(repr(axes))}; expected a group of settings, {{name: value}}")
+    source = paper_source(name, str(words["category"]))
+    of_paper = [axis for axis, node in axes.items() if isinstance(node, Mapping) and node.get("source") == source]
+    told = {key: str(value) for key, value in words.items()}
+    return About(
+        name, **told, embodiment=str(head.get("embodiment", EMBODIMENT)), axes=(*axes,), paper_axes=(*of_paper,)
+    )
+
+
+def paper_source(name: str, category: str) -> str:
+    """The source of an axis that the paper's table of OOD conditions (App. I) has for a task."""
+    return f"paper, App. I, {category} {name.replace('_', '-')}"
 
 
 def category(name: str) -> str:

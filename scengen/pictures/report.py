@@ -16,6 +16,7 @@ from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
 from ..samplers.task import Task
+from ..task_files import About
 from ..validate.playable import check_scene
 from . import render
 
@@ -107,7 +108,7 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     return [about, params, checks]
 
 
-def tasks_table(tasks: Sequence[Task], certified: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
     """All tasks in a few words.
 
     Args:

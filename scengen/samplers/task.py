@@ -11,7 +11,8 @@ from typing import Any
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
-from ..sim.world import EMBODIMENTS, JAW
+from ..sim.world import EMBODIMENTS
+from ..task_files import EMBODIMENT, paper_source
 from . import designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
@@ -91,7 +92,7 @@ class Task:
 
     def of_paper(self, axis: Axis) -> bool:
         """Whether an axis is the one that the paper's table of OOD conditions (App. I) has for this task."""
-        return axis.source == f"paper, App. I, {self.category} {self.name.replace('_', '-')}"
+        return axis.source == paper_source(self.name, self.category)
 
     @cached_property
     def proofs(self) -> dict[str, list[Proof]]:
@@ -256,7 +257,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         str(node["category"]),
         str(node["instruction"]),
         _positive(f"{name}.horizon", node["horizon"]),
-        _embodiment(name, node.get("embodiment", JAW)),
+        _embodiment(name, node.get("embodiment", EMBODIMENT)),
         training,
         axes,
         _group(f"{name}.certify", node.get("certify")),

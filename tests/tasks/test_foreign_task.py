@@ -82,6 +82,7 @@ def installed(tmp_path, monkeypatch):
 def test_an_installed_package_offers_its_tasks_to_every_command(installed, tmp_path, capsys):
     assert {"push_block", "domino_single"} < set(config.tasks()) == set(config.tasks(SEARCH))
     assert config.task("push_block").family is PushBlock
+    assert cli.run(("tasks",)) == 0 and "push_block" in capsys.readouterr().out
     assert cli.run(("tasks", "task=push_bloc")) == 2 and "did you mean 'push_block'" in capsys.readouterr().err
     (installed / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.config\n")
     task_files.packages.cache_clear()
