@@ -13,7 +13,7 @@ from ..episode import Actions, Episode, Outcome
 from ..errors import BadConfig, GaveUp
 from ..scenario import Plan, Scenario
 from ..sim.world import World
-from ..validate.rollout import STILL, STILL_FOR
+from ..validate.rollout import Stillness
 from . import macros
 from .macros import Macro
 from .signature import Signature, signature, starts
@@ -203,11 +203,9 @@ class _Run:
 
     def _idle(self) -> None:
         """Nothing, until something is decided or everything has been at rest for a while."""
-        still = 0
-        while self.episode.outcome is None and (self.episode.held or still * Loop.PERIOD < STILL_FOR):
+        stillness = Stillness(self.arena.scenario, self.world)
+        while self.episode.outcome is None and (not stillness.lasts() or self.episode.held):
             self._step(self.world.idle)
-            moving = np.abs(self.world.data.qvel).max() >= STILL or self.arena.scenario.pending(self.world)
-            still = 0 if moving else still + 1
 
     def _settled(self) -> Played:
         reached = self.world.time

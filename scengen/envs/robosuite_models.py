@@ -5,11 +5,12 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robots import suction
+from ..robots import panda, suction
 from ..sim import scene_text
 
 _log = logging.getLogger("robosuite_logs")
@@ -65,7 +66,7 @@ class SceneModel(MujocoXML):
 
 
 class SceneTask(ManipulationTask):
-    """A scene and the robots, under the scene's own physics options."""
+    """A scene and the robots, under the scene's own physics options and without contacts that cannot come about."""
 
     def __init__(self, scene: SceneModel, robots: list[RobotModel]):
         super().__init__(mujoco_arena=scene, mujoco_robots=robots)
@@ -73,6 +74,10 @@ class SceneTask(ManipulationTask):
             for theirs in self.root.findall(tag):
                 self.root.remove(theirs)
             self.root.extend(scene.root.findall(tag))
+        for robot in robots:
+            for one, other in panda.NEVER_TOUCH:
+                names = {"body1": robot.correct_naming(one), "body2": robot.correct_naming(other)}
+                self.contact.append(Element("exclude", names))
 
 
 @contextmanager

@@ -17,10 +17,10 @@ from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
 from ..sim.world import World
 
-STILL = 1e-3
-"""No coordinate of scene or robot may move faster than this [m/s, rad/s] where an episode is called settled."""
 STILL_FOR = 0.5
-"""How long that must last [s]."""
+"""For so long every coordinate of scene and robot must keep to its place where an episode is called settled [s] ..."""
+STILL = 5e-4
+"""... but for this [m, rad]: 1 mm in a second. What trembles in its place is at rest, as it is where a hand presses."""
 PATIENCE = 3.0
 """How many time limits a shortcut gets that is simulated to rest: two fallen tiles may rock for 14 s."""
 AT_REST = "everything came to rest without reaching the goal"
@@ -126,7 +126,7 @@ def run(
         raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
     """
     world.reset()
-    stillness = _Stillness(scenario, world) if until_settled else None
+    stillness = Stillness(scenario, world) if until_settled else None
     return _live(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
 
 
@@ -140,7 +140,7 @@ def replay(
 ) -> Rollout:
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
-    stillness = _Stillness(scenario, world) if until_settled else None
+    stillness = Stillness(scenario, world) if until_settled else None
     return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
 
 
@@ -207,16 +207,21 @@ class _Recorded:
         """Called when the goal has been reached; a recording goes on."""
 
 
-class _Stillness:
+class Stillness:
     """Watches whether everything has come to rest after the actions have ended, with no event to come."""
 
     def __init__(self, scenario: Scenario, world: World):
-        self.scenario, self.world, self.periods = scenario, world, 0
+        self.scenario, self.world = scenario, world
+        self.places: deque[NDArray[np.float64]] = deque(maxlen=round(STILL_FOR / Loop.PERIOD) + 1)
 
     def lasts(self) -> bool:
-        moving = np.abs(self.world.data.qvel).max() >= STILL or self.scenario.pending(self.world)
-        self.periods = 0 if moving else self.periods + 1
-        return self.periods * Loop.PERIOD >= STILL_FOR
+        """Whether all has been at rest for long enough now; asked once in every control period."""
+        if self.scenario.pending(self.world):
+            self.places.clear()
+        self.places.append(self.world.data.qpos.copy())
+        if len(self.places) < (self.places.maxlen or 0) or np.abs(self.places[0] - self.places[-1]).max() >= STILL:
+            return False  # the cheap question first
+        return bool(np.ptp(self.places, axis=0).max() < STILL)
 
 
 def _live(
@@ -225,7 +230,7 @@ def _live(
     source: _Planned | _Recorded,
     horizon: float,
     settle: float,
-    stillness: _Stillness | None,
+    stillness: Stillness | None,
 ) -> Rollout:
     actions: list[NDArray[np.float32]] = []
     episode = Episode(scenario, world, horizon)
