@@ -22,6 +22,7 @@ OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 VERBS = (
     "generate",
     "verify",
+    "drift",
     "show",
     "film",
     "view",

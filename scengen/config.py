@@ -350,14 +350,14 @@ def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _listed(override: str) -> str:
-    """`keep=refuted,unknown`, `pool=a,b` and `cameras=a,b` mean lists here, not sweeps; `keep` always is one.
+    """`keep=refuted,unknown`, `pool=a,b` and the like mean lists here, not sweeps; `keep` always is one.
 
     What `id` gives is a word: `12e4` begins an id and is no number.
     """
     key, _, value = override.partition("=")
     if key == "id" and value != "null" and re.fullmatch(r"[\w@+/]+", value, re.ASCII):
         return f"id='{value}'"
-    many = key == "keep" or (key in ("pool", "cameras") and "," in value and value[:1] not in ("'", '"'))
+    many = key == "keep" or (key in ("pool", "cameras", "mujoco") and "," in value and value[:1] not in ("'", '"'))
     return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 

@@ -29,7 +29,7 @@ LAYERS = (
     ("envs", "intake"),
     ("export", "evaluate"),
     ("analysis",),
-    ("ood", "frames"),
+    ("ood", "frames", "drift"),
     ("conformance", "bench"),
     ("pytest_plugin",),
     ("commands", "completion", "usage"),

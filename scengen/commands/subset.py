@@ -1,5 +1,6 @@
 """choose the scenarios of a pool that cover most of it, as a pool of their own"""
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
 from ..targets import try_folder
 from ..task_files import search_path
+from ..validate import lock
 from . import OK, Arguments, one, say
 
 
@@ -33,12 +35,15 @@ def command(arguments: Arguments) -> int:
     if (target / MANIFEST).exists():
         raise PoolError(f"{target} holds a pool already; choose another to=")
     try_folder(target)
+    locked = lock.read(pool.folder)
     task = task_of(pool, search_path(arguments))
     scenarios = scenarios_of(task, pool)
     space = of_parameters(task, list(scenarios.values()))
     chosen = {list(scenarios)[i] for i in farthest_points(space.points(scenarios.values()), settings.n)}
     about = {**pool.about, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
     subset = write(target, about, (row for row in pool.rows() if row.id in chosen))
+    if locked is not None:
+        shutil.copyfile(pool.folder / lock.FILE, target / lock.FILE)
     say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")
     say(f"pool sha256: {subset.sha256}")
     return OK

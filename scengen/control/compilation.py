@@ -19,7 +19,8 @@ class _Announcement(event.Listener):
         self._told = False
 
     def on_start(self, event: event.Event) -> None:
-        if not self._told and event.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+        what = (event.data or {})["dispatcher"].py_func.__module__
+        if not self._told and what.startswith(f"{__package__}."):
             self._told = True
             print(TOLD, file=sys.stderr, flush=True)
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from .. import pool
+from .. import pool, shards
 from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
@@ -19,6 +19,7 @@ from ..params import values
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..targets import refused
+from ..validate import lock
 from ..validate.certify import Certified, certify
 from ..validate.identity import fingerprint, source_sha256
 from ..validate.settings import CertifySettings
@@ -140,11 +141,14 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
     identity = {"config": _config(job), **_made_with(task)}
     journal = Journal(folder, identity)
     try:
+        locked = lock.of_run(journal.folder, task.family, _made_with(task))
         records = journal.records()
         _extend(job, settings, records, journal, progress)
         asked = settings.attack and _chosen(records, settings.n)
         report = _attack(job, settings, records, journal, progress) if asked else None
         try:
+            folder.mkdir(parents=True, exist_ok=True)
+            shards.replace(folder / lock.FILE, locked.encode())
             return _finish(folder, identity, settings, records, journal, report)
         except OSError as error:
             why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"

@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
+from ..errors import PoolError, cut
 from ..versions import versions
+from . import lock
 from .claims import Claims
 from .examine import Examination, Verdict
 from .identity import fingerprint, source_sha256
@@ -118,6 +121,32 @@ class Findings:
         if claims.fingerprint != fingerprint():
             self.remarks.append(
                 "certified on a machine that rounds otherwise: final states and numbers are not compared"
+            )
+
+    def look_up(self, folder: Path, claims: Claims) -> None:
+        """Note what the file of a pool's environment says, if there is one: see `lock`."""
+        try:
+            locked = lock.read(folder)
+        except PoolError as error:
+            self.of_pool(lock.FILE, "refuted", str(error))
+            return
+        if locked is None:
+            return
+        if wrong := lock.differing(locked, claims.versions):
+            what = ", ".join(
+                f"{package} {told}, the manifest {claims.versions[package]}" for package, told in wrong.items()
+            )
+            self.of_pool(lock.FILE, "refuted", f"it says {what}")
+            return
+        here = lock.needed(claims.task.family, versions())
+        if strange := lock.strange(locked, here):
+            what = f"{lock.FILE} names {cut(', '.join(strange))}, which no verdict touches here: do not install from it"
+            self.remarks.append(what)
+        elif other := lock.differing(locked, here):
+            told = ", ".join(f"{package} {made} (here {here[package]})" for package, made in other.items())
+            install = f"pip install --no-deps -r {folder / lock.FILE}"
+            self.remarks.append(
+                f"made with {told}; in an environment with scengen, {install} gives what it was made with"
             )
 
     def report(self) -> Report:

@@ -8,6 +8,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -70,6 +71,22 @@ def source_sha256(family: type[Scenario]) -> str:
     files, installed = _sources(module.__name__, *JUDGES)
     parts = [_essence(path, family.__name__ if name == module.__name__ else "") for name, path in sorted(files.items())]
     return hashlib.sha256("\n".join([*parts, *sorted(installed)]).encode()).hexdigest()
+
+
+@cache
+def packages(family: type[Scenario]) -> Mapping[str, str]:
+    """Installed distributions that the code of a certificate imports by itself, with their versions."""
+    module = inspect.getmodule(family)
+    assert module is not None
+    files, _ = _sources(module.__name__, *JUDGES)
+    tops = {imported.partition(".")[0] for name, path in files.items() for imported in _imports(name, path)}
+    own = {name.partition(".")[0] for name in files}
+    found = {}
+    for top in tops - own - sys.stdlib_module_names:
+        for name in _distributions().get(top, [top]):  # a module that is one compiled file is listed by nobody
+            with suppress(importlib.metadata.PackageNotFoundError):
+                found[name] = importlib.metadata.version(name)
+    return found
 
 
 def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:

@@ -76,6 +76,7 @@ def verify(
             found.of_pool(MANIFEST, "refuted", told)
     found.weigh(settings, levels)
     found.age(claims)
+    found.look_up(pool.folder, claims)
     if found.pool_verdict != "declined":
         run = _Run(pool, options, found, _sample(pool, options, found))
         examiner = Examiner(claims, options.level, found.expired, options.adversary)

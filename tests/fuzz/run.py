@@ -109,6 +109,7 @@ WORK = (
     "scengen.export.recording.unplayable",
     "scengen.validate.verify.verify",
     "scengen.commands.verify.verify",
+    "scengen.commands.drift.environment",
     "scengen.commands.attack.attack",
     "scengen.commands.bench.bench",
     "scengen.commands.shrink.certify",

@@ -1,0 +1,84 @@
+"""verdicts of a pool under several versions of MuJoCo: same bits, same verdict, flipped"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..config import read
+from ..drift.environment import Environment, environment
+from ..drift.matrix import FLIPPED, UNKNOWN, matrix, remarks, tables, total
+from ..errors import BadConfig, ScengenError, at_least
+from ..pool import Pool
+from ..runs.progress import ProgressBar
+from ..targets import try_file
+from ..task_files import search_path
+from ..validate.recheck import LEVELS
+from . import BAD_INPUT, FAILED, OK, Arguments, err, out, remark, say, several, write_json
+
+MODULE = "scengen.drift.judge"
+"""What runs in each environment."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `scengen drift`; meanings stand in conf/command/drift.yaml."""
+
+    pool: str | list[str]
+    mujoco: str | list[str]
+    level: str
+    n: int | None
+    json: str | None
+    workers: int
+    limit_seconds: float
+    limit_mb: int
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("drift", arguments, Settings)
+    if settings.level not in LEVELS:
+        raise BadConfig(f"level = {settings.level}; it must be {', '.join(LEVELS[:-1])} or {LEVELS[-1]}")
+    at_least(settings, n=1, workers=1, limit_seconds=1, limit_mb=200)
+    try_file(settings.json)
+    versions = [settings.mujoco] if isinstance(settings.mujoco, str) else list(dict.fromkeys(settings.mujoco))
+    if not versions:
+        raise BadConfig("mujoco = []; name the versions, as in mujoco=[3.4.0,3.5.0]")
+    pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+    places = [environment(version, say) for version in versions]
+    found = {place.mujoco: _judged(place, pools, settings, search_path(arguments)) for place in places}
+    result = matrix(pools, found, settings.level, settings.n)
+    if settings.json:
+        write_json(settings.json, result)
+    for table in tables(result):
+        out.print(table)
+    for line in remarks(result):
+        remark(line)
+    totals = {version: total(result, version) for version in versions}
+    for version, told in totals.items():
+        say(f"mujoco {version}: {', '.join(f'{told[name]} {name}' for name in told if name != 'checks')}")
+    if any(told[FLIPPED] for told in totals.values()):
+        return FAILED
+    return BAD_INPUT if any(told[UNKNOWN] for told in totals.values()) else OK
+
+
+def _judged(place: Environment, pools: Sequence[Pool], settings: Settings, search: Sequence[str]) -> dict[str, Any]:
+    """What the checks of some pools say in an environment: its `fingerprint`, and by folder what was `judged`.
+
+    Raises:
+        ScengenError: it does not run there, or not with the version that it should have.
+    """
+    folders = [str(pool.folder) for pool in pools]
+    asked = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
+    answers = place.lines(MODULE, {"pools": folders, "search": list(search), **asked})
+    about = next(answers)
+    if about["mujoco"] != place.mujoco:
+        raise ScengenError(
+            f"the environment of mujoco {place.mujoco} imports {about['mujoco']}; remove {place.folder}, and look at "
+            "PYTHONPATH"
+        )
+    judged: dict[str, list[dict[str, Any]]] = {folder: [] for folder in folders}
+    count = sum(len(pool) if settings.n is None else min(settings.n, len(pool)) for pool in pools)
+    with ProgressBar(err, f"mujoco {place.mujoco}", count) as progress_bar:
+        for done, answer in enumerate(answers, 1):
+            judged[answer.pop("pool")].append(answer)
+            progress_bar.show(done)
+    return {"fingerprint": about["fingerprint"], "judged": judged}

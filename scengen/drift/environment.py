@@ -1,0 +1,148 @@
+"""Environments that differ from the running one in MuJoCo alone: made by venv and pip, kept for the next time.
+
+Of its own an environment has pip and MuJoCo. Everything else, scengen, numpy, numba, tasks of other packages, is that
+of the running environment, through a .pth file: what is compared is one and the same code under another MuJoCo.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import venv
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+
+from ..errors import BadConfig, ScengenError, cut, nearest
+from ..targets import refused
+
+READY = "ready"
+"""The file that is written last: without it an environment is unfinished and made again."""
+SHARED = "scengen_shared.pth"
+VERSION = re.compile(r"\d+\.\d+\.\d+[\w.]*", re.ASCII)
+NEWEST = 12
+"""How many of the versions that there are, the newest, an error lists."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A Python that imports another MuJoCo."""
+
+    mujoco: str
+    folder: Path
+
+    @property
+    def python(self) -> Path:
+        return self.folder / "bin" / "python"
+
+    def lines(self, module: str, request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """Run a module of scengen there, and read what it writes: objects in JSON, one a line.
+
+        Args:
+            request: what it reads from its standard input, as JSON.
+
+        Raises:
+            ScengenError: it does not end well; its last line on standard error says why.
+        """
+        numba = str(self.folder / "numba")  # code compiled against another MuJoCo has the same name in the cache
+        with tempfile.TemporaryFile("w+", errors="replace") as errors:
+            with subprocess.Popen(
+                [self.python, "-P", "-m", module],  # -P: the folder in which the command was given is no place of code
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                env={**os.environ, "NUMBA_CACHE_DIR": numba},
+            ) as process:
+                assert process.stdin is not None and process.stdout is not None
+                try:
+                    process.stdin.write(json.dumps(request))
+                    process.stdin.close()
+                    for line in process.stdout:
+                        yield json.loads(line)
+                except BaseException:  # whoever reads has had enough, or was interrupted
+                    process.kill()
+                    raise
+            if process.returncode:
+                errors.seek(0)
+                told = [line.strip() for line in errors.read().splitlines() if line.strip()]
+                raise ScengenError(
+                    f"under mujoco {self.mujoco}: {cut(told[-1] if told else 'ended without a word', 600)}"
+                )
+
+
+def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
+    """The environment with that version of MuJoCo, made unless there is one.
+
+    Args:
+        told: is given a line when something is made, which takes seconds and the package index.
+
+    Raises:
+        BadConfig: there is no such version, or no place to keep it.
+    """
+    if not VERSION.fullmatch(mujoco):
+        raise BadConfig(f"mujoco = {cut(mujoco)}; give whole versions, as in mujoco=[3.4.0,3.5.0]")
+    shared = _shared()
+    key = hashlib.sha256("\n".join([shared, platform.python_version(), sys.executable]).encode()).hexdigest()[:12]
+    folder = cache() / f"mujoco-{mujoco}-{key}"
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder.with_suffix(f"{folder.suffix}.lock")):
+            if not (folder / READY).exists():
+                told(f"making an environment with mujoco {mujoco} in {folder}")
+                try:
+                    _make(folder, mujoco, shared)
+                except BaseException:
+                    shutil.rmtree(folder, ignore_errors=True)
+                    raise
+    except OSError as error:
+        raise refused(folder, error) from None
+    return Environment(mujoco, folder)
+
+
+def cache() -> Path:
+    """Where environments are kept: `scengen` in the user's folder of cached files, as the XDG specification says."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "scengen")
+
+
+def _shared() -> str:
+    """The .pth file through which an environment finds the code and the packages of the running one.
+
+    The folder of this scengen stands first: another one may be installed. `addsitedir` follows the .pth files of those
+    folders in turn, through which editable packages are found.
+    """
+    scengen = Path(__file__).resolve().parents[2]
+    packages = [path for path in dict.fromkeys(sys.path) if Path(path).name in ("site-packages", "dist-packages")]
+    return f"{scengen}\nimport site; {'; '.join(f'site.addsitedir({path!r})' for path in packages)}\n"
+
+
+def _make(folder: Path, mujoco: str, shared: str) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    venv.EnvBuilder(symlinks=True, with_pip=True).create(folder)
+    python = folder / "bin" / "python"
+    asked = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
+    done = subprocess.run([python, "-m", "pip", *asked, f"mujoco=={mujoco}"], capture_output=True, text=True)
+    if done.returncode:
+        raise BadConfig(_why_not(mujoco, done.stderr))
+    (packages,) = (folder / "lib").glob("python*/site-packages")
+    (packages / SHARED).write_text(shared)
+    (folder / READY).write_text("")
+
+
+def _why_not(mujoco: str, said: str) -> str:
+    """Why pip has not installed a version, in a line."""
+    listed = re.search(r"\(from versions: ([^)]*)\)", said)
+    known = listed[1].split(", ") if listed and listed[1] != "none" else []
+    if known:
+        newest = ", ".join(known[-NEWEST:])
+        return f"there is no mujoco {mujoco} for this Python{nearest(mujoco, known)}; the newest are {newest}"
+    lines = [line for line in said.splitlines() if line.startswith("ERROR")] or [" ".join(said.split())]
+    return f"pip cannot install mujoco {mujoco}: {cut(lines[0], 300)}; see whether pip install mujoco works"

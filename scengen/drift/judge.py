@@ -1,0 +1,177 @@
+"""What the checks of a pool say under the MuJoCo of this process, whichever made it: run in each environment.
+
+Verification declines a pool that another MuJoCo has made: its claims are about that one. Here the question is another
+one, how much of a verdict depends on the version, and every check is made although one before it has failed.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import mujoco
+
+from .. import config
+from ..attack.check import attacked
+from ..certificate import Check
+from ..control import native
+from ..errors import NoOracle, ScengenError
+from ..parallel import Limits, each
+from ..pool import Pool, PoolRow
+from ..samplers.task import Task
+from ..scenario import Scenario
+from ..validate.certify import Trial
+from ..validate.claims import wrong_names
+from ..validate.identity import fingerprint
+from ..validate.rebuilt import difference
+from ..validate.recheck import FIRST, REPLAYED
+from ..validate.rollout import replay
+from ..validate.settings import CertifySettings
+from ..validate.stored import settings_of, task_of_manifest
+
+ORACLES = ("shortcuts", "solved", "robust")
+"""Checks that ask tempting plans and the oracle, and not the witness."""
+
+
+@dataclass(frozen=True)
+class Again:
+    """A check that was made again."""
+
+    name: str
+    passed: bool | None
+    """None: not made, or nothing to check."""
+    reason: str
+    settings: Mapping[str, Any]
+    numbers: Mapping[str, Any]
+    stored: Mapping[str, Any]
+    """Its numbers in the certificate."""
+    flipped: bool
+    """It was made, and does not say what the certificate says."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What has become of one scenario."""
+
+    id: str
+    name: str
+    final_state: str
+    """Hash of the physics state in which the witness ends; empty if it was not replayed."""
+    same_bits: bool
+    """The witness ends in the state that the certificate tells of."""
+    scene: str
+    """In what the scene that the family builds differs from that of the pool by more than rounding."""
+    checks: tuple[Again, ...] = ()
+    unknown: str = ""
+    """Why nothing can be said: a limit was reached, a process died, or the row is none."""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges rows of one pool."""
+
+    task: Task
+    settings: CertifySettings
+    level: str
+    """One of `validate.recheck.LEVELS`."""
+
+    def __call__(self, row: PoolRow) -> Judgement:
+        try:
+            scenario = self.task.scenario(row.params)
+            if wrong := list(wrong_names(row, scenario)):
+                return lost(row, f"{wrong[0]}; see scengen verify")
+            return self._judged(row, scenario)
+        except (ScengenError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:
+            return lost(row, " ".join(str(error).split())[:300] or type(error).__name__)
+
+    def _judged(self, row: PoolRow, scenario: Scenario) -> Judgement:
+        trial = Trial(scenario, row.horizon, self.settings, row.embodiment, attacked)
+        stored = {check.name: check for check in row.certificate.checks}
+        found: list[Check] = []
+        for name in {"replay": ("compiles",), "recheck": FIRST, "full": (*FIRST, *ORACLES)}[self.level]:
+            found.append(_made(trial, name))
+            if name == "compiles" and not found[-1].passed:
+                return Judgement(row.id, str(row.name), "", False, "", _compared(found, stored))
+        scene = difference(row.scene_xml, trial.text, exact=False)
+        witness = replay(scenario, trial.world, row.witness, row.horizon, self.settings.settle)
+        numbers = {"outcome": witness.outcome, "seconds": witness.seconds}
+        found.append(Check("witness", witness.solved, witness.reason, {"horizon": row.horizon}, numbers))
+        if witness.solved:
+            trial.witness = witness
+            found += [_made(trial, name) for name in REPLAYED if self.level != "replay"]
+        elif self.level != "full":
+            found.append(_made(trial, "solved"))  # whether it was the recording alone that does not survive
+        if self.level == "full" and self.settings.attack and trial.witness is not None:
+            found.append(_made(trial, "attack"))
+        same = witness.digest == row.certificate.final_state
+        return Judgement(row.id, str(row.name), witness.digest, same, scene, _compared(found, stored))
+
+
+def judge(folder: str, search: Sequence[str], level: str, first: int | None, workers: int, limits: Limits) -> Iterator:
+    """Judge the scenarios of a pool, in any order.
+
+    Args:
+        folder: of the pool.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+        first: how many scenarios, from the first; None for all.
+
+    Raises:
+        ScengenError: the pool is damaged, or its task is unknown here.
+    """
+    pool = Pool.open(folder).check()
+    task = task_of_manifest(pool, config.task(pool.task, search))
+    rows = (row for place, row in enumerate(pool.rows()) if first is None or place < first)
+    return each(Judge(task, settings_of(pool.manifest["config"]["certify"]), level), rows, workers, limits, lost)
+
+
+def lost(row: PoolRow, reason: str) -> Judgement:
+    """What is said of a scenario of which nothing can be."""
+    return Judgement(row.id, str(row.name), "", False, "", unknown=reason)
+
+
+def _made(trial: Trial, name: str) -> Check:
+    try:
+        return trial.check(name)
+    except NoOracle:
+        return Check(name, None, "this machine has no oracle", {}, {})
+
+
+def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[Again, ...]:
+    told = []
+    for check in found:
+        before = stored[check.name]
+        flipped = check.passed is not None and check.passed != before.passed
+        told.append(
+            Again(check.name, check.passed, check.reason, check.settings, check.numbers, before.numbers, flipped)
+        )
+    return tuple(told)
+
+
+def main() -> int:
+    """Read a request, judge its pools, and write a line for every scenario; see `scengen.commands.drift`."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # nothing that a task prints may come between them
+    native.silence()
+
+    def answer(told: Mapping[str, Any]) -> None:
+        answers.write(json.dumps(told) + "\n")
+        answers.flush()
+
+    request = json.load(sys.stdin)
+    answer({"mujoco": mujoco.__version__, "fingerprint": fingerprint()})
+    limits = Limits(request["limit_seconds"], request["limit_mb"])
+    try:
+        for folder in request["pools"]:
+            asked = (request["search"], request["level"], request["n"], request["workers"], limits)
+            for judgement in judge(folder, *asked):
+                answer({"pool": folder, **asdict(judgement)})
+    except ScengenError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,193 @@
+"""The drift matrix: verdicts of a pool under several versions of MuJoCo, each in an environment of its own."""
+
+import json
+import venv
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from scengen import cli, config, pool
+from scengen.certificate import CHECKS
+from scengen.commands import drift
+from scengen.drift import environment as environments
+from scengen.drift.environment import Environment, environment
+from scengen.drift.judge import Judge, judge
+from scengen.drift.matrix import cell, flips, matrix, remarks, tables, total
+from scengen.errors import BadConfig, ScengenError
+from scengen.parallel import Limits
+from scengen.pool import Pool
+from scengen.validate.identity import fingerprint
+from scengen.validate.recheck import FIRST, REPLAYED
+from scengen.validate.stored import settings_of
+
+BASE = Path(__file__).parents[1] / "checker" / "base" / "single_quick"
+"""Two scenarios of domino_single."""
+HERE = mujoco.__version__
+LIMITS = Limits(300.0, 4000)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return Pool.open(BASE)
+
+
+@pytest.fixture(scope="module")
+def same(made):
+    """Every check under the MuJoCo that made the pool: the control."""
+    return [asdict(one) for one in judge(str(BASE), (), "recheck", None, 1, LIMITS)]
+
+
+@pytest.fixture(scope="module")
+def changed(made):
+    """The same checks with a bar that nothing passes, and of the second scenario a witness that stops halfway: what
+    another MuJoCo does to some scenarios, these do to two."""
+    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    strict = Judge(task, replace(settings, rest=replace(settings.rest, drift=0.0)), "recheck")
+    first, second = made.rows()
+    half = second.witness[: len(second.witness) // 4]
+    halved = {"witness_sha256": pool.sha256(half.tobytes())}
+    short = replace(second, witness=half, certificate=replace(second.certificate, **halved), **halved)
+    return [asdict(strict(first)), asdict(Judge(task, settings, "recheck")(short))]
+
+
+@pytest.fixture(scope="module")
+def result(made, same, changed):
+    found = {
+        version: {"fingerprint": told, "judged": {str(BASE): judged}}
+        for version, told, judged in ((HERE, fingerprint(), same), ("3.0.0", "otherwise", changed))
+    }
+    return json.loads(json.dumps(matrix([made], found, "recheck", None)))
+
+
+def test_the_control_repeats_every_bit(made, same):
+    assert [one["id"] for one in same] == [name.id for name in made.names()]
+    for one, row in zip(same, made.rows(), strict=True):
+        assert one["same_bits"] and not one["unknown"] and not one["scene"]
+        assert one["final_state"] == row.certificate.final_state
+        assert [check["name"] for check in one["checks"]] == [*FIRST, "witness", *REPLAYED]
+        assert not any(check["flipped"] for check in one["checks"])
+        assert all(c["numbers"] == c["stored"] for c in one["checks"] if c["name"] != "witness")
+
+
+def test_the_matrix_counts_outcomes_and_flipped_checks(result):
+    row = result["tasks"]["domino_single"]
+    assert cell(row[HERE]) == "2 / 0 / 0" == cell(total(result, HERE))
+    assert cell(row["3.0.0"]) == "0 / 0 / 2 (rest 1, witness 1)" == cell(total(result, "3.0.0"))
+    assert [one["mujoco"]["3.0.0"]["outcome"] for one in result["scenarios"]] == ["flipped", "flipped"]
+
+
+def test_a_flipped_check_stands_with_its_margins(made, result):
+    first, second = made.rows()
+    rest, witness = flips(result)
+    assert rest[:3] == ("3.0.0", str(first.name), "rest")
+    assert "mm while nobody acts" in rest[3] and "bar drift 0" in rest[3]
+    assert witness[1:3] == (str(second.name), "witness") and "the goal was not reached" in witness[3]
+    assert "of 4 jittered runs, goal after" in witness[4]
+
+
+def test_where_the_recording_fails_the_oracle_is_asked(changed):
+    _, second = changed
+    made = {check["name"]: check["passed"] for check in second["checks"]}
+    assert made["witness"] is False and made["solved"] is True
+    assert not made.keys() & set(REPLAYED), "nothing is played that has no witness"
+
+
+def test_the_control_is_named_where_it_is_missing(made, same, changed, result):
+    assert not list(remarks(result))
+    alone = matrix([made], {"3.0.0": {"fingerprint": "", "judged": {str(BASE): changed}}}, "recheck", None)
+    (told,) = remarks(alone)
+    assert f"made with mujoco {HERE}" in told and "control" in told
+    elsewhere = matrix([made], {HERE: {"fingerprint": "other", "judged": {str(BASE): same}}}, "recheck", None)
+    (told,) = remarks(elsewhere)
+    assert "rounds otherwise" in told
+
+
+def test_a_row_that_is_none_is_unknown_and_no_flip(made):
+    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    row = next(made.rows())
+    other = replace(row, witness=np.zeros_like(row.witness))
+    found = asdict(Judge(task, settings, "recheck")(other))
+    assert "the witness has another sha256" in found["unknown"] and not found["checks"]
+
+
+def test_level_full_makes_every_check_but_one_that_was_not_asked_for(made):
+    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    found = Judge(task, settings, "full")(next(made.rows()))
+    assert {check.name for check in found.checks} == set(CHECKS) - {"attack"}
+    assert found.same_bits and not any(check.flipped for check in found.checks)
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    """An environment as drift makes them, but for the download: its MuJoCo is the one that is installed."""
+    folder = tmp_path_factory.mktemp("environment") / "same"
+    venv.EnvBuilder(symlinks=True, with_pip=False).create(folder)
+    (packages,) = (folder / "lib").glob("python*/site-packages")
+    (packages / environments.SHARED).write_text(environments._shared())
+    return Environment(HERE, folder)
+
+
+def test_an_environment_shares_everything_but_mujoco(here, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(drift, "environment", lambda version, told: here)
+    report = tmp_path / "drift.json"
+    given = ("drift", f"pool={BASE}", f"mujoco={HERE}", "n=1", "level=replay", f"json={report}")
+    assert cli.run(given) == 0
+    assert "1 / 0 / 0" in capsys.readouterr().out
+    told = json.loads(report.read_text())
+    assert told["mujoco"] == {HERE: {"fingerprint": fingerprint()}} and len(told["scenarios"]) == 1
+
+
+def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(here, monkeypatch, capsys):
+    monkeypatch.setattr(drift, "environment", lambda version, told: replace(here, mujoco=version))
+    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.0]", "level=replay")) == 2
+    assert f"the environment of mujoco 3.4.0 imports {HERE}" in capsys.readouterr().err
+
+
+def test_what_fails_in_an_environment_is_one_line(here):
+    with pytest.raises(ScengenError, match=f"under mujoco {HERE}: no pool at nowhere"):
+        limits = {"limit_seconds": 300, "limit_mb": 4000}
+        asked = {"pools": ["nowhere"], "search": [], "level": "replay", "n": None, "workers": 1, **limits}
+        list(here.lines("scengen.drift.judge", asked))
+    with pytest.raises(ScengenError, match="No module named"):
+        list(here.lines("scengen.drift.nothing", {}))
+
+
+@pytest.mark.parametrize("version", ["3.5", "latest", "3.4.0 --index-url=x", "../3.4.0", ">=3.4.0"])
+def test_a_version_is_spelled_whole(version):
+    with pytest.raises(BadConfig, match="give whole versions"):
+        environment(version)
+
+
+def test_a_version_that_does_not_exist_is_told_with_those_that_do():
+    said = (
+        "ERROR: Could not find a version that satisfies the requirement mujoco==3.4.9 (from versions: 3.3.7, 3.4.0)\n"
+    )
+    told = environments._why_not("3.4.9", said)
+    assert told == "there is no mujoco 3.4.9 for this Python (did you mean '3.4.0'?); the newest are 3.3.7, 3.4.0"
+    assert "pip cannot install mujoco 3.4.0: ERROR: no network" in environments._why_not("3.4.0", "ERROR: no network")
+
+
+def test_tables_are_printed(result, capsys):
+    for table in tables(result):
+        drift.out.print(table)
+    assert "0 / 0 / 2 (rest 1, witness 1)" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_another_mujoco_is_really_another_one(tmp_path, monkeypatch, capsys):
+    """An environment from the package index: the bits of both scenarios are others, their verdicts are not."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    report = tmp_path / "drift.json"
+    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.0]", f"json={report}")) == 0
+    told = json.loads(report.read_text())
+    assert cell(told["tasks"]["domino_single"]["3.4.0"]) == "0 / 2 / 0"
+    assert told["mujoco"]["3.4.0"]["fingerprint"] != fingerprint()
+    assert "as the control" in capsys.readouterr().err
+    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.99]")) == 2
+    assert "there is no mujoco 3.4.99 for this Python" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "scengen").glob("mujoco-*[!k]")] == [
+        path.name for path in (tmp_path / "scengen").glob("mujoco-3.4.0-????????????")
+    ], "nothing is left of what could not be made"
