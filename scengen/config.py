@@ -19,17 +19,15 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from .cluster import AUTO, Cluster
 from .errors import BadConfig, UnknownName, cut
-from .parallel import cores
+from .parallel import Workers, cores
 from .samplers.task import Task, load
 from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path
 from .task_files import tasks as tasks  # for those who load them all
 from .validate.settings import CertifySettings
 
 T = TypeVar("T")
-
-AUTO = "auto"
-"""A number of workers: as many as there are cores to use."""
 
 
 def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
@@ -344,9 +342,24 @@ def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in settings.items():
         if value == "???":
             raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
-    if settings.get("workers") == AUTO:
-        settings["workers"] = cores()
+    if "workers" in settings:
+        settings["workers"] = _workers(settings["workers"], plain.get("executor"))
     return settings
+
+
+def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
+    """Who works: `workers=auto` stands for all cores, of this machine or of the cluster that executor=ray names.
+
+    Raises:
+        ScengenError: it is no number, or there is no such cluster.
+    """
+    if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
+        raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")
+    if not executor:
+        return cores() if count == AUTO else count
+    cluster = typed("executor", Cluster, {**executor, "count": None if count == AUTO else count})
+    cluster.connect()
+    return cluster
 
 
 def _listed(override: str) -> str:
@@ -398,7 +411,7 @@ def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
     """Name the key at which the path of an override leaves the configuration."""
-    files = _with_packages([o for o in overrides if re.match(r"(task|certify|hydra\.searchpath)=", o)])
+    files = _with_packages([o for o in overrides if re.match(r"(task|certify|executor|hydra\.searchpath)=", o)])
     try:
         node: Any = compose(file(verb), overrides=files if groups(verb) else [])
     except HydraException:
@@ -409,6 +422,8 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             return None
         if part not in node:
             known = {*map(str, node), *([] if seen else groups(verb))}
+            if seen == ["executor"] and not known:
+                return BadConfig(f"{path} is a setting of executor=ray; say that as well")
             unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
             if seen[:2] == ["task", "id"]:  # what a task file does not list stays at its nominal value: it can be added
                 return BadConfig(f"{unknown}; +{path}=... adds one")

@@ -114,11 +114,13 @@ MOST = {
 def at_least(settings: object, **lowest: float) -> None:
     """Raise `BadConfig` for the first of the named settings that is less than its lowest value, or beyond `MOST`.
 
-    None passes.
+    What is no number passes, such as None.
     """
     for name, low in lowest.items():
         value = getattr(settings, name)
-        if value is not None and not value >= low:
+        if not isinstance(value, (int, float)):
+            continue
+        if not value >= low:
             raise BadConfig(f"{name} = {cut(str(value))}; it must be at least {low:g}")
-        if value is not None and value > MOST[name]:
+        if value > MOST[name]:
             raise BadConfig(f"{name} = {cut(str(value))}; it must be at most {MOST[name]}")

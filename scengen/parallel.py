@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 
 from .control import native
 from .errors import ScengenError
@@ -55,12 +55,35 @@ def cores() -> int:
     return max(1, allowed)
 
 
+@runtime_checkable
+class Executor(Protocol):
+    """Workers that are no processes of this machine."""
+
+    status: str
+    """How many there are, and where, for whoever waits: `2 nodes, 64 workers`. Empty while nothing is done."""
+
+    def each(
+        self,
+        function: Callable[[A], B],
+        items: Iterable[A],
+        limits: Limits | None,
+        lost: Callable[[A, str], B] | None,
+    ) -> Iterator[B]:
+        """What the function `each` does."""
+        ...
+
+
+Workers = int | Executor
+"""Who works: so many processes of this machine, or an executor."""
+
+
 def each(
     function: Callable[[A], B],
     items: Iterable[A],
-    workers: int,
+    workers: Workers,
     limits: Limits | None = None,
     lost: Callable[[A, str], B] | None = None,
+    fork: bool = True,
 ) -> Iterator[B]:
     """Apply `function` to every item; in this process if there is one worker only, and no limits are asked for.
 
@@ -71,16 +94,21 @@ def each(
     Args:
         function: can be pickled, like items and results. It is sent once to each worker: it may be large, and what it
             keeps between items stays in its process.
-        limits: of every item. Workers are then copies of this process, which start in milliseconds.
+        limits: of every item. Workers are then copies of this process, which start in milliseconds (see `fork`).
         lost: makes the result of an item that has crashed its worker, or has reached a limit, from the reason.
+        fork: whether workers with limits are copies of this process; a process with threads must not be copied.
 
     Raises:
         WorkerDied: a worker crashed, or reached a limit, and there is no `lost`.
     """
+    if isinstance(workers, Executor):
+        yield from workers.each(function, items, limits, lost)
+        return
     if workers == 1 and limits is None:
         yield from map(function, items)
         return
-    todo, crew = iter(items), [_Worker(function, limits) for _ in range(max(1, workers))]
+    method = "fork" if fork and limits is not None else "spawn"
+    todo, crew = iter(items), [_Worker(function, limits, method) for _ in range(max(1, workers))]
     more = True
     try:
         while True:
@@ -98,10 +126,7 @@ def each(
             for worker in busy:
                 found = worker.answer(worker.connection in ready)
                 if isinstance(found, _Lost):
-                    if lost is None:
-                        why = f"a worker process {found.reason}; run again to continue, with workers=1 to see why"
-                        raise WorkerDied(why)
-                    yield lost(found.item, found.reason)
+                    yield made_of_lost(found.item, found.reason, lost)
                 elif found is not None:
                     yield found[0]
     finally:
@@ -126,6 +151,17 @@ def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
     return result
 
 
+def made_of_lost(item: A, reason: str, lost: Callable[[A, str], B] | None) -> B:
+    """The result of an item that no worker has brought to its end.
+
+    Raises:
+        WorkerDied: there is no `lost` that makes one.
+    """
+    if lost is None:
+        raise WorkerDied(f"a worker process {reason}; run again to continue, with workers=1 to see why")
+    return lost(item, reason)
+
+
 _NOTHING: Any = object()
 
 
@@ -138,9 +174,9 @@ class _Lost:
 class _Worker:
     """One process that works on one item at a time."""
 
-    def __init__(self, function: Callable[[Any], Any], limits: Limits | None):
+    def __init__(self, function: Callable[[Any], Any], limits: Limits | None, method: str):
         self._function, self._limits = function, limits
-        self._context = multiprocessing.get_context("spawn" if limits is None else "fork")
+        self._context: Any = multiprocessing.get_context(method)
         self._process: Any = None
         self._item, self._tries, self.busy, self.deadline = None, 0, False, float("inf")
         self.connection: Connection
@@ -193,10 +229,11 @@ class _Worker:
             finally:
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             theirs.close()
-        try:
+            if self._limits:  # an item does not pay for the start of a process
+                with suppress(EOFError, OSError):
+                    self.connection.recv_bytes()
+        with suppress(OSError):  # it has died: the answer tells
             self.connection.send(self._item)
-        except OSError:
-            pass  # it has died: the answer tells
         self.deadline = time.monotonic() + (self._limits.seconds if self._limits else float("inf"))
 
     def _died(self) -> _Lost | None:
@@ -229,6 +266,8 @@ def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | 
         _close_all_but(orders.fileno())
         _bound_memory(limits.megabytes)
     native.silence()
+    if limits is not None:
+        orders.send_bytes(_READY)
     while True:
         try:
             item = orders.recv()
@@ -243,12 +282,12 @@ def _reply(function: Callable[[Any], Any], item: Any, limits: Limits | None) -> 
     except MemoryError as error:
         if limits is not None:
             return pickle.dumps(("lost", f"needs more than {limits.megabytes} MB"))
-        return _portable(error)
+        return portable(error)
     except Exception as error:
-        return _portable(error)
+        return portable(error)
 
 
-def _portable(error: Exception) -> bytes:
+def portable(error: Exception) -> bytes:
     """An exception as bytes; one that does not survive the way becomes one of the same meaning that does."""
     try:
         pickle.loads(written := pickle.dumps(("error", error)))
@@ -258,6 +297,8 @@ def _portable(error: Exception) -> bytes:
         return pickle.dumps(("error", kind(str(error))))
 
 
+_READY = b"ready"
+"""The first word of a process with limits."""
 _PR_SET_PDEATHSIG = 1
 """Option of prctl: the signal that a process gets when its parent dies (linux/prctl.h)."""
 

@@ -22,6 +22,7 @@ LAYERS = (
     ("tasks",),
     ("samplers", "pool"),
     ("collection", "validate"),
+    ("cluster",),
     ("config",),
     ("attack",),
     ("runs",),

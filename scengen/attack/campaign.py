@@ -11,7 +11,7 @@ from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
 from ..log import Log
 from ..names import Name
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
@@ -47,7 +47,7 @@ class Settings:
     budget: int = 200
     seed: int = 0
     tiers: str | list[str] | None = None
-    workers: int = 1
+    workers: Workers = 1
     limit_seconds: float = 3600.0
     limit_mb: int = 4000
     to: str | None = None

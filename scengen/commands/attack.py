@@ -28,7 +28,7 @@ def command(arguments: Arguments) -> int:
     task, subjects = _chosen(arguments, settings)
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
-    with ProgressBar(err, f"attack {task.name}", len(subjects)) as progress_bar:
+    with ProgressBar(err, f"attack {task.name}", len(subjects), settings.workers) as progress_bar:
 
         def progress(done: int, hits: int) -> None:
             progress_bar.show(done, f"{hits} hits")

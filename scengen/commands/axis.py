@@ -17,7 +17,7 @@ def command(arguments: Arguments) -> int:
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     try_folder(folder)
-    with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n) as progress_bar:
+    with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n, settings.workers) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:
             progress_bar.of(min(done, total), total, what)

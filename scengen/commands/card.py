@@ -8,6 +8,7 @@ from ..attack.check import attacked
 from ..config import read
 from ..errors import BadConfig, PoolError, at_least, cut
 from ..export.hub import Part, check_parts, check_target, own_license, publish
+from ..parallel import Workers
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
@@ -31,7 +32,7 @@ class Settings:
     level: str
     sample: int | None
     expired: str
-    workers: int
+    workers: Workers
 
 
 def command(arguments: Arguments) -> int:
@@ -47,7 +48,7 @@ def command(arguments: Arguments) -> int:
     options = Options(settings.level, settings.sample, seed, settings.workers, LIMITS, strict, attacked)
     parts = []
     for pool in pools:
-        with ProgressBar(err, f"verify {pool.folder}", len(pool)) as progress_bar:
+        with ProgressBar(err, f"verify {pool.folder}", len(pool), settings.workers) as progress_bar:
             report = verified(pool, options, search_path(arguments), progress_bar.show)
         if not report.holds:
             fault = report.failed[0]

@@ -20,7 +20,7 @@ def command(arguments: Arguments) -> int:
         raise UnknownName("method", settings.method, METHODS)
     folder = Path(settings.to or f"generated/discover/{task.name}")
     try_folder(folder)
-    with ProgressBar(err, f"discover {task.name}", settings.budget) as progress_bar:
+    with ProgressBar(err, f"discover {task.name}", settings.budget, settings.workers) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:
             progress_bar.of(min(done, total), total, what)

@@ -12,7 +12,7 @@ from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_js
 
 def command(arguments: Arguments) -> int:
     settings = read("evaluate", arguments, Settings)
-    with ProgressBar(err, f"evaluate {settings.policy}", 1) as progress_bar:
+    with ProgressBar(err, f"evaluate {settings.policy}", 1, settings.workers) as progress_bar:
         found = evaluate(settings, progress_bar.of, search_path(arguments))
     lines = table(found.episodes)
     shown = Table("", "split", "ID", "OOD", "difference", title=f"{settings.policy}: success [%]", title_justify="left")

@@ -41,7 +41,7 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"of {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; say n={SOBOL} or more, or sampler=lhs:{settings.n}")
-        with ProgressBar(err, f"{task.name}/{settings.split}", settings.n) as progress_bar:
+        with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
 
             def progress(certified: int, finished: int, verdicts: Mapping[str, int]) -> None:
                 lost = ", ".join(f"{n} {v}" for v, n in sorted(verdicts.items()) if v != "certified")

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from ..config import read
 from ..errors import BadConfig, at_least
-from ..parallel import Limits
+from ..parallel import Limits, Workers
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..targets import try_file
@@ -23,7 +23,7 @@ class Settings:
     first: int | None
     limit: float
     json: str | None
-    workers: int
+    workers: Workers
     limit_seconds: float
     limit_mb: int
 
@@ -46,7 +46,7 @@ def command(arguments: Arguments) -> int:
     from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
 
     limits = Limits(settings.limit_seconds, settings.limit_mb)
-    with ProgressBar(err, "robosuite", total) as progress_bar:
+    with ProgressBar(err, "robosuite", total, settings.workers) as progress_bar:
         found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments), limits)
     called, tasks = names(pools), defaultdict(list)
     for comparison in found:

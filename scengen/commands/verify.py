@@ -16,7 +16,7 @@ from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read
 from ..errors import BadConfig, at_least
-from ..parallel import Limits, WorkerDied, apart
+from ..parallel import Limits, WorkerDied, Workers, apart
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
@@ -47,7 +47,7 @@ class Settings:
     seed: int | None
     json: str | None
     junit: str | None
-    workers: int
+    workers: Workers
     limit_seconds: float
     limit_mb: int
     expired: str
@@ -80,7 +80,7 @@ def command(arguments: Arguments) -> int:
     plain: dict[str, dict[str, Any]] = {}
     for folder in folders:
         pool = Pool.open(folder)
-        with ProgressBar(err, f"verify {folder}", len(pool)) as progress_bar:
+        with ProgressBar(err, f"verify {folder}", len(pool), settings.workers) as progress_bar:
             report = reports[folder] = verified(pool, options, search_path(arguments), progress_bar.show)
         about = {key: value for key, value in asdict(report).items() if key != "names"}
         plain[folder] = {"pool_sha256": pool.sha256, **about}

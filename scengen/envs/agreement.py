@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..episode import Actions, Outcome
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..pool import Pool, PoolRow
 from ..sim.world import Vec3, World
 from ..validate.rollout import replay
@@ -41,7 +41,7 @@ class Comparison:
 
 def compare_all(
     pools: Sequence[Pool],
-    workers: int,
+    workers: Workers,
     progress: Callable[[int], None],
     first: int | None = None,
     search: tuple[str, ...] = (),

@@ -17,7 +17,7 @@ from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..errors import BadConfig, PoolError, ScengenError, at_least
 from ..log import Log
-from ..parallel import each
+from ..parallel import Workers, each
 from ..pool import Pool, PoolRow
 from ..samplers.keyed import unit
 from ..samplers.split import ID
@@ -42,7 +42,7 @@ class Settings:
     observations: list[str] | None = None
     width: int = 256
     height: int = 256
-    workers: int = 1
+    workers: Workers = 1
     to: str | None = None
     version: str | None = None
     fresh: bool = False
@@ -129,8 +129,8 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None], search: S
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings, search)
     depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
-    if settings.workers > 1:
-        player = PolicyPlayer(settings, search)  # each worker makes its own policy
+    if settings.workers != 1:
+        player = PolicyPlayer(_elsewhere(settings), search)  # each worker makes its own policy
     if settings.fresh:
         _move_aside(path)
     remedy = "say fresh=true to begin anew (they are moved aside), or choose another to="
@@ -267,6 +267,11 @@ def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat")
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
+
+
+def _elsewhere(settings: Settings) -> Settings:
+    """Settings for workers, which need not be where this process is: their paths are whole."""
+    return replace(settings, pool=[str(Path(folder).resolve()) for folder in settings.folders], workers=1)
 
 
 def _move_aside(path: Path) -> None:

@@ -22,7 +22,7 @@ from typing import Any
 from ..episode import Actions
 from ..errors import Infeasible
 from ..log import Log
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..params import with_values
 from ..samplers.dists import Fixed
 from ..samplers.keyed import unit
@@ -96,7 +96,7 @@ def climb(
     n: int,
     any_n: int,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> tuple[list[Rung], Rate | None]:
     """Play all memories on the first twins of a split, continuing what stands in both folders.

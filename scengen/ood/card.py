@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ..analysis import distance
 from ..analysis.space import Space, of_features, of_parameters
 from ..errors import BadConfig, Infeasible, UnknownName, at_least
+from ..parallel import Workers
 from ..pictures import film, render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
@@ -44,7 +45,7 @@ class Settings:
     certify_n: int | None = None
     seed: int = 0
     rounds: int = 20
-    workers: int = 1
+    workers: Workers = 1
     to: str | None = None
 
     def check(self, task: Task) -> None:

@@ -22,7 +22,7 @@ from scipy.stats import binomtest
 
 from ..errors import BadConfig, ScengenError
 from ..log import Log
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..params import with_values
 from ..samplers.axis import Axis, Proof
 from ..samplers.dists import Dist, Fixed, Integer, Uniform
@@ -68,7 +68,7 @@ class Settings:
     budget: int = 500
     method: str = FOREST
     seed: int = 0
-    workers: int = 1
+    workers: Workers = 1
     to: str | None = None
 
 

@@ -14,7 +14,7 @@ from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..params import values
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
@@ -35,7 +35,7 @@ class Settings:
     sampler: str = "iid"
     n: int = 10
     seed: int = 0
-    workers: int = 1
+    workers: Workers = 1
     pool: str | None = None
     keep: list[str] = field(default_factory=list)
     limit: int | None = None
@@ -70,6 +70,9 @@ class Summary:
     cpu: float
     """Processor time of all indices that count, in this run or earlier ones [s]."""
 
+
+MOST_LOST = 100
+"""A run ends when so many scenarios in a row crash or reach a limit: of a sound family hardly one in a hundred does."""
 
 Progress = Callable[[int, int, Mapping[str, int]], None]
 """Called with the certified count, the number of finished indices, and the verdicts so far."""
@@ -234,6 +237,7 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
     missing = (i for i in range(limit) if i not in records)
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     verdicts = Counter(r.verdict for r in records.values())
+    lost_in_a_row = 0
 
     def needed(index: int) -> bool:
         """Whether index can still be among the first n certified ones."""
@@ -245,6 +249,10 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
         journal.add(record)
         records[record.index] = replace(record, row=None)
         verdicts[record.verdict] += 1
+        lost_in_a_row = lost_in_a_row + 1 if record.check == pool.PROCESS else 0
+        if lost_in_a_row == MOST_LOST:
+            why = f"{MOST_LOST} scenarios one after the other have no verdict, the last because it {record.reason}"
+            raise PoolError(f"{why}; give them more with limit_seconds= and limit_mb=, or look at one with workers=1")
         progress(verdicts["certified"], len(records), verdicts)
 
 

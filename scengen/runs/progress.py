@@ -5,6 +5,7 @@ from types import TracebackType
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ..parallel import Executor, Workers
 from ..printed import PlainConsole, printable
 
 EVERY = 15.0
@@ -12,12 +13,14 @@ EVERY = 15.0
 
 
 class ProgressBar:
-    """Shows how far some work has come."""
+    """Shows how far some work has come, how fast it goes, when it will end, and on how many nodes."""
 
-    def __init__(self, console: PlainConsole, title: str, total: int):
+    def __init__(self, console: PlainConsole, title: str, total: int, workers: Workers = 1):
         title = printable(title)
-        self.console, self.title, self.total = console, title, total
+        self.console, self.title, self.total, self.workers = console, title, total, workers
         self._last, self._said = time.monotonic(), 0
+        self._first: tuple[float, int] | None = None
+        """When something was shown first, and how much was done: a run that goes on has done more than this one."""
         columns = (
             TextColumn("{task.description}", markup=False),
             BarColumn(),
@@ -46,8 +49,16 @@ class ProgressBar:
 
     def show(self, done: int, note: str = "") -> None:
         """Say that `done` of the total are done."""
-        self._progress.update(self._task, completed=done, note=note)
-        due = time.monotonic() - self._last > EVERY or (done == self.total and self._said != done)
+        now = time.monotonic()
+        if self._first is None or done < self._first[1]:  # other work has begun
+            self._first = now, done
+        status = self.workers.status if isinstance(self.workers, Executor) else ""
+        rate = (done - self._first[1]) / (now - self._first[0]) if now > self._first[0] else 0.0
+        told = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
+        self._progress.update(self._task, completed=done, note=told)
+        due = now - self._last > EVERY or (done == self.total and self._said != done)
         if due and not self.console.is_terminal:
-            self._last, self._said = time.monotonic(), done
-            self.console.print(f"{self.title}: {done} of {self.total} {note}".rstrip())
+            self._last, self._said = now, done
+            left = (self.total - done) / rate if rate else 0.0
+            end = time.strftime(", ends %a %H:%M", time.localtime(time.time() + left)) if left else ""
+            self.console.print(f"{self.title}: {done} of {self.total} {told}".rstrip() + end)

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 from ..episode import Actions
 from ..errors import Unstable
-from ..parallel import SHOWN, apart, each
+from ..parallel import SHOWN, Workers, apart, each
 from ..pool import NO_WITNESS, PoolRow
 from ..sim.world import World
 
@@ -23,7 +23,7 @@ def play(what: Played) -> None:
             world.apply(action)
 
 
-def unplayable(rows: Iterable[PoolRow], workers: int = 1) -> Iterator[tuple[str, str]]:
+def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[str, str]]:
     """Id and reason of every scenario that crashes, or takes more than a scenario may.
 
     Raises:

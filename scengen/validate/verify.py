@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from ..errors import PoolError, ScengenError, cut
-from ..parallel import Limits, each
+from ..parallel import Limits, Workers, each
 from ..pool import Pool
 from ..samplers.task import Task
 from . import survey
@@ -37,7 +37,7 @@ class Options:
     """How many scenarios are simulated, chosen at random; None for all."""
     seed: int = 0
     """Decides which. An author who knows it forges the others."""
-    workers: int = 1
+    workers: Workers = 1
     limits: Limits | None = LIMITS
     """Of one scenario; None to work in this process."""
     strict: bool = True
