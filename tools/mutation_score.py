@@ -24,7 +24,7 @@ from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import config
 from scengen.attack.campaign import Settings, Subject, arena_of, drawn, fitted
-from scengen.attack.evidence import Hit, causal
+from scengen.attack.evidence import Causal, Hit
 from scengen.attack.macros import Macro
 from scengen.attack.play import SETTLE, Arena, Attempt
 from scengen.attack.search import PRIOR, RANDOM, TIERS, Attack
@@ -181,14 +181,14 @@ def flagged(task: str) -> dict[str, Any]:
     subjects = drawn(config.task(task), "id", 4, 7)
     for subject in subjects:
         arena = arena_of(subject)
-        needed = causal(arena)
+        causal = Causal(arena)
         for k in range(VARIED // len(subjects)):
             jitter = Jitter(f"varied/{subject.scenario.id}/{k}", 0.003, 2.0, 0.08, 0.15, 0.04, k % 2)
             world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
             if rollout.solved:
                 runs += 1
-                lacking += sorted(needed - pairs(world))
+                lacking += sorted(causal.lacking(pairs(world)))
     return {"task": task, "mutant": "", "runs": runs, "flagged": lacking}
 
 

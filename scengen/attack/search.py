@@ -8,12 +8,12 @@ from itertools import islice
 
 from ..samplers.keyed import unit
 from . import draws
-from .evidence import Hit, Rate, causal, hit, rates
+from .evidence import Causal, Hit, Rate, hit, rates
 from .macros import Macro
 from .play import Arena, Attempt, Node, Played
 from .priors import Prior, guesses
 from .retries import RETRY, retries
-from .signature import Pair, Signature
+from .signature import Signature
 from .variations import FOREIGN, WITNESS, foreign, perturbed
 
 SHORTCUT, PRIOR, RANDOM, SEARCH = "shortcut", "prior", "random", "search"
@@ -105,12 +105,12 @@ class Attack:
     ):
         """`number` of `of`: which part of the tiers that are lists this scenario takes. `until`: stop at such a hit."""
         self.arena, self.seed, self.number, self.of, self.priors, self.until = arena, seed, number, of, priors, until
+        self.causal = Causal(arena)
         self.archive, self.fatal = Archive(), Counter[tuple[int | None, str, str]]()
         self.counts: list[Rate] = []
         self.hits: list[Hit] = []
         self.untried: list[Untried] = []
         self.cpu, self.done = 0.0, False
-        self._needed: frozenset[Pair] | None = None
         for k, stage in enumerate(arena.trace.stages[: arena.phases]):
             for raw in (False, True):
                 self.archive.add(Cell(arena.stage(k), raw, stage.signature))
@@ -181,7 +181,7 @@ class Attack:
         start = time.process_time()
         played = self.arena.play(attempt.macros, raw, node)
         self.cpu += time.process_time() - start
-        found = hit(self.arena, attempt, raw, played, node, self.needed) if played.solved else None
+        found = hit(self.arena, attempt, raw, played, node, self.causal) if played.solved else None
         refuting = int(found is not None and found.refutes)
         self.counts.append(Rate(attempt.tier, raw, 1, int(found is not None), refuting))
         if found:
@@ -196,13 +196,6 @@ class Attack:
             if one.seconds < self.arena.horizon - LEFT:
                 self.archive.add(Cell(one, raw, one.signature))
         return played
-
-    @property
-    def needed(self) -> frozenset[Pair]:
-        """The causal contacts, found out when the first hit asks for them."""
-        if self._needed is None:
-            self._needed = causal(self.arena)
-        return self._needed
 
 
 def shortcuts(arena: Arena) -> Iterator[Attempt]:

@@ -10,7 +10,7 @@ import pytest
 from scengen import config
 from scengen.attack import draws
 from scengen.attack.campaign import Settings, arena_of, attack, drawn
-from scengen.attack.evidence import Hit, Rate, causal, hit, rates
+from scengen.attack.evidence import Causal, Hit, Rate, hit, rates
 from scengen.attack.macros import Macro
 from scengen.attack.play import Arena, Attempt
 from scengen.attack.priors import fit
@@ -51,8 +51,8 @@ def arena(subject) -> Arena:
 
 
 @pytest.fixture(scope="module")
-def needed(arena):
-    return causal(arena)
+def causal(arena):
+    return Causal(arena)
 
 
 PICK, AGAINST = Macro("pick", "tile_0", (0.6, 0.0, 1.0, 0.2)), Macro("push", "slab", (np.pi / 2, 0.8, 0.0, 0.08, 0.15))
@@ -121,9 +121,9 @@ def test_perturbed_witnesses_begin_where_a_phase_does(arena):
 # --- evidence -----------------------------------------------------------------------------------
 
 
-def test_carrying_lacks_the_chain(arena, subject, needed, tmp_path):
+def test_carrying_lacks_the_chain(arena, subject, causal, tmp_path):
     played = arena.play((PICK, AGAINST), raw=False)
-    found = hit(arena, Attempt("random", (PICK, AGAINST)), False, played, None, needed)
+    found = hit(arena, Attempt("random", (PICK, AGAINST)), False, played, None, causal)
     assert found and found.refutes and ("tile_0", "tile_1") in found.lacks and "tile_1" in found.unmoved
     found.store(tmp_path)
     stored = Hit.load(tmp_path / f"{found.name}.npz")
@@ -132,9 +132,9 @@ def test_carrying_lacks_the_chain(arena, subject, needed, tmp_path):
     assert again.solved and again.digest == found.digest
 
 
-def test_the_witness_itself_refutes_nothing(arena, needed):
+def test_the_witness_itself_refutes_nothing(arena, causal):
     steps = rest(arena, 0)
-    found = hit(arena, Attempt("witness", steps), False, arena.play(steps, False), None, needed)
+    found = hit(arena, Attempt("witness", steps), False, arena.play(steps, False), None, causal)
     assert found and not found.refutes
 
 
