@@ -20,6 +20,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TextIO, TypeVar
@@ -86,6 +87,7 @@ class Cluster:
         ray = self._ray()
         if ray.is_initialized():
             return
+        code_sha256()  # of the code that this process has imported: soon after, before anybody changes it
         given = f"executor.address = {cut(self.address)}"
         settings = {"include_dashboard": False} if self.address == LOCAL else {}
         with _sigterm_kept(), tempfile.TemporaryFile("w+") as said:
@@ -179,6 +181,7 @@ def about(function: bytes) -> dict[str, str]:
     return {**versions(), "fingerprint": fingerprint(), "code": code_sha256()}
 
 
+@cache
 def code_sha256() -> str:
     """Hash of the Python and configuration files of scengen, by name: the same in a checkout and where it is installed.
 
@@ -338,7 +341,7 @@ class _Crew:
                         raise value
                     yield value if kind == "result" else made_of_lost(item, value, lost)
             for task in self._judged():
-                yield made_of_lost(task.item, f"died, and so did {TRIES - 1} before it on nodes that live", lost)
+                yield made_of_lost(task.item, f"died: it took {TRIES} workers with it", lost)
 
     def end(self) -> None:
         """End all workers, in the middle of their work if need be."""

@@ -191,7 +191,6 @@ def test_pools_have_the_same_bytes_on_one_process_on_two_nodes_and_when_a_node_d
     victim.kill_raylet()
     told = run.communicate()[1]
     assert run.returncode == 0, told
-    print("KILLED", told)
     nodes.remove_node(victim, allow_graceful=False)
     assert content(tmp_path / "killed") == content(tmp_path / "local")
 
@@ -218,7 +217,7 @@ def test_limits_hold_on_nodes(ours):
 def test_what_kills_its_worker_twice_is_lost_and_a_run_of_nothing_else_ends(ours, monkeypatch):
     monkeypatch.setattr(cluster, "NOTICED", 2.0)
     found = sorted(each(work, ["a", "kill", "b"], ours, LIMITS, lost))
-    assert found == ["a", "b", "kill died, and so did 1 before it on nodes that live"]
+    assert found == ["a", "b", "kill died: it took 2 workers with it"]
     with pytest.raises(ClusterError, match="workers died one after the other without a result; the last: The actor"):
         list(each(work, ["kill"] * 20, ours, LIMITS, lost))
 

@@ -47,7 +47,7 @@ def _apart(settings: Settings) -> Mapping[str, Settings]:
 
 def _record(settings: Settings, arguments: Arguments) -> int:
     """Make one recording, and tell of it."""
-    with ProgressBar(err, f"record to {settings.to}", 0) as progress_bar:
+    with ProgressBar(err, f"record to {settings.to}", 0, settings.workers) as progress_bar:
         try:
             summary = record(settings, progress_bar.of, search_path(arguments))
         except KeyboardInterrupt:

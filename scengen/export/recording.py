@@ -24,6 +24,7 @@ from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..orientation import Orientation
+from ..parallel import Workers
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
@@ -66,6 +67,7 @@ class Settings:
     cameras: str | list[str] = field(default_factory=lambda: list(CAMERAS))
     width: int = 640
     height: int = 480
+    workers: Workers = 1
 
     @cached_property
     def folders(self) -> list[str]:
@@ -99,7 +101,7 @@ class Settings:
         """Raise `ScengenError` for settings that make no sense."""
         if self.format not in (LEROBOT, ROBOMIMIC):
             raise UnknownName("format of recordings", self.format, [LEROBOT, ROBOMIMIC])
-        at_least(self, n=1, fps=1, width=2, height=2)
+        at_least(self, n=1, fps=1, width=2, height=2, workers=1)
         periods_between(self.rate)
         if self.format == ROBOMIMIC:
             check_target(self.to)
@@ -158,7 +160,7 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
     failed = []
     _begin(settings)
     try:
-        lost = dict(unplayable(_rows(pools, count)))
+        lost = dict(unplayable(_rows(pools, count), settings.workers))
         with _writer(settings, robot, streams, next(iter(tasks)), tuple(search)) as writer:
             for row in _rows(pools, count):
                 if row.id in lost:

@@ -277,3 +277,11 @@ def test_a_limit_on_files_is_one_line_and_the_run_goes_on_afterwards(finished, t
     assert process.returncode == 2 and len(told) == 1 and "Traceback" not in err and "damaged" not in err
     assert not list(tmp_path.rglob("*.part"))
     assert cli.run(command(folder)) == 0 and Pool.open(folder).sha256 == Pool.open(finished).sha256
+
+
+def test_a_run_that_loses_every_scenario_ends_and_says_why(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(generate, "MOST_LOST", 2)
+    slow = ("limit_seconds=1", "certify.robust.runs=500")
+    assert cli.run(["generate", "task=domino_single", "n=3", *slow, f"pool={tmp_path / 'pool'}"]) == 2
+    told = "2 scenarios one after the other have no verdict, the last because it took longer than 1 s"
+    assert told in capsys.readouterr().err

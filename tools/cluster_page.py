@@ -1,0 +1,37 @@
+"""The table of costs in docs/cluster.md, from conf/certified.yaml. `make docs`"""
+
+import re
+from pathlib import Path
+
+from scengen import task_files
+
+PAGE = Path(__file__).parent.parent / "docs" / "cluster.md"
+BEGIN, END = "<!-- costs: tools/cluster_page.py -->\n", "<!-- end of costs -->\n"
+HOUR, DAY = 3600.0, 86_400.0
+
+
+def page() -> str:
+    """The page, with the table as it has to be."""
+    return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}{table()}{END}", PAGE.read_text(), flags=re.S)
+
+
+def table() -> str:
+    """What pools of the training split cost, by task: Markdown."""
+    each = {task: splits[task_files.ID]["cpu"] for task, splits in task_files.certified().items()}
+    lines = [
+        "| task | one [core s] | 10 thousand [core hours] | 1 million [core days] | 10 million [core days] |",
+        "|---|---|---|---|---|",
+        *(_line(f"[{task}](tasks/{task}.md)", cpu) for task, cpu in sorted(each.items(), key=lambda x: x[1])),
+        _line("as many of every task", sum(each.values()) / len(each)),
+    ]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _line(what: str, cpu: float) -> str:
+    costs = (1e4 * cpu / HOUR, 1e6 * cpu / DAY, 1e7 * cpu / DAY)
+    return f"| {what} | {cpu:.1f} | {' | '.join(f'{cost:.0f}' for cost in costs)} |"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
+    print(f"wrote {PAGE}")
