@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test wheel slow readme fuzz kills check types format certify axes attacks docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo test wheel slow readme fuzz kills check types format certify axes attacks drift docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -86,6 +86,12 @@ TASKS ?=
 BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
+
+# Verdicts under other versions of MuJoCo, and docs/drift.md: hours. N scenarios of the pools in POOLS, made where
+# there are none; TASKS=packing takes some. The environments come from the package index.
+POOLS ?= generated/drift
+drift: setup
+	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(TASKS)
 
 # docs/api.md, and a page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
 docs: setup

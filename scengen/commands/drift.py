@@ -6,7 +6,7 @@ from typing import Any
 
 from ..config import read
 from ..drift.environment import Environment, environment
-from ..drift.matrix import FLIPPED, UNKNOWN, matrix, remarks, tables, total
+from ..drift.matrix import FLIPPED, UNKNOWN, matrix, remarks, tables, under
 from ..errors import BadConfig, ScengenError, at_least
 from ..pool import Pool
 from ..runs.progress import ProgressBar
@@ -52,7 +52,7 @@ def command(arguments: Arguments) -> int:
         out.print(table)
     for line in remarks(result):
         remark(line)
-    totals = {version: total(result, version) for version in versions}
+    totals = {version: under(result, version) for version in versions}
     for version, told in totals.items():
         say(f"mujoco {version}: {', '.join(f'{told[name]} {name}' for name in told if name != 'checks')}")
     if any(told[FLIPPED] for told in totals.values()):

@@ -52,7 +52,7 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
         for place, name in enumerate(pool.names()):
             if n is not None and place >= n:
                 break
-            by = {mujoco: {"outcome": outcome(told[name.id]), **told[name.id]} for mujoco, told in judged.items()}
+            by = {mujoco: _entry(told[name.id]) for mujoco, told in judged.items()}
             about = {"pool": str(pool.folder), "task": pool.task, "id": name.id, "name": str(name)}
             scenarios.append({**about, "certificate": certified[name.id], "mujoco": by})
     return {
@@ -71,6 +71,11 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
         "tasks": _by_task(scenarios, list(found)),
         "scenarios": scenarios,
     }
+
+
+def _entry(judgement: Mapping[str, Any]) -> dict[str, Any]:
+    """A judgement with its outcome, without what the scenario's own entry says."""
+    return {"outcome": outcome(judgement), **{k: v for k, v in judgement.items() if k not in ("id", "name")}}
 
 
 def _certified(certificate: Any, horizon: float) -> dict[str, Any]:
@@ -94,11 +99,15 @@ def _by_task(scenarios: Sequence[Mapping[str, Any]], versions: Sequence[str]) ->
     return {task: found[task] for task in sorted(found)}
 
 
-def total(result: Mapping[str, Any], version: str) -> dict[str, Any]:
-    """The same for all tasks under one version."""
-    rows = [row[version] for row in result["tasks"].values()]
+def total(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What stands for several tasks under one version."""
     checks = sum((Counter(row["checks"]) for row in rows), Counter[str]())
     return {**{name: sum(row[name] for row in rows) for name in OUTCOMES}, "checks": checks}
+
+
+def under(result: Mapping[str, Any], version: str) -> dict[str, Any]:
+    """What stands for all tasks of a result under one version."""
+    return total([row[version] for row in result["tasks"].values()])
 
 
 def cell(told: Mapping[str, Any]) -> str:
@@ -181,7 +190,7 @@ def tables(result: Mapping[str, Any]) -> list[Table]:
         found.add_row(task, *(cell(row[version]) for version in result["mujoco"]))
     if len(result["tasks"]) > 1:
         found.add_section()
-        found.add_row("all", *(cell(total(result, version)) for version in result["mujoco"]))
+        found.add_row("all", *(cell(under(result, version)) for version in result["mujoco"]))
     margins = Table("mujoco", "scenario", "check", "now", "the certificate", title="flipped", title_justify="left")
     for line in flips(result):
         margins.add_row(*line)

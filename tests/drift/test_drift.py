@@ -1,5 +1,6 @@
 """The drift matrix: verdicts of a pool under several versions of MuJoCo, each in an environment of its own."""
 
+import importlib.util
 import json
 import venv
 from dataclasses import asdict, replace
@@ -15,7 +16,7 @@ from scengen.commands import drift
 from scengen.drift import environment as environments
 from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge
-from scengen.drift.matrix import cell, flips, matrix, remarks, tables, total
+from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.errors import BadConfig, ScengenError
 from scengen.parallel import Limits
 from scengen.pool import Pool
@@ -23,6 +24,7 @@ from scengen.validate.identity import fingerprint
 from scengen.validate.recheck import FIRST, REPLAYED
 from scengen.validate.stored import settings_of
 
+ROOT = Path(__file__).parents[2]
 BASE = Path(__file__).parents[1] / "checker" / "base" / "single_quick"
 """Two scenarios of domino_single."""
 HERE = mujoco.__version__
@@ -74,8 +76,8 @@ def test_the_control_repeats_every_bit(made, same):
 
 def test_the_matrix_counts_outcomes_and_flipped_checks(result):
     row = result["tasks"]["domino_single"]
-    assert cell(row[HERE]) == "2 / 0 / 0" == cell(total(result, HERE))
-    assert cell(row["3.0.0"]) == "0 / 0 / 2 (rest 1, witness 1)" == cell(total(result, "3.0.0"))
+    assert cell(row[HERE]) == "2 / 0 / 0" == cell(under(result, HERE))
+    assert cell(row["3.0.0"]) == "0 / 0 / 2 (rest 1, witness 1)" == cell(under(result, "3.0.0"))
     assert [one["mujoco"]["3.0.0"]["outcome"] for one in result["scenarios"]] == ["flipped", "flipped"]
 
 
@@ -174,6 +176,17 @@ def test_tables_are_printed(result, capsys):
     for table in tables(result):
         drift.out.print(table)
     assert "0 / 0 / 2 (rest 1, witness 1)" in capsys.readouterr().out
+
+
+def test_the_page_is_made_of_its_results_and_the_control_repeats_every_bit():
+    spec = importlib.util.spec_from_file_location("drift_all", ROOT / "tools" / "drift_all.py")
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    files = [ROOT / tool.FOLDER / f"{task}.json" for task in config.tasks()]
+    told = [json.loads(path.read_text()) for path in files if path.is_file()]
+    assert (ROOT / tool.PAGE).read_text() == tool.page(told), "docs/drift.md is out of date; run make drift"
+    made = [(one, pool["versions"]["mujoco"]) for one in told for pool in one["pools"]]
+    assert {j["mujoco"][version]["outcome"] for one, version in made for j in one["scenarios"]} == {"same bits"}
 
 
 @pytest.mark.slow
