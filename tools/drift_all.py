@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from scengen import cli, config
-from scengen.drift.matrix import FLIPPED, cell, flips, total
+from scengen.attack.evidence import Rate
+from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.pool import MANIFEST
 
 VERSIONS = ("3.3.7", "3.4.0", "3.5.0")
@@ -92,8 +93,9 @@ def page(told: list[dict[str, Any]]) -> str:
         f"{count} scenarios of {len(rows)} tasks; `same bits / same verdict / flipped`:\n",
         f"| task | scenarios | {' | '.join(f'MuJoCo {version}' for version in VERSIONS)} |",
         "|---|---|" + "---|" * len(VERSIONS),
-        *(_row(task, n, [row[version] for version in VERSIONS]) for task, row, n in rows),
-        _row("**all**", count, [every[version] for version in VERSIONS]),
+        *(_row(task, n, [cell(row[version]) for version in VERSIONS]) for task, row, n in rows),
+        _row("**all**", count, [cell(every[version]) for version in VERSIONS]),
+        _row("flipped, 95 % bound", count, [f"< {_bound(every[version]):.1%}" for version in VERSIONS]),
     ]
     if any(each[FLIPPED] for each in every.values()):
         lines += [
@@ -107,8 +109,13 @@ def page(told: list[dict[str, Any]]) -> str:
     return HEAD + "\n".join(lines) + "\n" + LOCK
 
 
-def _row(task: str, count: int, told: list[dict[str, Any]]) -> str:
-    return f"| {task} | {count} | {' | '.join(map(cell, told))} |"
+def _row(task: str, count: int, told: list[str]) -> str:
+    return f"| {task} | {count} | {' | '.join(told)} |"
+
+
+def _bound(told: dict[str, Any]) -> float:
+    """One-sided 95 % Clopper-Pearson bound of the share that flips, among those of which something can be said."""
+    return Rate("", False, sum(told[name] for name in OUTCOMES if name != UNKNOWN), told[FLIPPED]).bound
 
 
 if __name__ == "__main__":  # worker processes import this file again

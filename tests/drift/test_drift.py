@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from pools import make
 
 from scengen import cli, config, pool
 from scengen.certificate import CHECKS
@@ -19,27 +20,25 @@ from scengen.drift.judge import Judge, judge
 from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.errors import BadConfig, ScengenError
 from scengen.parallel import Limits
-from scengen.pool import Pool
 from scengen.validate.identity import fingerprint
 from scengen.validate.recheck import FIRST, REPLAYED
 from scengen.validate.stored import settings_of
 
 ROOT = Path(__file__).parents[2]
-BASE = Path(__file__).parents[1] / "checker" / "base" / "single_quick"
-"""Two scenarios of domino_single."""
 HERE = mujoco.__version__
 LIMITS = Limits(300.0, 4000)
 
 
 @pytest.fixture(scope="module")
-def made():
-    return Pool.open(BASE)
+def made(tmp_path_factory):
+    """Two scenarios, certified by the code and the MuJoCo that run here."""
+    return make(tmp_path_factory.mktemp("drift") / "pool", n=2).pool
 
 
 @pytest.fixture(scope="module")
 def same(made):
     """Every check under the MuJoCo that made the pool: the control."""
-    return [asdict(one) for one in judge(str(BASE), (), "recheck", None, 1, LIMITS)]
+    return [asdict(one) for one in judge(str(made.folder), (), "recheck", None, 1, LIMITS)]
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +57,7 @@ def changed(made):
 @pytest.fixture(scope="module")
 def result(made, same, changed):
     found = {
-        version: {"fingerprint": told, "judged": {str(BASE): judged}}
+        version: {"fingerprint": told, "judged": {str(made.folder): judged}}
         for version, told, judged in ((HERE, fingerprint(), same), ("3.0.0", "otherwise", changed))
     }
     return json.loads(json.dumps(matrix([made], found, "recheck", None)))
@@ -87,7 +86,7 @@ def test_a_flipped_check_stands_with_its_margins(made, result):
     assert rest[:3] == ("3.0.0", str(first.name), "rest")
     assert "mm while nobody acts" in rest[3] and "bar drift 0" in rest[3]
     assert witness[1:3] == (str(second.name), "witness") and "the goal was not reached" in witness[3]
-    assert "of 4 jittered runs, goal after" in witness[4]
+    assert "1 of 1 jittered runs, goal after" in witness[4]
 
 
 def test_where_the_recording_fails_the_oracle_is_asked(changed):
@@ -99,10 +98,10 @@ def test_where_the_recording_fails_the_oracle_is_asked(changed):
 
 def test_the_control_is_named_where_it_is_missing(made, same, changed, result):
     assert not list(remarks(result))
-    alone = matrix([made], {"3.0.0": {"fingerprint": "", "judged": {str(BASE): changed}}}, "recheck", None)
+    alone = matrix([made], {"3.0.0": {"fingerprint": "", "judged": {str(made.folder): changed}}}, "recheck", None)
     (told,) = remarks(alone)
     assert f"made with mujoco {HERE}" in told and "control" in told
-    elsewhere = matrix([made], {HERE: {"fingerprint": "other", "judged": {str(BASE): same}}}, "recheck", None)
+    elsewhere = matrix([made], {HERE: {"fingerprint": "other", "judged": {str(made.folder): same}}}, "recheck", None)
     (told,) = remarks(elsewhere)
     assert "rounds otherwise" in told
 
@@ -132,19 +131,19 @@ def here(tmp_path_factory):
     return Environment(HERE, folder)
 
 
-def test_an_environment_shares_everything_but_mujoco(here, monkeypatch, capsys, tmp_path):
+def test_an_environment_shares_everything_but_mujoco(made, here, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(drift, "environment", lambda version, told: here)
     report = tmp_path / "drift.json"
-    given = ("drift", f"pool={BASE}", f"mujoco={HERE}", "n=1", "level=replay", f"json={report}")
+    given = ("drift", f"pool={made.folder}", f"mujoco={HERE}", "n=1", "level=replay", f"json={report}")
     assert cli.run(given) == 0
     assert "1 / 0 / 0" in capsys.readouterr().out
     told = json.loads(report.read_text())
     assert told["mujoco"] == {HERE: {"fingerprint": fingerprint()}} and len(told["scenarios"]) == 1
 
 
-def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(here, monkeypatch, capsys):
+def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(made, here, monkeypatch, capsys):
     monkeypatch.setattr(drift, "environment", lambda version, told: replace(here, mujoco=version))
-    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.0]", "level=replay")) == 2
+    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", "level=replay")) == 2
     assert f"the environment of mujoco 3.4.0 imports {HERE}" in capsys.readouterr().err
 
 
@@ -190,16 +189,16 @@ def test_the_page_is_made_of_its_results_and_the_control_repeats_every_bit():
 
 
 @pytest.mark.slow
-def test_another_mujoco_is_really_another_one(tmp_path, monkeypatch, capsys):
+def test_another_mujoco_is_really_another_one(made, tmp_path, monkeypatch, capsys):
     """An environment from the package index: the bits of both scenarios are others, their verdicts are not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     report = tmp_path / "drift.json"
-    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.0]", f"json={report}")) == 0
+    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", f"json={report}")) == 0
     told = json.loads(report.read_text())
     assert cell(told["tasks"]["domino_single"]["3.4.0"]) == "0 / 2 / 0"
     assert told["mujoco"]["3.4.0"]["fingerprint"] != fingerprint()
     assert "as the control" in capsys.readouterr().err
-    assert cli.run(("drift", f"pool={BASE}", "mujoco=[3.4.99]")) == 2
+    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.99]")) == 2
     assert "there is no mujoco 3.4.99 for this Python" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "scengen").glob("mujoco-*[!k]")] == [
         path.name for path in (tmp_path / "scengen").glob("mujoco-3.4.0-????????????")
