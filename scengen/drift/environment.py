@@ -73,10 +73,15 @@ class Environment:
                     raise
             if process.returncode:
                 errors.seek(0)
-                told = [line.strip() for line in errors.read().splitlines() if line.strip()]
-                raise ScengenError(
-                    f"under mujoco {self.mujoco}: {cut(told[-1] if told else 'ended without a word', 600)}"
-                )
+                why = _last_word(errors.read())
+                raise ScengenError(f"under mujoco {self.mujoco}: {cut(why, 600)}")
+
+
+def _last_word(said: str) -> str:
+    """What a program that failed has said in the end: its error, if that has several lines the first of them."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["it ended without a word"]
+    named = [line for line in lines if re.match(r"[\w.]+(Error|Exception): ", line)]
+    return (named or lines)[-1]
 
 
 def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
