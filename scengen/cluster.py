@@ -442,7 +442,8 @@ class _Crew:
             ClusterError: no node can be used, or no worker starts.
         """
         ready = [*self._idle, *(worker for worker in self._pending.values() if worker.task)]
-        self.cluster.status = f"{len({worker.node for worker in ready})} nodes, {len(ready)} workers"
+        counts = {"node": len({worker.node for worker in ready}), "worker": len(ready)}
+        self.cluster.status = ", ".join(f"{n} {what}{'s' * (n != 1)}" for what, n in counts.items())
         if ready:
             self._useful = now
         if self._refused and not (self._nodes or self._asked):
