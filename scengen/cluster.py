@@ -76,8 +76,11 @@ class Cluster:
         self.told: set[str] = set()
         """What has been said of nodes that are not used, once for all that is done."""
 
-    def connect(self) -> None:
+    def connect(self) -> ModuleType:
         """Join the cluster, unless this process has joined one.
+
+        Returns:
+            Ray.
 
         Raises:
             ScengenError: Ray is not installed, the address or the token is wrong, or nobody answers there.
@@ -86,7 +89,9 @@ class Cluster:
             raise BadConfig(f"workers = {self.count}; of a cluster they must be from 1 to {MOST_WORKERS}, or auto")
         ray = self._ray()
         if ray.is_initialized():
-            return
+            return ray
+        if ":" in self.address:
+            self._answers()
         code_sha256()  # of the code that this process has imported: soon after, before anybody changes it
         given = f"executor.address = {cut(self.address)}"
         settings = {"include_dashboard": False} if self.address == LOCAL else {}
@@ -94,7 +99,7 @@ class Cluster:
             try:
                 with _redirected(said):
                     ray.init(self.address, log_to_driver=False, logging_level=logging.CRITICAL, **settings)
-                return
+                return ray
             except ray.exceptions.AuthenticationError as error:
                 why = _line(error).partition(". ")[0]
             except ConnectionError as error:
@@ -121,8 +126,7 @@ class Cluster:
             ClusterError: no node can be used, or workers die one after the other without any result.
             WorkerDied: an item has taken `TRIES` workers with it, or has reached a limit, and there is no `lost`.
         """
-        self.connect()
-        crew = _Crew(self._ray(), self, pickle.dumps(function), limits)
+        crew = _Crew(self.connect(), self, pickle.dumps(function), limits)
         try:
             yield from crew.work(iter(items), lost)
         finally:
@@ -133,7 +137,7 @@ class Cluster:
         """Ray, which is imported when it is needed, and told to be quiet before."""
         if importlib.util.find_spec("ray") is None:
             raise ClusterError("executor=ray needs Ray, which is not installed; pip install 'scengen[ray]'")
-        if not re.fullmatch(rf"{AUTO}|{LOCAL}|(ray://)?[\w.-]+:\d+", self.address, re.ASCII):
+        if not re.fullmatch(rf"{AUTO}|{LOCAL}|(ray://)?[\w.-]+:\d{1, 5}", self.address, re.ASCII):
             accepted = f"{AUTO}, {LOCAL}, HOST:PORT or ray://HOST:PORT"
             raise BadConfig(f"executor.address = {cut(repr(self.address))}; it must be {accepted}")
         if self.token is not None:
@@ -144,8 +148,6 @@ class Cluster:
             os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN_PATH=self.token)
         for name, value in QUIET.items():
             os.environ.setdefault(name, value)
-        if ":" in self.address:
-            self._answers()
         import ray
 
         return ray
@@ -155,7 +157,7 @@ class Cluster:
         host, _, port = self.address.rpartition("/")[2].rpartition(":")
         try:
             socket.create_connection((host, int(port)), REACHED).close()
-        except (OSError, OverflowError) as error:
+        except (OSError, OverflowError, UnicodeError) as error:
             why = f"nobody answers there ({_line(error)}); see that the cluster runs, and say its HOST:PORT"
             raise ClusterError(f"executor.address = {cut(self.address)}: {why}") from None
 

@@ -63,6 +63,7 @@ def lost(item, reason):
         (("executor=ray", "executor.address=127.0.0.1:1"), "nobody answers there ([Errno 111] Connection refused)"),
         (("executor=ray", "executor.address=ray://localhost:1"), "nobody answers there"),
         (("executor=ray", "executor.address=x:99999"), "nobody answers there"),
+        (("executor=ray", "executor.address=a..b:1"), "nobody answers there"),
         (("executor=ray", "executor.token=missing.txt"), "executor.token = missing.txt; there is no such file"),
         (("executor=ray", "workers=0"), "workers = 0; of a cluster they must be from 1 to 10000, or auto"),
         (("executor=ray", "workers=many"), "workers = 'many'; it must be a whole number, or auto"),
