@@ -137,7 +137,7 @@ class Cluster:
         """Ray, which is imported when it is needed, and told to be quiet before."""
         if importlib.util.find_spec("ray") is None:
             raise ClusterError("executor=ray needs Ray, which is not installed; pip install 'scengen[ray]'")
-        if not re.fullmatch(rf"{AUTO}|{LOCAL}|(ray://)?[\w.-]+:\d{1, 5}", self.address, re.ASCII):
+        if not re.fullmatch(rf"{AUTO}|{LOCAL}|(ray://)?[\w.-]+:\d{{1,5}}", self.address, re.ASCII):
             accepted = f"{AUTO}, {LOCAL}, HOST:PORT or ray://HOST:PORT"
             raise BadConfig(f"executor.address = {cut(repr(self.address))}; it must be {accepted}")
         if self.token is not None:

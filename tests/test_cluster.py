@@ -132,15 +132,17 @@ def nodes():
     os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]), str(Path(__file__).parent)])
     from ray.cluster_utils import Cluster as Nodes
 
-    found = Nodes(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
-    found.token = str(token)
-    for _ in range(2):
-        found.add_node(num_cpus=1)
-    yield found
-    found.shutdown()
-    os.environ.clear()
-    os.environ.update(kept)
-    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        found = Nodes(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
+        found.token = str(token)
+        for _ in range(2):
+            found.add_node(num_cpus=1)
+        yield found
+        found.shutdown()
+    finally:
+        os.environ.clear()
+        os.environ.update(kept)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @pytest.fixture
