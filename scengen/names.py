@@ -5,8 +5,9 @@ was drawn. Files and columns hold ids alone.
 """
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from .errors import BadConfig, ScengenError, UnknownName, cut, nearest
 
@@ -21,9 +22,8 @@ class Misnamed(UserWarning):
 class NoScenario(UnknownName):
     """No id begins as asked for."""
 
-    def __init__(self, text: str, start: str, known: Sequence["Name"], where: str):
-        close = nearest(start, (name.id for name in known))
-        ScengenError.__init__(self, f"no scenario in {where} named {cut(repr(text))}{close}; known: {_listed(known)}")
+    def __init__(self, text: str, close: str, known: str, where: str):
+        ScengenError.__init__(self, f"no scenario in {where} named {cut(repr(text))}{close}; known: {known}")
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,27 @@ class Name:
         return f"{self.task}/{self.split}@{self.index}/{self.id}"
 
 
-def find(text: str, known: Iterable[Name], where: str) -> Name:
-    """The scenario of that name, or whose id begins so. Warns (`Misnamed`) of a name that is wrong about its id.
+class Known(Protocol):
+    """Scenarios among which one is looked for; each has a place."""
+
+    def __len__(self) -> int: ...
+
+    def beginning(self, start: str) -> Sequence[int]:
+        """Places of those whose ids begin so, one for each id."""
+        ...
+
+    def alike(self, start: str) -> Sequence[str]:
+        """Ids among which the one that was meant may be."""
+        ...
+
+
+def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> int:
+    """Place of the scenario of that name, or whose id begins so.
+
+    Warns (`Misnamed`) of a name that is wrong about its id.
 
     Args:
+        name: of the scenario at a place.
         where: the scenarios are, for errors.
 
     Raises:
@@ -51,17 +68,19 @@ def find(text: str, known: Iterable[Name], where: str) -> Name:
         BadConfig: there is more than one.
     """
     before, _, start = text.rpartition("/")
-    names = list(known)
-    found = [name for name in names if name.id.startswith(start)] if start else []
+    found = known.beginning(start) if start else []
     if not found:
-        raise NoScenario(text, start, names, where)
+        raise NoScenario(text, nearest(start, known.alike(start)), _listed(range(len(known)), name), where)
     if len(found) > 1:
-        raise BadConfig(f"{cut(repr(text))} begins {len(found)} ids in {where}; give more of one: {_listed(found)}")
-    (name,) = found
-    if before and not str(name).startswith(f"{before}/"):
-        warnings.warn(f"{cut(text)} is {name}: the id counts, what stands before it is wrong", Misnamed, stacklevel=3)
-    return name
+        told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more of one: {_listed(found, name)}"
+        raise BadConfig(told)
+    called = name(found[0])
+    if before and not str(called).startswith(f"{before}/"):
+        told = f"{cut(text)} is {called}: the id counts, what stands before it is wrong"
+        warnings.warn(told, Misnamed, stacklevel=3)
+    return found[0]
 
 
-def _listed(names: Sequence[Name]) -> str:
-    return ", ".join([*map(str, names[:SHOWN]), *(["..."] if len(names) > SHOWN else [])]) or "(none)"
+def _listed(places: Sequence[int], name: Callable[[int], Name]) -> str:
+    more = ["..."] if len(places) > SHOWN else []
+    return ", ".join([*(str(name(place)) for place in places[:SHOWN]), *more]) or "(none)"

@@ -4,26 +4,36 @@ Data only: nothing in a pool is executed, imported or opened by its name, whoeve
 rules of `scengen.schema`.
 """
 
+import bisect
 import hashlib
+import itertools
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from . import schema, shards
 from .certificate import StoredCertificate, as_json, from_json
+from .directory import Directory, joined
 from .errors import PoolError, UnknownName
-from .names import Name, find
+from .names import Name
 from .params import Value
 from .shards import FORMAT
 
 MANIFEST = "manifest.json"
-SHARD_ROWS = 100_000
+SHARD_ROWS = 10_000
+"""Scenarios in a file: some 150 MB, written and hashed in seconds."""
+MOST_ROWS = 20_000_000
+"""Scenarios that can be found by their ids: 600 MB of them."""
+FOOTERS = 8
+"""Files whose lists of groups are kept, some MB each."""
 REJECTED = "rejected.parquet"
 PROCESS = "process"
 """Stands for a check in the reasons where a scenario has ended its process, or was ended with it at a limit."""
@@ -260,6 +270,59 @@ class Pool:
         """
         return (Name(*told) for told in self.columns("task", "split", "index", "id"))
 
+    # --- some of the scenarios --------------------------------------------------------------
+
+    @cached_property
+    def directory(self) -> Directory:
+        """Ids and indices of all scenarios, read once.
+
+        Raises:
+            PoolError: a shard cannot be read, or holds another number of scenarios than the manifest says.
+        """
+        if len(self) > MOST_ROWS:
+            raise PoolError(f"{self.folder} promises {len(self)} scenarios; at most {MOST_ROWS} are found by their ids")
+        return joined([Directory(*shards.keys(path, rows)) for path, rows in self._files])
+
+    def kinds(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
+        """The different texts in a column such as `split`, and which of them each scenario has, shape (n,).
+
+        Raises:
+            PoolError: as `directory`, or there are too many.
+        """
+        found: dict[str, int] = {}
+        codes = [np.zeros(0, np.int32)]
+        for path, rows in self._files:
+            texts, here = shards.kinds(path, name, rows)
+            codes.append(np.array([found.setdefault(text, len(found)) for text in texts] or [0], np.int32)[here])
+        return list(found), np.concatenate(codes)
+
+    def some(self, places: Iterable[int], witness: bool = True) -> Iterator[PoolRow]:
+        """The scenarios at some places, counted from 0 in index order; no others are unpacked.
+
+        Args:
+            places: increasing within a hundred neighbours, so that these are read once.
+
+        Raises:
+            PoolError: a shard cannot be read.
+        """
+        names = shards.NAMES if witness else shards.LIGHT
+        return (PoolRow(**{"witness": NO_WITNESS, **values}) for values in self._some(places, names))
+
+    def at(self, place: int, witness: bool = True) -> PoolRow:
+        """The scenario at a place, counted from 0 in index order.
+
+        Raises:
+            IndexError: there is none.
+            PoolError: its shard cannot be read.
+        """
+        if not 0 <= place < len(self):
+            raise IndexError(f"{self.folder} holds {len(self)} scenarios, numbered from 0; there is none at {place}")
+        return next(self.some([place], witness))
+
+    def name_at(self, place: int) -> Name:
+        """What the scenario at a place is called."""
+        return Name(*next(self._some([place], ("task", "split", "index", "id"))).values())
+
     def row(self, name: str) -> PoolRow:
         """The scenario of that name, such as `domino_single/wide_gaps@3/8ed4a4577fe0`, or whose id begins so.
 
@@ -269,8 +332,59 @@ class Pool:
             UnknownName: there is none.
             BadConfig: there is more than one.
         """
-        found = find(name, self.names(), str(self.folder))
-        return next(row for row in self.rows() if row.id == found.id)
+        return self.at(self.directory.find(name, self.name_at, str(self.folder)))
+
+    def of_index(self, index: int) -> PoolRow:
+        """The scenario that was drawn at an index.
+
+        Raises:
+            PoolError: there is none; the others were not certified.
+        """
+        place = self.directory.of_index(index)
+        if place is None:
+            raise PoolError(f"{self.folder} holds no scenario of index {index}; {self.indices} indices were tried")
+        return self.at(place)
+
+    def _some(self, places: Iterable[int], names: Sequence[str]) -> Iterator[dict[str, Any]]:
+        for (number, group), found in itertools.groupby(map(self._where, places), key=lambda where: where[:2]):
+            path, metadata = self._files[number][0], self._footer(number)[0]
+            yield from shards.read_some(path, metadata, group, [inside for *_, inside in found], names)
+
+    def _where(self, place: int) -> tuple[int, int, int]:
+        """Shard, group of rows, and row in it of a place."""
+        number = bisect.bisect_right(self._ends, place)
+        inside = place - (self._ends[number - 1] if number else 0)
+        ends = self._footer(number)[1]
+        group = bisect.bisect_right(ends, inside)
+        return number, group, inside - (ends[group - 1] if group else 0)
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        """Place behind the last scenario of every shard."""
+        return list(itertools.accumulate(rows for _, rows in self._files))
+
+    @cached_property
+    def _footer(self) -> Callable[[int], tuple[pq.FileMetaData, list[int]]]:
+        """What a shard says of its groups of rows, and the place in it behind the last row of each."""
+
+        @lru_cache(FOOTERS)
+        def footer(number: int) -> tuple[pq.FileMetaData, list[int]]:
+            path, rows = self._files[number]
+            metadata, ends = shards.footer(path)
+            if not ends or ends[-1] != rows:
+                raise PoolError(f"{path} holds {ends[-1] if ends else 0} rows, and the manifest promises {rows}")
+            return metadata, ends
+
+        return footer
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What goes to another process: where the pool is, and not what was read of it."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def _files(self) -> list[tuple[Path, int]]:
+        """Every shard with the number of its scenarios."""
+        return [(self.folder / shard["file"], shard["rows"]) for shard in self.manifest["shards"]]
 
     @property
     def promised_rejects(self) -> int:
@@ -287,32 +401,44 @@ class Pool:
             yield from _rows(self.folder / REJECTED, witness=True)
 
 
-def write(folder: Path, about: Mapping[str, Any], rows: Iterable[PoolRow], kept: Sequence[PoolRow] = ()) -> Pool:
+def write(
+    folder: Path,
+    about: Mapping[str, Any],
+    rows: Iterable[PoolRow],
+    kept: Sequence[PoolRow] = (),
+    ready: Sequence[Mapping[str, Any]] = (),
+) -> Pool:
     """Write a pool: shards first, the manifest last, each under its final name only when complete.
 
     Args:
         about: the manifest but for the files.
-        rows: the certified scenarios in index order.
+        rows: the certified scenarios in index order, as far as they are not in shards that are ready.
         kept: scenarios that were not certified.
+        ready: what the manifest says of full shards that lie in the folder already, see `write_shard`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    found, batch = [], []
-    for row in rows:
-        batch.append(row)
-        if len(batch) == SHARD_ROWS:
-            found.append(_written(folder / f"scenarios-{len(found):05d}.parquet", batch))
-            batch = []
-    if batch or not found:
-        found.append(_written(folder / f"scenarios-{len(found):05d}.parquet", batch))
+    found, left = [*ready], iter(rows)
+    while (first := next(left, None)) or not found:
+        some = itertools.chain([first] if first else [], itertools.islice(left, SHARD_ROWS - 1))
+        found.append(write_shard(folder, len(found), some))
     extra = {"rejected": _written(folder / REJECTED, kept)} if kept else {}
     text = json.dumps({"format": FORMAT, **about, "shards": found, **extra}, indent=1, sort_keys=True) + "\n"
     shards.replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)
 
 
-def _written(path: Path, rows: Sequence[PoolRow]) -> dict[str, Any]:
-    """Write one shard, and say what a manifest says of it."""
-    return shards.write(path, [row.plain() for row in rows], [row.witness for row in rows])
+def write_shard(folder: Path, number: int, rows: Iterable[PoolRow]) -> dict[str, Any]:
+    """Write one shard of a pool, and say what its manifest says of it.
+
+    Args:
+        number: of the shard, from 0.
+        rows: `SHARD_ROWS` of them, or less in the last one.
+    """
+    return _written(folder / f"scenarios-{number:05d}.parquet", rows)
+
+
+def _written(path: Path, rows: Iterable[PoolRow]) -> dict[str, Any]:
+    return shards.write(path, ((row.plain(), row.witness) for row in rows))
 
 
 def _rows(path: Path, witness: bool) -> Iterator[PoolRow]:

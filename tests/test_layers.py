@@ -16,7 +16,7 @@ LAYERS = (
     ("control",),
     ("log", "parallel", "sim"),
     ("assets",),
-    ("scenario", "predicates", "schema"),
+    ("directory", "predicates", "scenario", "schema"),
     ("columns", "episode"),
     ("shards", "skills"),
     ("tasks",),

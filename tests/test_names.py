@@ -2,11 +2,13 @@
 
 import warnings
 
+import numpy as np
 import pytest
 from helpers import REFERENCE
 
 from scengen import cli, config
 from scengen.commands import show
+from scengen.directory import Directory
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
 from scengen.names import Misnamed, Name, NoScenario, find
@@ -17,6 +19,14 @@ KNOWN = [
     Name("domino_single", "wide_gaps@2", 7, "8e12e4000000"),
     Name("domino_single", "diagonal+wide_gaps", 3, "12e4aaaaaaaa"),
 ]
+
+
+HERE = Directory(np.array([name.id for name in KNOWN], "S12"), np.array([name.index for name in KNOWN]))
+
+
+def found(text):
+    """The name that a text stands for among the known ones."""
+    return KNOWN[find(text, HERE, KNOWN.__getitem__, "here")]
 
 
 def test_a_name_says_task_split_index_and_id():
@@ -31,13 +41,13 @@ def test_a_scenario_is_found_by_its_name_its_id_and_the_beginning_of_either(name
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for text in (start, f"{name.task}/{start}", f"{name.task}/{name.split}@{name.index}/{start}"):
-            assert find(text, KNOWN, "here") == name
+            assert found(text) == name
 
 
 @pytest.mark.parametrize("before", ["packing", "domino_single/id@1", "domino_single/wide_gaps@0", "domino_single/id"])
 def test_where_a_name_is_wrong_about_its_id_the_id_counts_and_a_line_says_so(before):
     with pytest.warns(Misnamed, match="is domino_single/id@0/8ed4a4577fe0: the id counts"):
-        assert find(f"{before}/8ed4", KNOWN, "here") == KNOWN[0]
+        assert found(f"{before}/8ed4") == KNOWN[0]
 
 
 @pytest.mark.parametrize(
@@ -52,7 +62,7 @@ def test_where_a_name_is_wrong_about_its_id_the_id_counts_and_a_line_says_so(bef
 )
 def test_what_finds_none_or_several_ends_in_one_line_with_their_names(text, error, says):
     with pytest.raises(error, match=says) as raised:
-        find(text, KNOWN, "here")
+        found(text)
     assert "\n" not in str(raised.value)
 
 
