@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from itertools import islice
 
 from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -23,6 +24,8 @@ _scengen() {
 complete -o default -F _scengen scengen
 """.lstrip()
 """What bash evaluates. Where nothing is found it completes names of files."""
+OFFERED = 1000
+"""Scenarios of a pool that are offered: the first ones by their names, or those whose ids begin so."""
 
 
 def completions(line: str, verbs: Sequence[str]) -> list[str]:
@@ -48,8 +51,9 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
         if equals and key == "task":
             return _last(word, ",", task_files.tasks(task_files.search_path(others))) if verb != "new" else []
         if equals and key == "id":
-            names = [name for folder in _pools(others) for name in Pool.open(folder).names()]
-            return _last(word, "", map(str, names)) or _last(word, "", (name.id for name in names))
+            pools = [Pool.open(folder) for folder in _pools(others)]
+            names = [str(name) for pool in pools for name in islice(pool.names(), OFFERED)]
+            return _last(word, "", names) or _last(word, "", (id_ for pool in pools for id_ in _ids(pool, word)))
         return _settings(verb, others, word)
     return []
 
@@ -61,6 +65,12 @@ def _task(words: Sequence[str]) -> str:
 
 def _pools(words: Sequence[str]) -> list[str]:
     return [folder for word in words if word.startswith("pool=") for folder in word.removeprefix("pool=").split(",")]
+
+
+def _ids(pool: Pool, word: str) -> list[str]:
+    """Ids that begin as the word asks for."""
+    places = pool.directory.beginning(word.removeprefix("id="))
+    return [pool.directory.id(place) for place in places[:OFFERED]]
 
 
 def _last(word: str, separators: str, known: Iterable[str]) -> list[str]:

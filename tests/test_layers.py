@@ -21,7 +21,7 @@ LAYERS = (
     ("shards", "skills"),
     ("tasks",),
     ("samplers", "pool"),
-    ("collection", "validate"),
+    ("collection", "library", "validate"),
     ("cluster",),
     ("config",),
     ("attack",),

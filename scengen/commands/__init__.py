@@ -9,7 +9,8 @@ from typing import Any
 
 from .. import collection
 from ..errors import BadConfig, cut
-from ..names import Misnamed, find
+from ..library import Library
+from ..names import Misnamed
 from ..pool import Pool, PoolRow
 from ..printed import PlainConsole, printable
 from ..targets import write as write  # for the commands
@@ -58,8 +59,8 @@ def holder(pool: str | list[str] | None, name: str) -> Pool:
     found = [Pool.open(folder) for folder in several(pool or "")]
     if len(found) == 1:
         return found[0].check()
-    asked = find(name, dict.fromkeys(each for one in found for each in one.names()), "these pools").id
-    return next(one for one in found if any(each.id == asked for each in one.names())).check()
+    several_pools = Library(found)
+    return several_pools.pool(several_pools.find(name)).check()
 
 
 def chosen(pool: Pool, name: str) -> PoolRow:
@@ -72,9 +73,14 @@ def chosen(pool: Pool, name: str) -> PoolRow:
     return row
 
 
-def names(pools: Iterable[Pool]) -> Mapping[str, str]:
-    """What people call the scenarios of some pools, by id."""
-    return {name.id: str(name) for pool in pools for name in pool.names()}
+def names(pools: Iterable[Pool], ids: Iterable[str]) -> Mapping[str, str]:
+    """What people call some scenarios of some pools, by id."""
+    found: dict[str, str] = {}
+    for pool in pools:
+        for id_ in ids:
+            if id_ not in found and (places := pool.directory.beginning(id_)):
+                found[id_] = str(pool.name_at(places[0]))
+    return found
 
 
 def write_json(path: str, result: Any) -> None:

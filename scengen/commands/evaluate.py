@@ -21,7 +21,7 @@ def command(arguments: Arguments) -> int:
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
-    called = names(map(Pool.open, settings.folders)) if found.lost else {}
+    called = names(map(Pool.open, settings.folders), found.lost)
     for scenario, why in found.lost.items():
         warn(f"UNKNOWN {called[scenario]}: {why}; it was left out")
     if found.earlier:

@@ -35,7 +35,7 @@ def _apart(settings: Settings) -> Mapping[str, Settings]:
     """The recordings to make, each below `to` if they are more than one."""
     found: dict[str, list[str]] = defaultdict(list)
     for folder in settings.folders:
-        for (value,) in dict.fromkeys(Pool.open(folder).columns(_kind(settings))) or [("",)]:
+        for value in Pool.open(folder).kinds(_kind(settings))[0] or [""]:
             found[value].append(folder)
     if len(found) < 2:
         return {settings.to: settings}
@@ -57,7 +57,7 @@ def _record(settings: Settings, arguments: Arguments) -> int:
         f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} a second, "
         f"{len(settings.eyes)} cameras to {settings.to}"
     )
-    called = names(map(Pool.open, settings.folders)) if summary.failed or summary.lost else {}
+    called = names(map(Pool.open, settings.folders), [*summary.failed, *summary.lost])
     for scenario in summary.failed:
         warn(f"FAILED {called[scenario]}: the witness does not reach the goal here; its episode has success = false")
     for scenario, why in summary.lost.items():

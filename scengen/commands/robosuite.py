@@ -48,7 +48,7 @@ def command(arguments: Arguments) -> int:
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     with ProgressBar(err, "robosuite", total, settings.workers) as progress_bar:
         found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments), limits)
-    called, tasks = names(pools), defaultdict(list)
+    called, tasks = names(pools, [c.id for c in found if not c.agrees]), defaultdict(list)
     for comparison in found:
         tasks[comparison.task].append(comparison)
         if not comparison.agrees:

@@ -18,7 +18,6 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
 from ..errors import BadConfig, UnknownName, cut
-from ..names import find
 from ..params import Value
 from ..pictures.render import Camera
 from ..pool import PoolRow
@@ -103,13 +102,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.task: Task = config.task(task, search)
         rows = rows_of(pool, task)
-        self._rows = {row.id: row for row in chosen(rows, scenario, split)}
+        self._rows = chosen(rows, scenario, split)
         robot = self.task.embodiment
         if observations is None:
             observations = proprioception(robot)
         known, self.views = streams_of(robot), cameras_of(robot)
         if not set(observations) <= {*known, *self.views}:  # which bodies there are costs some scenes
-            bodies = bodies_of(self.task, {row.scene_xml for row in rows})
+            bodies = bodies_of(self.task, (scene for (scene,) in rows.columns("scene_xml")))
             state = ObjectState(bodies, len(hands(robot)))
             known |= privileged(state, self.task.family, lambda: self.scenario.orientation)
             check_names(observations, robot, known)
@@ -121,14 +120,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "render_fps": round(1 / (Loop.PERIOD * action_repeat)),
             "names": {name: stream.entries(name) for name, stream in self.streams.items()},
         }
-        if self._sees and width != height:
-            for row in self._rows.values():
-                self.task.scenario(row.params).orientation.check_size(width, height)
-        self._order = list(self._rows)
+        if self._sees and width != height and self.task.family.orientation is not Scenario.orientation:
+            for (params,) in self._rows.columns("params"):
+                self.task.scenario(params).orientation.check_size(width, height)
         self._next = 0
         self._world: World | None = None
         self._eye: Camera | None = None
-        self._row: PoolRow = self._rows[self._order[0]]
+        self._row: PoolRow = self._rows[0]
         self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
         boxes: dict[str, spaces.Space[Any]] = {
             name: spaces.Box(np.float32(-s.bound), np.float32(s.bound), s.shape, np.float32)
@@ -150,7 +148,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     @property
     def scenarios(self) -> tuple[str, ...]:
         """Ids of all scenarios, in the order of the pools."""
-        return tuple(self._order)
+        return tuple(id_.decode() for id_ in self._rows.directory.ids.tolist())
 
     @property
     def world(self) -> World:
@@ -192,12 +190,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if unknown:
             raise UnknownName("reset option", unknown.pop(), ["scenario"])
         if seed is not None:
-            self._next = seed % len(self._order)
-        chosen = (options or {}).get("scenario", self._order[self._next])
-        if chosen not in self._rows:
-            chosen = find(str(chosen), (row.name for row in self._rows.values()), "these pools").id
-        self._next = (self._order.index(chosen) + 1) % len(self._order)
-        self._load(self._rows[chosen])
+            self._next = seed % len(self._rows)
+        named = (options or {}).get("scenario")
+        number = self._next if named is None else self._rows.find(str(named))
+        self._next = (number + 1) % len(self._rows)
+        self._load(self._rows[number])
         self._over = False
         return self._observe(), self._info("", False)
 

@@ -17,6 +17,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from math import ceil, floor
 
 import mujoco
@@ -62,7 +63,7 @@ def bodies_of(task: Task, scenes: Iterable[str] = ()) -> Bodies:
         scenes: further scenes, MJCF, such as those of a pool that was drawn with other distributions.
     """
     found: dict[str, bool] = {}
-    for told in (*map(_built, _variants(task)), *map(_written, scenes)):
+    for told in chain(map(_built, _variants(task)), map(_written, _different(scenes))):
         for name, moves in told.items():
             found[name] = found.get(name, False) or moves
     return {name: found[name] for name in sorted(found, key=_naturally) if name not in ALWAYS}
@@ -185,6 +186,19 @@ def _whole_numbers(dist: Dist) -> list[int]:
 def _built(scenario: Scenario) -> Bodies:
     scene = scenario.build()  # held by name: the bodies of a scene that nobody holds have lost their joints
     return {body.name: bool(body.joints or body.mocap) for body in scene.bodies}
+
+
+_NUMBERS = re.compile(r"""(["'])[-+.e\d\s]*\1""")
+"""Values of attributes that are numbers."""
+
+
+def _different(scenes: Iterable[str]) -> Iterator[str]:
+    """Of scenes that differ in numbers only, one: a pool has as many texts as scenarios, and few sets of bodies."""
+    seen = set[int]()
+    for text in scenes:
+        if (rest := hash(_NUMBERS.sub("", text))) not in seen:
+            seen.add(rest)
+            yield text
 
 
 def _written(text: str) -> Bodies:

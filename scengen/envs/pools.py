@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..collection import members
-from ..errors import PoolError, UnknownName
-from ..names import find
-from ..pool import Pool, PoolRow
+from ..errors import PoolError
+from ..library import Library
+from ..pool import Pool
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
 """Folder of a pool, or several."""
 
 
-def rows_of(pool: Folders | None, task: str) -> list[PoolRow]:
-    """The rows of some pools without witnesses.
+def rows_of(pool: Folders | None, task: str) -> Library:
+    """The scenarios of some pools.
 
     Raises:
         PoolError: a pool is missing, damaged, empty, of another version or task, or there is none.
@@ -22,7 +22,7 @@ def rows_of(pool: Folders | None, task: str) -> list[PoolRow]:
     folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
     if not folders:
         raise PoolError("no pool was named; say pool=FOLDER, or a list of them; scengen generate makes pools")
-    return [row for folder in folders for each in _of_task(folder, task) for row in _rows(each, task)]
+    return Library([_opened(each, task) for folder in folders for each in _of_task(folder, task)])
 
 
 def _of_task(folder: str | Path, task: str) -> list[str]:
@@ -35,7 +35,7 @@ def _of_task(folder: str | Path, task: str) -> list[str]:
     return own
 
 
-def chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None = None) -> list[PoolRow]:
+def chosen(rows: Library, scenario: str | None, split: str | None = None) -> Library:
     """The scenarios of a split, and of these the one of that name.
 
     Args:
@@ -46,21 +46,17 @@ def chosen(rows: Sequence[PoolRow], scenario: str | None, split: str | None = No
         BadConfig: several ids begin so.
     """
     if split is not None:
-        if split not in (known := {row.split for row in rows}):
-            raise UnknownName("split in these pools", split, known)
-        rows = [row for row in rows if row.split == split]
-    if scenario is None:
-        return list(rows)
-    found = {row.id: row for row in rows}
-    return [found[find(scenario, (row.name for row in found.values()), "these pools").id]]
+        rows = rows.of_split(split)
+    return rows if scenario is None else rows.only(rows.find(scenario))
 
 
-def _rows(folder: str | Path, task: str) -> list[PoolRow]:
+def _opened(folder: str | Path, task: str) -> Pool:
+    """A sound pool of a task."""
     pool = Pool.open(folder).check()
     check_versions(pool.versions, str(folder))
-    rows = list(pool.rows(witness=False))
-    if not rows:
+    tasks, _ = pool.kinds("task")
+    if not tasks:
         raise PoolError(f"{folder} holds no scenario; see scengen generate")
-    if others := {row.task for row in rows} - {task}:
+    if others := {*tasks} - {task}:
         raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
-    return rows
+    return pool

@@ -9,7 +9,7 @@ the scene, the suction cup, the events of the scene, and the verdict, which is t
 
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, ClassVar
 
 import mujoco
@@ -22,6 +22,7 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
+from ..library import Library
 from ..pool import PoolRow
 from ..robots import panda
 from ..scenario import Scenario
@@ -128,7 +129,7 @@ class RobosuiteEnv(ManipulationEnv):
             self._refuse("gripper_types", _listed(gripper_types), grippers)
         self.use_object_obs, self._seen = use_object_obs, None
         if use_object_obs:
-            bodies = bodies_of(self.task, {row.scene_xml for row in self._choice})
+            bodies = bodies_of(self.task, _scenes(self._choice))
             self.objects = ObjectState(bodies, len(hands(self.task.embodiment)))
         super().__init__(
             robots=[ROBOT] * len(grippers) if robots is None else robots,
@@ -283,10 +284,12 @@ class RobosuiteEnv(ManipulationEnv):
         """The scenario that `set_ep_meta` asks for, if it does."""
         if (id_ := self._ep_meta.get("scenario")) is None:
             return None
-        found = next((row for row in self._choice if row.id == id_), None)
-        if found is None:
-            raise UnknownName("scenario to choose from", str(id_), [row.id for row in self._choice])
-        return found
+        if isinstance(self._choice, Library):
+            return self._choice[self._choice.find(str(id_))]
+        (row,) = self._choice
+        if row.id != id_:
+            raise UnknownName("scenario to choose from", str(id_), [row.id])
+        return row
 
     # --- the certificate's clock ----------------------------------------------------------
 
@@ -349,7 +352,7 @@ def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 
 
-def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> list[PoolRow]:
+def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> Sequence[PoolRow]:
     """The scenarios to draw from: one row, the one of some pools whose id begins with a text, or all of them.
 
     Raises:
@@ -364,6 +367,13 @@ def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> 
     if pool is None or isinstance(scenario, PoolRow):
         raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
     return chosen(rows_of(pool, task), scenario)
+
+
+def _scenes(rows: Sequence[PoolRow]) -> Iterator[str]:
+    """Texts of their scenes."""
+    return (
+        (scene for (scene,) in rows.columns("scene_xml")) if isinstance(rows, Library) else (r.scene_xml for r in rows)
+    )
 
 
 for _name in config.tasks():

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from typing import Any
 
 import jinja2
@@ -19,6 +19,11 @@ from ..samplers.task import Task
 from ..task_files import About
 from ..validate.playable import check_scene
 from . import render
+
+LINES = 1000
+"""Scenarios of a pool in a table; id= finds the others."""
+LARGEST_PAGE = 19_000_000
+"""Letters of the scenarios on a page: with all else it stays below 20 MB, which browsers open at once."""
 
 
 def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table:
@@ -67,8 +72,8 @@ def _cells(rate: Rate) -> list[str]:
 
 
 def pool_table(pool: Pool) -> Table:
-    """One line per scenario, with the parameters that differ from one to another."""
-    rows = list(zip(pool.names(), pool.columns("shifted", "params"), strict=True))
+    """One line per scenario, of `LINES` at most, with the parameters that differ from one to another."""
+    rows = list(islice(zip(pool.names(), pool.columns("shifted", "params"), strict=True), LINES))
     every = [params for _, (_, params) in rows]
     drawn = [name for name in (every[0] if every else ()) if any(params[name] != every[0][name] for params in every)]
     table = Table(title=f"{pool.folder}: {pool.split}", title_justify="left")
@@ -77,6 +82,8 @@ def pool_table(pool: Pool) -> Table:
     for called, (shifted, params) in rows:
         shown = [name for name in params if name in drawn or name in shifted]
         table.add_row(str(called), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
+    if len(pool) > len(rows):
+        table.title = f"{table.title}: the first {len(rows)} of {len(pool)} scenarios"
     return table
 
 
@@ -84,7 +91,7 @@ def pools_table(pools: Sequence[Pool]) -> Table:
     """One line for each of many pools."""
     table = Table("pool", "code", "split", "scenarios", "proposed", title_justify="left")
     for pool in pools:
-        codes = ", ".join(sorted({code for (code,) in pool.columns("code")}))
+        codes = ", ".join(sorted(pool.kinds("code")[0]))
         table.add_row(str(pool.folder), codes, pool.split, str(len(pool)), str(pool.funnel["proposed"]))
     table.title = f"{len(pools)} pools, {sum(map(len, pools))} scenarios"
     return table

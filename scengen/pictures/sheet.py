@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from markupsafe import Markup
+
 from ..certificate import STAGES
 from ..errors import ScengenError
 from ..pool import Pool, PoolRow
@@ -15,7 +17,7 @@ from ..sim import scene_text
 from ..targets import write
 from ..validate.playable import check_row
 from . import film, render
-from .report import template, thumbnail
+from .report import LARGEST_PAGE, template, thumbnail
 
 STRIP = (8, 240, 180)
 """Pictures of a film strip, and width and height of each [pixels]."""
@@ -44,21 +46,22 @@ def contact_sheet(
 ) -> str:
     """Write one HTML file that shows the scenes of some pools. Returns a remark, or nothing.
 
-    Without OpenGL the page has no pictures and says so.
+    Without OpenGL the page has no pictures and says so. It says of every pool how many of its scenarios it shows.
 
     Args:
         pools: each with its task as it was when the pool was made.
-        images: how many scenarios of a pool are shown at most.
+        images: how many scenarios of a pool are shown at most; fewer where the page would become too large.
         films: how many of them with a film strip of the witness.
         progress: told how many of how many scenarios are drawn.
 
     Raises:
         ScengenError: a scene or a witness cannot be played.
     """
-    remark, sections = "", []
-    total = sum(min(images, len(pool)) for pool, _ in pools)
-    for pool, task in pools:
-        cards: list[Card] = []
+    remark, sections, figure = "", [], template("contact_sheet_figure.html")
+    total, size = sum(min(images, len(pool)) for pool, _ in pools), 0
+    for number_of_pool, (pool, task) in enumerate(pools):
+        cards: list[Markup] = []
+        share = (LARGEST_PAGE - size) // (len(pools) - number_of_pool)
         for number, row in enumerate(islice(pool.rows(), images)):
             card = Card(row, [_moved(task, name, value) for name, value in row.shifted.items()])
             if not remark:
@@ -68,11 +71,15 @@ def contact_sheet(
                     card.strip = _strip(task, row) if number < films else ""
                 except render.NoPictures as error:
                     remark = str(error)
-            cards.append(card)
+            text = Markup(figure.render(card=card, task=task, unit=_unit))
+            if len(text) > share:
+                break
+            share, size = share - len(text), size + len(text)
+            cards.append(text)
             progress(sum(len(c) for *_, c in sections) + len(cards), total)
         sections.append((pool, task, cards))
     steps = ("proposed", *STAGES)
-    page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark, unit=_unit)
+    page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
     write(path, page)
     return remark
 

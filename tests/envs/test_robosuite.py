@@ -374,7 +374,7 @@ def test_a_demonstration_finds_its_scenario_again():
         told = env.get_ep_meta()
         assert (told["scenario"], told["lang"]) == (row.id, row.instruction) == (env.row.id, env.row.instruction)
     env.set_ep_meta({"scenario": "0" * 12})
-    with pytest.raises(UnknownName, match="no scenario to choose from named '000000000000'"):
+    with pytest.raises(UnknownName, match="no scenario in these pools named '000000000000'"):
         env.reset()
 
 

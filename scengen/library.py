@@ -1,0 +1,112 @@
+"""Scenarios of one pool or several, found by their names and read one by one."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .directory import Directory, joined
+from .errors import UnknownName
+from .names import Name
+from .pool import Pool, PoolRow
+
+KEPT = 100
+"""Rows that are kept after they were read; each has the text of a scene."""
+
+
+class Library(Sequence[PoolRow]):
+    """Scenarios of some pools without witnesses, each once, in the order of the pools; read when they are asked for."""
+
+    def __init__(self, pools: Sequence[Pool], places: NDArray[np.int64] | None = None):
+        """
+        Args:
+            places: which of all rows, the pools one after the other; all of them if None.
+        """
+        self.pools, self._starts = pools, np.cumsum([0, *map(len, pools)])
+        every = np.arange(self._starts[-1]) if places is None else places
+        whole = joined([pool.directory for pool in pools])
+        _, first = np.unique(whole.ids[every], return_index=True)
+        self.places = every[np.sort(first)]
+        self.directory = Directory(whole.ids[self.places], whole.indices[self.places])
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @overload
+    def __getitem__(self, number: int) -> PoolRow: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> list[PoolRow]: ...
+
+    def __getitem__(self, number: int | slice) -> PoolRow | list[PoolRow]:
+        if isinstance(number, slice):
+            return [self._read(k) for k in range(*number.indices(len(self)))]
+        return self._read(range(len(self))[number])
+
+    def __iter__(self) -> Iterator[PoolRow]:
+        for pool, places in self._by_pool():
+            yield from pool.some(places, witness=False)
+
+    def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
+        """A few columns of all of them, see `Pool.columns`."""
+        for pool, places in self._by_pool():
+            yield from pool.columns(*names, places=places)
+
+    def pool(self, number: int) -> Pool:
+        """The pool that holds one of them."""
+        return self._where(number)[0]
+
+    def name(self, number: int) -> Name:
+        """What one of them is called."""
+        pool, place = self._where(number)
+        return pool.name_at(place)
+
+    def find(self, text: str) -> int:
+        """Number of the scenario of that name: what `Pool.row` takes, a name, an id, or how one begins.
+
+        Raises:
+            UnknownName: there is none.
+            BadConfig: several ids begin so.
+        """
+        return self.directory.find(text, self.name, "these pools")
+
+    def of_split(self, split: str) -> "Library":
+        """Those of one split.
+
+        Raises:
+            UnknownName: there are none.
+        """
+        found, known = [], set[str]()
+        for pool, start in zip(self.pools, self._starts, strict=False):
+            splits, codes = pool.kinds("split")
+            known |= set(splits)
+            found += [start + np.flatnonzero(codes == splits.index(split))] if split in splits else []
+        if not found:
+            raise UnknownName("split in these pools", split, known)
+        return Library(self.pools, np.intersect1d(self.places, np.concatenate(found)))
+
+    def only(self, number: int) -> "Library":
+        """One of them alone."""
+        return Library(self.pools, self.places[[number]])
+
+    @cached_property
+    def _read(self) -> Callable[[int], PoolRow]:
+        @lru_cache(KEPT)
+        def read(number: int) -> PoolRow:
+            pool, place = self._where(number)
+            return pool.at(place, witness=False)
+
+        return read
+
+    def _where(self, number: int) -> tuple[Pool, int]:
+        place = int(self.places[number])
+        which = int(np.searchsorted(self._starts, place, side="right")) - 1
+        return self.pools[which], place - int(self._starts[which])
+
+    def _by_pool(self) -> Iterator[tuple[Pool, list[int]]]:
+        """Every pool with the places in it, increasing."""
+        which = np.searchsorted(self._starts, self.places, side="right") - 1
+        for k in dict.fromkeys(which.tolist()):
+            yield self.pools[k], (self.places[which == k] - self._starts[k]).tolist()
