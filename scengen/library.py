@@ -1,6 +1,6 @@
 """Scenarios of one pool or several, found by their names and read one by one."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, overload
 
@@ -110,3 +110,13 @@ class Library(Sequence[PoolRow]):
         which = np.searchsorted(self._starts, self.places, side="right") - 1
         for k in dict.fromkeys(which.tolist()):
             yield self.pools[k], (self.places[which == k] - self._starts[k]).tolist()
+
+
+def names(pools: Iterable[Pool], ids: Iterable[str]) -> Mapping[str, str]:
+    """What people call some scenarios of some pools, by id."""
+    missing, found = set(ids), dict[str, str]()
+    for pool in pools:
+        for id_ in sorted(missing - found.keys()):
+            if places := pool.directory.beginning(id_):
+                found[id_] = str(pool.name_at(places[0]))
+    return found

@@ -268,11 +268,12 @@ def check_versions(value: Any) -> None:
 
 def canonical(name: str, text: str) -> dict[str, Any]:
     """Canonical JSON of a mapping, as `certificate.as_json` writes it, with finite numbers."""
+    check_text(name, text)
     try:
         found = from_json(text)
     except RecursionError:
         raise Malformed(f"{name} has too many brackets within each other") from None
-    read_json(text)
+    check_plain(found)
     return found
 
 

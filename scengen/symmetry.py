@@ -43,6 +43,28 @@ class Symmetry:
             raise BadConfig(f"symmetry {self.name!r} speaks of parameters that do not exist: {missing or self.swap}")
 
 
+@dataclass(frozen=True)
+class Moved:
+    """A value that stands where another one stood: `sign * values[source] + offset`."""
+
+    source: str
+    sign: float = 1.0
+    offset: float = 0.0
+
+    def reflected(self, about: float) -> "Moved":
+        """Its mirror image about a value."""
+        return Moved(self.source, -self.sign, 2 * about - self.offset)
+
+
+def motions(names: Iterable[str], symmetries: Sequence[Symmetry]) -> Iterator[dict[str, Moved]]:
+    """What symmetries and their combinations do to any parameter values: first nothing, then every image.
+
+    Raises:
+        BadConfig: there is no end to it.
+    """
+    return images({name: Moved(name) for name in names}, symmetries, Moved.reflected)
+
+
 def images(
     point: Mapping[str, T], symmetries: Sequence[Symmetry], reflect: Callable[[T, float], T]
 ) -> Iterator[dict[str, T]]:
@@ -77,4 +99,6 @@ def _key(point: Mapping[str, Any]) -> str:
 def _rounded(x: Any) -> Any:
     if isinstance(x, (int, float)):
         return round(float(x), 9) + 0.0  # -0.0 and 0.0 are one number
+    if isinstance(x, Moved):
+        return [x.source, x.sign, _rounded(x.offset)]
     return [[_rounded(i.low), _rounded(i.high), i.open_low, i.open_high] for i in x]

@@ -51,7 +51,7 @@ def farthest_points(points: Points, count: int) -> NDArray[np.int64]:
     chosen = [int(np.argmin(np.linalg.norm(points - np.median(points, axis=0), axis=1)))]
     away = cdist(points, points[chosen])[:, 0]
     while len(chosen) < count:
-        away[chosen] = -1.0  # equal points may all be chosen, but none twice
+        away[chosen[-1]] = -1.0  # equal points may all be chosen, but none twice
         chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, cdist(points, points[chosen[-1:]])[:, 0])
+        np.minimum(away, cdist(points, points[chosen[-1:]])[:, 0], out=away)
     return np.array(chosen)

@@ -1,7 +1,7 @@
 """How far scenarios and pools are from training and from each other."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,20 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 from scipy.stats import permutation_test
 
-from ..params import values, with_values
-from ..samplers.support import nearest
+from ..params import values
+from ..samplers.support import Support, nearest
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..symmetry import images
-from .space import Points, measured, of_parameters, scale
+from ..symmetry import motions
+from .space import Batch, Points, of_tables, scale
 
+MOST_PAIRS = 10_000
+"""Near duplicates after which no more are looked for: a line or a plane of a million scenarios has billions."""
+AT_A_TIME = 10_000
+"""Points whose neighbours are counted at a time."""
+ENERGY_OF = 2000
+"""Scenarios of each of two pools at most, the first ones, whose energy distance is taken: it needs a matrix of all
+distances, and permutations of it."""
 CLOSE = 0.01
 """Scenarios that differ by less than this in every parameter are near duplicates [training widths]. The jitter of the
 robustness check moves more: actions that solve one of them solve the other."""
@@ -114,48 +121,67 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: 
     return Energy(math.sqrt(round(max(0.0, float(tested.statistic)), 12)), float(tested.pvalue), by_chance)
 
 
-def near_duplicates(
-    task: Task,
-    scenarios: Mapping[str, Scenario],
-    others: Mapping[str, Scenario] | None = None,
-    within: float = CLOSE,
-) -> list[Pair]:
-    """Pairs of scenarios that differ by less than `within` in every parameter, nearest first.
+def near_duplicates(task: Task, batch: Batch, others: Batch | None = None, within: float = CLOSE) -> list[Pair]:
+    """Pairs of scenarios that differ by less than `within` in every parameter, nearest first, of `MOST_PAIRS` at most.
 
     Between two pools this is leakage; within one pool (`others` left out) these are repetitions. Every symmetric image
     of a scenario is compared, so that two identical cubes that have changed places do not hide a pair.
 
     Args:
-        scenarios, others: by any name that tells them apart.
         within: largest difference of any parameter that counts [training widths].
     """
-    beside = scenarios if others is None else others
-    if not scenarios or not beside:
+    beside = batch if others is None else others
+    if not len(batch) or not len(beside):
         return []
-    space = of_parameters(task, [*scenarios.values(), *beside.values()])
-    names, here = list(scenarios), space.points(scenarios.values())
-    if not space.columns:  # nothing varies: all are one scenario
-        here = np.zeros((len(names), 1))
-    tree, least = KDTree(here), dict[tuple[str, str], float]()
-    for other, scenario in beside.items():
-        for image in images(values(scenario), task.family.SYMMETRIES, lambda v, about: 2 * about - v):
-            point = space.point(measured(with_values(scenario, image))) or [0.0]
-            for i in tree.query_ball_point(point, within, p=np.inf):
-                if others is None and names[i] >= other:
+    space, least = of_tables(task, batch.values, beside.values), dict[tuple[str, str], float]()
+    here = _with_a_coordinate(space.of(batch.values, len(batch)))
+    tree = KDTree(here)
+    for motion in motions(beside.values, task.family.SYMMETRIES):
+        moved = {name: to.sign * beside.values[to.source] + to.offset for name, to in motion.items()}
+        there = _with_a_coordinate(space.of(moved, len(beside)))
+        for number, neighbours in _neighbours(tree, there, within):
+            other = beside.name(number)
+            for i in neighbours:
+                if others is None and batch.name(i) >= other:
                     continue
-                apart = float(np.abs(here[i] - point).max())
-                pair = names[i], other
+                apart, pair = float(np.abs(here[i] - there[number]).max()), (batch.name(i), other)
                 least[pair] = min(apart, least.get(pair, np.inf))
+                if len(least) == MOST_PAIRS:
+                    return _nearest_first(least)
+    return _nearest_first(least)
+
+
+def _neighbours(tree: KDTree, points: Points, within: float) -> Iterator[tuple[int, list[int]]]:
+    """Every point that has neighbours in the tree, by its number, and theirs."""
+    for start in range(0, len(points), AT_A_TIME):
+        some = points[start : start + AT_A_TIME]
+        for k in np.flatnonzero(tree.query_ball_point(some, within, p=np.inf, return_length=True)):
+            yield start + int(k), tree.query_ball_point(some[k], within, p=np.inf)
+
+
+def _with_a_coordinate(points: Points) -> Points:
+    """Points that have a coordinate: where nothing varies all are one scenario."""
+    return points if points.shape[1] else np.zeros((len(points), 1))
+
+
+def _nearest_first(least: Mapping[tuple[str, str], float]) -> list[Pair]:
     return sorted((Pair(*pair, apart) for pair, apart in least.items()), key=lambda p: p.distance)
 
 
-def per_parameter(task: Task, scenarios: Sequence[Scenario]) -> dict[str, tuple[float, float]]:
+def per_parameter(task: Task, batch: Batch) -> dict[str, tuple[float, float]]:
     """Least and mean distance of a pool from training, by parameter that leaves it [training widths]."""
-    found: dict[str, list[float]] = {}
-    for scenario in scenarios:
-        for offset in offsets(task, scenario):
-            found.setdefault(offset.parameter, []).append(offset.relative)
-    return {
-        name: (min(far) if len(far) == len(scenarios) else 0.0, sum(far) / len(scenarios))
-        for name, far in found.items()
-    }
+    found = {}
+    for name, column in batch.values.items():
+        support, period = task.training[name].support, task.known[name].period
+        outside = ~np.any([(low <= column) & (column <= high) for low, high in _ends(support)], axis=0)
+        values, places = np.unique(column[outside], return_inverse=True)
+        far = np.array([abs(value - nearest(support, value, period)) for value in values.tolist()])
+        if len(far) and far.max() > 0:
+            relative = np.zeros(len(column))
+            relative[outside] = far[places] / scale(task, name)
+            found[name] = (float(relative.min()), float(relative.mean()))
+    return found
+
+
+def _ends(support: Support) -> list[tuple[float, float]]:
+    return [(interval.low, interval.high) for interval in support]

@@ -11,23 +11,25 @@ import numpy as np
 
 from ..certificate import STAGES
 from ..errors import Infeasible
+from ..library import names
 from ..pictures import render
 from ..pictures.plots import svg
-from ..pictures.report import template, thumbnail
+from ..pictures.report import LARGEST_PAGE, template, thumbnail
 from ..pool import Pool
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..scenario import Scenario
 from ..targets import write
 from .bias import Bias, bias
 from .coverage import Evenness, evenness
-from .distance import CLOSE, Energy, Pair, energy, near_duplicates, per_parameter
+from .distance import CLOSE, ENERGY_OF, MOST_PAIRS, Energy, Pair, energy, near_duplicates, per_parameter
 from .histogram import Histogram, figure, histogram, label
-from .redraw import redrawn, scenarios_of, task_of
-from .space import measured, of_features
+from .redraw import batch_of, first_scenarios, redrawn, task_of, told
+from .space import Batch, measured, of_features
 
 SHOWN = 4
 """Marginals that are drawn of each pool, the most telling ones, and scenes that are shown."""
+PAIRS = 5
+"""Near duplicates of two pools that are named."""
 TRAINED = 500
 """Training scenarios at most with which the draws of a pool are compared."""
 
@@ -40,6 +42,8 @@ class Overview:
     task: str
     split: str
     scenarios: int
+    sample: str
+    """Of which indices coverage, bias and histograms tell; empty for all."""
     funnel: Mapping[str, int]
     reasons: Mapping[str, int]
     outside: Mapping[str, tuple[float, float]]
@@ -70,32 +74,43 @@ def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Over
         search: folders of other packages with tasks, see `task_files.search_path`.
     """
     known = [(pool, task_of(pool, search)) for pool in pools]
-    held = [(pool, task, scenarios_of(task, pool)) for pool, task in known]
+    held = [(pool, task, batch_of(task, pool)) for pool, task in known]
     contrasts = [
         _contrast(task, (a, one), (b, other))
         for (a, task, one), (b, beside, other) in itertools.combinations(held, 2)
-        if task.name == beside.name and one and other
+        if task.name == beside.name and len(one) and len(other)
     ]
     return [_overview(*each, search) for each in held], contrasts
 
 
 def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequence[Contrast], path: Path) -> str:
     """Write the report as one HTML file. Returns why it has no pictures, or nothing."""
-    remark, pictures = "", {}
-    try:
-        for pool in pools:
-            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), SHOWN)
-            pictures[str(pool.folder)] = [thumbnail(*scene)[0] for scene in scenes]
-    except render.NoPictures as error:
-        remark = str(error)
-    plots = {o.folder: svg(figure(o.histograms)) for o in overviews if o.histograms}
+    remark, pictures, plots, size = "", {}, {}, 0
+    for pool, overview in zip(pools, overviews, strict=True):
+        shown: list[str] = []
+        try:
+            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), 0 if remark else SHOWN)
+            shown = [thumbnail(*scene)[0] for scene in scenes]
+        except render.NoPictures as error:
+            remark = str(error)
+        plot = svg(figure(overview.histograms)) if overview.histograms else ""
+        size += len(plot) + sum(map(len, shown))
+        if size > LARGEST_PAGE:
+            remark = remark or f"those of the first {len(pictures)} of {len(pools)} pools fill the page"
+            break
+        pictures[overview.folder] = shown
+        plots |= {overview.folder: plot} if plot else {}
+    told = [(contrast, contrast.shared[:PAIRS]) for contrast in contrasts]
     text = template("report.html").render(
         overviews=overviews,
         contrasts=contrasts,
         pictures=pictures,
         plots=plots,
         steps=("proposed", *STAGES),
-        names={name.id: str(name) for pool in pools for name in pool.names()},
+        names=names(pools, [id_ for _, pairs in told for pair in pairs for id_ in (pair.one, pair.other)]),
+        pairs=PAIRS,
+        most=MOST_PAIRS,
+        energy_of=ENERGY_OF,
         remark=remark,
         close=CLOSE,
     )
@@ -108,9 +123,9 @@ def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[
     return {"pools": [asdict(o) for o in overviews], "contrasts": [asdict(c) for c in contrasts]}
 
 
-def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario], search: Sequence[str]) -> Overview:
+def _overview(pool: Pool, task: Task, batch: Batch, search: Sequence[str]) -> Overview:
     even, biased, histograms = None, None, ()
-    if scenarios and not pool.chosen:
+    if len(batch) and not pool.chosen:
         drawn = [p for p in redrawn(pool, search=search) if p.feasible]
         numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
         even = evenness(numbers) if numbers.size else None
@@ -127,10 +142,11 @@ def _overview(pool: Pool, task: Task, scenarios: Mapping[str, Scenario], search:
         str(pool.folder),
         task.name,
         pool.split,
-        len(scenarios),
+        len(batch),
+        told(pool) if histograms else "",
         pool.funnel,
         pool.reasons,
-        per_parameter(task, list(scenarios.values())),
+        per_parameter(task, batch),
         even,
         biased,
         histograms,
@@ -146,11 +162,12 @@ def _training(pool: Pool, task: Task) -> list[dict[str, float]]:
     return found
 
 
-Side = tuple[Pool, Mapping[str, Scenario]]
+Side = tuple[Pool, Batch]
 
 
 def _contrast(task: Task, one: Side, other: Side) -> Contrast:
     (a, here), (b, there) = one, other
-    space = of_features(task, list(here.values()), list(there.values()))
-    apart = energy(space.points(here.values()), space.points(there.values()))
+    ones, others = (first_scenarios(task, pool, ENERGY_OF) for pool in (a, b))
+    space = of_features(task, ones, others)
+    apart = energy(space.points(ones), space.points(others))
     return Contrast(str(a.folder), str(b.folder), apart, near_duplicates(task, here, there))

@@ -2,14 +2,23 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
 
 from .. import config
 from ..errors import BadConfig, Infeasible, PoolError
+from ..params import Value, values
 from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate import survey
 from ..validate.stored import task_of_manifest
+from .space import Batch
+
+MOST = 10_000
+"""Indices at most that are drawn again: in whatever design they were drawn, the first ones are a sample of all. Shares
+come out to 1 %, and the discrepancy, whose cost grows with the square, takes seconds."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +49,7 @@ def task_of(pool: Pool, search: Sequence[str] = ()) -> Task:
 def redrawn(
     pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None, search: Sequence[str] = ()
 ) -> list[Redrawn]:
-    """Draw everything again that the pool's run has drawn, infeasible tries included.
+    """Draw again what the pool's run has drawn at its first `MOST` indices, infeasible tries included.
 
     Args:
         progress: told how many of how many indices are done.
@@ -57,10 +66,12 @@ def redrawn(
         raise PoolError(f"{pool.folder}: {why}")
     task = task_of(pool, search)
     design = task.design(pool.sampler)
-    ids = dict(pool.columns("index", "id"))
+    count = min(pool.indices, MOST)
+    places = np.flatnonzero(pool.directory.indices < count).tolist()
+    ids = {int(pool.directory.indices[place]): pool.directory.id(place) for place in places}
     found: list[Redrawn] = []
     untold = 0  # tries at a training scenario that an axis could not start from
-    for index in range(pool.indices):
+    for index in range(count):
         if why := survey.too_many(pool, index, len(found) + untold):
             raise PoolError(f"{pool.folder}: {why}")
         try:
@@ -74,19 +85,36 @@ def redrawn(
                 found.append(Redrawn(index, p.scenario, p.quantiles, p.refutation is None, certified))
         except Infeasible as error:
             untold += error.tries  # there was no training scenario of this index that the axis could move
-        progress(index + 1, pool.indices)
+        progress(index + 1, count)
     return found
 
 
-def scenarios_of(task: Task, pool: Pool) -> dict[str, Scenario]:
-    """The scenarios of a pool by id.
+def batch_of(task: Task, pool: Pool) -> Batch:
+    """The scenarios of a pool by their parameter values.
 
     Raises:
-        PoolError: a scenario stands in it twice.
+        ScengenError: a scenario stands in it twice, or has other parameters than the task or values out of bounds.
     """
-    found: dict[str, Scenario] = {}
-    for id_, params in pool.columns("id", "params"):
-        if id_ in found:
-            raise PoolError(f"{pool.folder} holds scenario {id_} twice; see scengen verify")
-        found[id_] = task.scenario(params)
-    return found
+    if id_ := pool.directory.twice:
+        raise PoolError(f"{pool.folder} holds scenario {id_} twice; see scengen verify")
+    rows = (_complete(task, params) for (params,) in pool.columns("params"))
+    batch = Batch.read(pool.directory.ids, rows)
+    for name, column in batch.values.items():
+        for value in (column.min(), column.max()):
+            whole = task.known[name].integer and float(value).is_integer()
+            task.known[name].check(f"{pool.folder}: {name}", int(value) if whole else float(value))
+    return batch
+
+
+def _complete(task: Task, params: Mapping[str, Value]) -> Mapping[str, Value]:
+    return params if params.keys() == task.known.keys() else values(task.scenario(params))
+
+
+def first_scenarios(task: Task, pool: Pool, count: int) -> list[Scenario]:
+    """The first so many scenarios of a pool."""
+    return [task.scenario(params) for (params,) in islice(pool.columns("params"), count)]
+
+
+def told(pool: Pool) -> str:
+    """Of how many indices `redrawn` speaks, if not of all."""
+    return f"of the first {MOST} of {pool.indices} indices" if pool.indices > MOST else ""

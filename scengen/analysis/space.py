@@ -1,6 +1,7 @@
 """Scenarios as points: parameters or features in units of the training range, periods closed to circles."""
 
 import math
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,48 @@ from ..scenario import Scenario
 
 Points = NDArray[np.float64]
 """Shape (n, d): one row per scenario."""
+
+
+Table = Mapping[str, NDArray[np.float64]]
+"""Values of many scenarios by parameter or feature, each of shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Many scenarios by the values of their parameters: a million of them take some hundred MB."""
+
+    ids: NDArray[np.str_] | NDArray[np.bytes_]
+    """Any names that tell them apart, shape (n,)."""
+    values: Table
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def of(cls, scenarios: Mapping[str, Scenario]) -> "Batch":
+        """Scenarios by their names."""
+        return cls.read(np.array(list(scenarios), str), map(values, scenarios.values()))
+
+    @classmethod
+    def read(cls, ids: NDArray[np.str_] | NDArray[np.bytes_], rows: Iterable[Mapping[str, float]]) -> "Batch":
+        """Scenarios whose parameter values come one after the other, all of one family."""
+        columns: dict[str, array[float]] = {}
+        for row in rows:
+            columns = columns or {name: array("d") for name in row}
+            for name, column in columns.items():
+                column.append(row[name])
+        return cls(ids, {name: _column(np.frombuffer(column)) for name, column in columns.items()})
+
+    def name(self, number: int) -> str:
+        """The name of one of them."""
+        name = self.ids[number]
+        return name.decode() if isinstance(name, bytes) else str(name)
+
+
+def _column(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same numbers; one number in the memory of all, if they are equal."""
+    equal = len(column) > 0 and bool((column == column[0]).all())
+    return np.broadcast_to(column[0].copy(), column.shape) if equal else column
 
 
 def measured(scenario: Scenario) -> dict[str, float]:
@@ -38,11 +81,12 @@ class Column:
     scale: float
     period: float | None = None
 
-    def of(self, value: float) -> tuple[float, ...]:
+    def of(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """The coordinates of some values, each of shape (n,)."""
         if self.period is None:
-            return (value / self.scale,)
-        radius, angle = self.period / self.scale / math.tau, math.tau * value / self.period
-        return radius * math.cos(angle), radius * math.sin(angle)
+            return (values / self.scale,)
+        radius, angle = self.period / self.scale / math.tau, math.tau * values / self.period
+        return radius * np.cos(angle), radius * np.sin(angle)
 
 
 @dataclass(frozen=True)
@@ -55,20 +99,31 @@ class Space:
     def names(self) -> tuple[str, ...]:
         return tuple(column.name for column in self.columns)
 
-    def point(self, measured: Mapping[str, float]) -> list[float]:
-        return [x for column in self.columns for x in column.of(measured[column.name])]
+    def of(self, table: Table, count: int) -> Points:
+        """Scenarios as points, whose values stand in a table.
+
+        Args:
+            count: how many they are; without coordinates all are one point.
+        """
+        found = [x for column in self.columns for x in column.of(table[column.name])]
+        return np.column_stack(found) if found else np.zeros((count, 0))
 
     def points(self, scenarios: Iterable[Scenario]) -> Points:
         """The scenarios as points."""
-        rows = [self.point(measured(scenario)) for scenario in scenarios]
-        return np.array(rows, float).reshape(len(rows), -1)
+        rows = [measured(scenario) for scenario in scenarios]
+        return self.of({name: np.array([row[name] for row in rows], float) for name in self.names}, len(rows))
+
+
+def of_tables(task: Task, *tables: Table) -> Space:
+    """Coordinates of those parameters in which scenarios differ, in training widths."""
+    found = [table for table in tables if table]
+    varied = [n for n in task.known if any((table[n] != found[0][n][0]).any() for table in found)]
+    return Space(tuple(Column(n, scale(task, n), task.known[n].period) for n in varied))
 
 
 def of_parameters(task: Task, scenarios: Sequence[Scenario]) -> Space:
     """Coordinates of those parameters in which the scenarios differ, in training widths."""
-    every = [values(scenario) for scenario in scenarios]
-    varied = [n for n in task.known if any(v[n] != every[0][n] for v in every)]
-    return Space(tuple(Column(n, scale(task, n), task.known[n].period) for n in varied))
+    return of_tables(task, Batch.read(np.zeros(len(scenarios), str), map(values, scenarios)).values)
 
 
 def of_features(task: Task, training: Sequence[Scenario], others: Sequence[Scenario]) -> Space:

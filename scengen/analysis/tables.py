@@ -11,6 +11,8 @@ from .bias import AcceptanceMap, Bias
 from .distance import Pair
 from .shrink import Shrunk
 
+SHOWN = 20
+"""Near duplicates that are told."""
 CORRELATIONS = (0.0, 0.2, 0.5, 1.0)
 """Intra-cluster correlations in the table of a power analysis, besides the one asked for."""
 BASELINES = (0.9, 0.7, 0.5, 0.3)
@@ -50,13 +52,13 @@ def pairs_table(pairs: list[Pair], one: str, other: str, names: Mapping[str, str
 
     Args:
         one, other: what the two columns are called.
-        names: of the scenarios, by id.
+        names: of the scenarios that are told, by id.
     """
     table = Table(one, other, "distance [training widths]", title="near duplicates", title_justify="left")
-    for pair in pairs[:20]:
+    for pair in pairs[:SHOWN]:
         table.add_row(names[pair.one], names[pair.other], f"{pair.distance:.2g}")
-    if len(pairs) > 20:
-        table.add_row(f"and {len(pairs) - 20} more", "", "")
+    if len(pairs) > SHOWN:
+        table.add_row(f"and {len(pairs) - SHOWN} more", "", "")
     return table
 
 

@@ -3,13 +3,14 @@
 import json
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from .. import collection
 from ..errors import BadConfig, cut
 from ..library import Library
+from ..library import names as names  # for the commands
 from ..names import Misnamed
 from ..pool import Pool, PoolRow
 from ..printed import PlainConsole, printable
@@ -71,16 +72,6 @@ def chosen(pool: Pool, name: str) -> PoolRow:
     for one in told:
         remark(str(one.message))
     return row
-
-
-def names(pools: Iterable[Pool], ids: Iterable[str]) -> Mapping[str, str]:
-    """What people call some scenarios of some pools, by id."""
-    found: dict[str, str] = {}
-    for pool in pools:
-        for id_ in ids:
-            if id_ not in found and (places := pool.directory.beginning(id_)):
-                found[id_] = str(pool.name_at(places[0]))
-    return found
 
 
 def write_json(path: str, result: Any) -> None:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ..analysis.bias import Bias, acceptance_map, bias
-from ..analysis.redraw import Redrawn, redrawn
+from ..analysis.redraw import MOST, Redrawn, redrawn, told
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
 from ..config import read
@@ -29,8 +29,10 @@ def command(arguments: Arguments) -> int:
     settings = read("bias", arguments, Settings)
     try_file(settings.json)
     pool = Pool.open(one(settings.pool)).check()
-    with ProgressBar(err, f"draw {pool.folder} again", pool.indices) as progress_bar:
+    with ProgressBar(err, f"draw {pool.folder} again", min(pool.indices, MOST)) as progress_bar:
         drawn = redrawn(pool, lambda done, total: progress_bar.show(done), search_path(arguments))
+    if told(pool):
+        say(f"a sample: {told(pool)}")
     feasible = [p for p in drawn if p.feasible]
     stages = {
         "feasible": ("feasible draws against all draws: what the family's constraints leave out", drawn),

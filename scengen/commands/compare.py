@@ -1,21 +1,20 @@
 """how far pools are from training and from each other, and what leaks from one to the other"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from ..analysis.coverage import evenness
-from ..analysis.distance import energy, near_duplicates, per_parameter
-from ..analysis.redraw import redrawn, scenarios_of, task_of
-from ..analysis.space import of_features
-from ..analysis.tables import pairs_table
+from ..analysis.distance import ENERGY_OF, MOST_PAIRS, Pair, energy, near_duplicates, per_parameter
+from ..analysis.redraw import batch_of, first_scenarios, redrawn, task_of, told
+from ..analysis.space import Batch, of_features
+from ..analysis.tables import SHOWN, pairs_table
 from ..config import read
 from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..samplers.task import Task
-from ..scenario import Scenario
 from ..targets import try_file
 from ..task_files import search_path
 from . import FAILED, OK, Arguments, names, out, say, several, write_json
@@ -42,32 +41,31 @@ def command(arguments: Arguments) -> int:
     task, names = task_of(pools[0], search), {task_of(pool, search).name for pool in pools}
     if len(names) > 1:
         raise BadConfig(f"pool = {','.join(several(settings.pool))}; these are pools of {', '.join(sorted(names))}")
-    first, *others = ((pool, scenarios_of(task, pool)) for pool in pools)
+    first, *others = ((pool, batch_of(task, pool)) for pool in pools)
     result = [_alone(task, *first, settings, search)]
-    for pool, scenarios in others:
-        result += [_alone(task, pool, scenarios, settings, search), _pair(task, first, (pool, scenarios), settings)]
+    for other in others:
+        result += [_alone(task, *other, settings, search), _pair(task, first, other, settings)]
     if settings.json:
         write_json(settings.json, result)
     return FAILED if any(r["near_duplicates"] for r in result) else OK
 
 
-def _alone(
-    task: Task, pool: Pool, scenarios: Mapping[str, Scenario], settings: Settings, search: Sequence[str]
-) -> dict[str, Any]:
+def _alone(task: Task, pool: Pool, batch: Batch, settings: Settings, search: Sequence[str]) -> dict[str, Any]:
     """How far one pool is from training, how even it is, and whether it repeats itself."""
-    away = per_parameter(task, list(scenarios.values()))
-    told = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
-    say(f"{pool.folder}: {len(scenarios)} scenarios")
-    say(f"  outside training by [training widths]: {told or 'nothing'}")
+    away = per_parameter(task, batch)
+    far = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
+    say(f"{pool.folder}: {len(batch)} scenarios")
+    say(f"  outside training by [training widths]: {far or 'nothing'}")
     even = None
-    if scenarios and not pool.chosen:
+    if len(batch) and not pool.chosen:
         certified = [list(p.quantiles.values()) for p in redrawn(pool, search=search) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
-            say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws")
-    pairs = near_duplicates(task, scenarios, within=settings.within)
+            of = f", {told(pool)}" if told(pool) else ""
+            say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws{of}")
+    pairs = near_duplicates(task, batch, within=settings.within)
     if pairs:
-        out.print(pairs_table(pairs, "in the pool", "again", names([pool])))
+        out.print(pairs_table(pairs, "in the pool", "again", names([pool], _ids(pairs))))
     return {
         "pool": str(pool.folder),
         "outside": {name: {"least": least, "mean": mean} for name, (least, mean) in away.items()},
@@ -76,25 +74,35 @@ def _alone(
     }
 
 
-Side = tuple[Pool, Mapping[str, Scenario]]
+Side = tuple[Pool, Batch]
 
 
 def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, Any]:
     """How far a pool is from the first one, and what they share."""
     (pool, here), (beside, there) = one, other
-    space = of_features(task, list(here.values()), list(there.values()))
-    apart = energy(space.points(here.values()), space.points(there.values()), settings.permutations)
+    ones, others = (first_scenarios(task, of, ENERGY_OF) for of in (pool, beside))
+    space = of_features(task, ones, others)
+    apart = energy(space.points(ones), space.points(others), settings.permutations)
+    few = f" of the first {ENERGY_OF} scenarios" if max(len(here), len(there)) > ENERGY_OF else ""
     say(
         f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
-        f"[training ranges], p = {apart.pvalue:.3f}"
+        f"[training ranges], p = {apart.pvalue:.3f}{few}"
     )
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
-        out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside])))
-    say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs")
+        out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside], _ids(pairs))))
+    say(
+    more = " or more" if len(pairs) == MOST_PAIRS else ""
+    say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs{more}")
+    )
     return {
         "pools": [str(pool.folder), str(beside.folder)],
         "over": space.names,
         "energy": asdict(apart),
         "near_duplicates": [asdict(p) for p in pairs],
     }
+
+
+def _ids(pairs: Sequence[Pair]) -> list[str]:
+    """Ids of the scenarios that are told."""
+    return [id_ for pair in pairs[:SHOWN] for id_ in (pair.one, pair.other)]

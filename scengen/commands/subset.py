@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.coverage import farthest_points
-from ..analysis.redraw import scenarios_of, task_of
-from ..analysis.space import of_parameters
+from ..analysis.redraw import batch_of, task_of
+from ..analysis.space import of_tables
 from ..config import read
 from ..errors import BadConfig, PoolError
 from ..pool import MANIFEST, Pool, write
@@ -37,11 +37,11 @@ def command(arguments: Arguments) -> int:
     try_folder(target)
     locked = lock.read(pool.folder)
     task = task_of(pool, search_path(arguments))
-    scenarios = scenarios_of(task, pool)
-    space = of_parameters(task, list(scenarios.values()))
-    chosen = {list(scenarios)[i] for i in farthest_points(space.points(scenarios.values()), settings.n)}
+    batch = batch_of(task, pool)
+    points = of_tables(task, batch.values).of(batch.values, len(batch))
+    chosen = sorted(farthest_points(points, settings.n).tolist())
     about = {**pool.about, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
-    subset = write(target, about, (row for row in pool.rows() if row.id in chosen))
+    subset = write(target, about, pool.some(chosen))
     if locked is not None:
         shutil.copyfile(pool.folder / lock.FILE, target / lock.FILE)
     say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")

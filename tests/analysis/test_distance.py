@@ -9,13 +9,18 @@ from scipy import stats
 from scengen import config
 from scengen.analysis.coverage import evenness, farthest_points
 from scengen.analysis.distance import energy, near_duplicates, offsets, per_parameter
-from scengen.analysis.space import of_features, of_parameters
+from scengen.analysis.space import Batch, of_features, of_parameters
 from scengen.params import with_values
 from scengen.samplers.split import ID
 from scengen.symmetry import Symmetry
 
 TASK = config.task("domino_single")
 TRAINED = {f"id {i}": TASK.draw(ID, 0, i).scenario for i in range(40)}
+
+
+def repeated(scenarios, others=None):
+    """Near duplicates within one batch, or between two."""
+    return near_duplicates(TASK, Batch.of(scenarios), Batch.of(others) if others else None)
 
 
 def of_normals(shift: float) -> float:
@@ -64,7 +69,7 @@ def test_an_offset_is_the_way_to_the_nearest_training_value():
 
 
 def test_a_split_is_as_far_from_training_as_its_axis_says():
-    away = per_parameter(TASK, [TASK.draw("wide_gaps", 0, i).scenario for i in range(40)])
+    away = per_parameter(TASK, Batch.of({f"{i}": TASK.draw("wide_gaps", 0, i).scenario for i in range(40)}))
     ((name, (least, mean)),) = away.items()
     assert name == "gap_ratio" and 0.05 / 0.6 <= least < mean == pytest.approx(0.125 / 0.6, rel=0.2)
 
@@ -86,11 +91,11 @@ def test_the_energy_distance_is_over_the_declared_features():
 def test_leakage_is_found_and_neighbours_are_not():
     close = with_values(TRAINED["id 3"], {"x": TRAINED["id 3"].x + 0.0004})
     far = with_values(TRAINED["id 4"], {"x": TRAINED["id 4"].x + 0.004})
-    (pair,) = near_duplicates(TASK, TRAINED, {"close": close, "far": far})
+    (pair,) = repeated(TRAINED, {"close": close, "far": far})
     assert (pair.one, pair.other) == ("id 3", "close") and pair.distance == pytest.approx(0.004)
-    assert not near_duplicates(TASK, TRAINED)
-    assert len(near_duplicates(TASK, {**TRAINED, "again": TRAINED["id 5"]})) == 1
-    assert not near_duplicates(TASK, TRAINED, {f"{i}": TASK.draw(ID, 1, i).scenario for i in range(40)})
+    assert not repeated(TRAINED)
+    assert len(repeated({**TRAINED, "again": TRAINED["id 5"]})) == 1
+    assert not repeated(TRAINED, {f"{i}": TASK.draw(ID, 1, i).scenario for i in range(40)})
 
 
 def test_leakage_in_disguise_is_found(monkeypatch):
@@ -98,9 +103,9 @@ def test_leakage_in_disguise_is_found(monkeypatch):
     mirror = Symmetry("mirror", reflect={"y": 0.0, "heading": 0.0, "slab_yaw": 0.0})
     s = TRAINED["id 3"]
     image = with_values(s, {"y": -s.y, "heading": -s.heading, "slab_yaw": -s.slab_yaw + 0.0})
-    assert not near_duplicates(TASK, TRAINED, {"image": image})
+    assert not repeated(TRAINED, {"image": image})
     monkeypatch.setattr(TASK.family, "SYMMETRIES", (mirror,))
-    (pair,) = near_duplicates(TASK, TRAINED, {"image": image})
+    (pair,) = repeated(TRAINED, {"image": image})
     assert pair.one == "id 3" and pair.distance == pytest.approx(0.0, abs=1e-9)
 
 
