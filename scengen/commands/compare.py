@@ -91,10 +91,8 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
         out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside], _ids(pairs))))
-    say(
     more = " or more" if len(pairs) == MOST_PAIRS else ""
     say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs{more}")
-    )
     return {
         "pools": [str(pool.folder), str(beside.folder)],
         "over": space.names,
