@@ -78,14 +78,18 @@ class Library(Sequence[PoolRow]):
         Raises:
             UnknownName: there are none.
         """
-        found, known = [], set[str]()
-        for pool, start in zip(self.pools, self._starts, strict=False):
-            splits, codes = pool.kinds("split")
-            known |= set(splits)
-            found += [start + np.flatnonzero(codes == splits.index(split))] if split in splits else []
-        if not found:
+        if split not in (known := self.kinds("split")):
             raise UnknownName("split in these pools", split, known)
-        return Library(self.pools, np.intersect1d(self.places, np.concatenate(found)))
+        return Library(self.pools, np.intersect1d(self.places, known[split]))
+
+    def kinds(self, name: str) -> dict[str, NDArray[np.int64]]:
+        """The different texts in a column such as `split`, and the places of the rows that have each."""
+        found: dict[str, list[NDArray[np.int64]]] = {}
+        for pool, start in zip(self.pools, self._starts[:-1], strict=True):
+            texts, codes = pool.kinds(name)
+            for code, text in enumerate(texts):
+                found.setdefault(text, []).append(start + np.flatnonzero(codes == code))
+        return {text: np.concatenate(places) for text, places in found.items()}
 
     def only(self, number: int) -> "Library":
         """One of them alone."""
@@ -99,6 +103,11 @@ class Library(Sequence[PoolRow]):
             return pool.at(place, witness=False)
 
         return read
+
+    def witness(self, number: int) -> NDArray[np.float32]:
+        """The witness of one of them, shape (n, 7 * arms)."""
+        pool, place = self._where(number)
+        return pool.at(place).witness
 
     def _where(self, number: int) -> tuple[Pool, int]:
         place = int(self.places[number])

@@ -8,7 +8,7 @@ import hashlib
 import importlib
 import inspect
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,8 +20,8 @@ from ..control.teleop import Filter, unfiltered
 from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
 from ..errors import BadConfig, ForeignCode, GaveUp, ScengenError, UnknownName, cut
+from ..library import Library
 from ..params import Value
-from ..pool import PoolRow
 from ..samplers.task import Task
 from ..sim.world import IDLE, hands
 
@@ -95,26 +95,25 @@ class Oracle:
 class Replay:
     """Plays the witness of the nearest training scenario other than the one at hand: what pure memory achieves."""
 
-    def __init__(self, env: PoolEnv, memory: Sequence[PoolRow]):
+    def __init__(self, env: PoolEnv, memory: Library | None):
         """
         Args:
-            memory: rows of training pools with their witnesses.
+            memory: training scenarios of the task.
 
         Raises:
-            BadConfig: there are none for this task.
+            BadConfig: there are none, or one alone.
         """
-        self.env = env
-        self.memory = [row for row in memory if row.task == env.task.name]
-        if len(self.memory) < 2:
+        if memory is None or len(memory) < 2:
             raise BadConfig(f"policy replay needs a pool of {env.task.name} with split id and at least 2 scenarios")
-        self.points = np.array([coordinates(env.task, row.params) for row in self.memory])
+        self.env, self.memory = env, memory
+        self.points = np.array([coordinates(env.task, params) for (params,) in memory.columns("params")])
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Look up the nearest witness."""
         here = coordinates(self.env.task, self.env.values)
         far = np.linalg.norm(self.points - here, axis=1)
-        far[[row.id == info["scenario"] for row in self.memory]] = np.inf
-        self.actions: Actions = self.memory[int(far.argmin())].witness
+        far[self.memory.directory.ids == info["scenario"].encode()] = np.inf
+        self.actions: Actions = self.memory.witness(int(far.argmin()))
         self.next = 0
 
     def act(self, observation: Observation) -> ArrayLike:
@@ -141,7 +140,7 @@ def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:
     return np.array(found)
 
 
-def find(name: str, memory: Sequence[PoolRow] = ()) -> Factory:
+def find(name: str, memory: Library | None = None) -> Factory:
     """The factory of a policy: a built-in name, or `module:factory` from the path or the working directory.
 
     Raises:

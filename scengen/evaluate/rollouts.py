@@ -4,7 +4,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,9 +16,10 @@ from .. import collection
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..errors import BadConfig, PoolError, ScengenError, at_least
+from ..library import Library
 from ..log import Log
 from ..parallel import Workers, each
-from ..pool import Pool, PoolRow
+from ..pool import Pool
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
@@ -335,7 +336,7 @@ class PolicyPlayer:
             self._running = None
         if not self._running:
             settings = self.settings
-            folders = [f for f in settings.folders if (task,) in Pool.open(f).columns("task")]
+            folders = [f for f in settings.folders if task in Pool.open(f).kinds("task")[0]]
             env = PoolEnv(
                 task,
                 folders,
@@ -347,11 +348,12 @@ class PolicyPlayer:
                 settle=True,
                 search=self.search,
             )
-            memory = list(_training(folders)) if settings.policy == REPLAY else []
+            memory = _training(folders) if settings.policy == REPLAY else None
             self._running = env, made(settings.policy, find(settings.policy, memory), env)
         return self._running
 
 
-def _training(folders: Sequence[str]) -> Iterator[PoolRow]:
-    for folder in folders:
-        yield from (row for row in Pool.open(folder).rows() if row.split == ID)
+def _training(folders: Sequence[str]) -> Library | None:
+    """The training scenarios of some pools; None if there are none."""
+    every = Library([Pool.open(folder) for folder in folders])
+    return every.of_split(ID) if ID in every.kinds("split") else None

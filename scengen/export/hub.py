@@ -5,8 +5,9 @@ README.md                            YAML head (configurations, columns, sizes, 
 """
 
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import yaml
 from jinja2 import Template
 
 from ..attack.evidence import Rate, rates, spelled
-from ..certificate import CHECKS, StoredCertificate
+from ..certificate import CHECKS, Check, StoredCertificate
 from ..errors import BadConfig
 from ..pool import MANIFEST, Pool
 from ..printed import printable
@@ -77,6 +78,51 @@ class Part:
         manifest = self.pool.manifest
         rejected = [manifest["rejected"]["file"]] if "rejected" in manifest else []
         return [MANIFEST, *rejected, *(hit["file"] for hit in manifest.get("attack", {}).get("hits", []))]
+
+
+@dataclass
+class Tally:
+    """What the certificates of a pool say together."""
+
+    times: Counter[str] = field(default_factory=Counter)
+    """How often each check has passed."""
+    made: set[str] = field(default_factory=set)
+    """Checks that had something to check."""
+    worst: Mapping[str, Any] = field(default_factory=dict)
+    """Numbers of the check `robust` where the oracle had the lowest bound."""
+    rates: list[Rate] = field(default_factory=list)
+    """How often the adversaries of the check `attack` reached the goal."""
+
+    @classmethod
+    def of(cls, certificates: Iterable[StoredCertificate]) -> "Tally":
+        """That of some certificates, which are looked at one after the other."""
+        found = cls()
+        for check in (check for one in certificates for check in one.checks):
+            found.add(check)
+        return found
+
+    def add(self, check: Check) -> None:
+        """Count one check."""
+        if not check.waived:
+            self.made.add(check.name)
+        if not check.passed:
+            return
+        self.times[check.name] += 1
+        if check.name == "robust" and (not self.worst or check.numbers["bound"] < self.worst["bound"]):
+            self.worst = check.numbers
+        if check.name == "attack":
+            parted = ((*key.rpartition("_"), numbers) for key, numbers in check.numbers.items())
+            more = [Rate(tier, how == spelled(True), n["rollouts"], n["hits"]) for tier, _, how, n in parted]
+            self.rates = rates([*self.rates, *more])
+
+    def passed(self, name: str) -> str:
+        """How often a check has passed, in words."""
+        return str(self.times[name]) if name in self.made else "not checked"
+
+    @property
+    def robust(self) -> str:
+        """The fewest successes of the oracle under jitter in any scenario, and their bound."""
+        return f"{self.worst['solved']} of {self.worst['runs']} (> {self.worst['bound']:.0%})"
 
 
 def check_target(to: str) -> None:
@@ -196,12 +242,12 @@ def _feature(kind: pa.DataType) -> dict[str, Any]:
 
 def _text(parts: Sequence[Part], title: str) -> str:
     """What people read."""
-    told = [[certificate for (certificate,) in part.pool.columns("certificate")] for part in parts]
+    told = [Tally.of(one for (one,) in part.pool.columns("certificate")) for part in parts]
     overview = [
-        [f"`{p.name}`", p.split, len(p.pool), p.pool.funnel["proposed"], p.settings, _robust(found), p.verified]
+        [f"`{p.name}`", p.split, len(p.pool), p.pool.funnel["proposed"], p.settings, found.robust, p.verified]
         for p, found in zip(parts, told, strict=True)
     ]
-    checks = [[name, HOLDS[name], CHECKS[name], *(_passed(found, name) for found in told)] for name in CHECKS]
+    checks = [[name, HOLDS[name], CHECKS[name], *(found.passed(name) for found in told)] for name in CHECKS]
     nodes = {part.pool.task: part.pool.task_node for part in parts}
     moved = [(part.pool.task, axis) for part in parts for axis in _axes(part)]
     axes = [[f"`{task}`", axis, _said(nodes[task]["axes"][axis].get("why", ""))] for task, axis in dict.fromkeys(moved)]
@@ -225,29 +271,12 @@ def _axes(part: Part) -> list[str]:
     return [axis for text in part.pool.split.split("+") if (axis := text.partition("@")[0]) in known]
 
 
-def _robust(found: Sequence[StoredCertificate]) -> str:
-    """The fewest successes of the oracle under jitter in any scenario, and their bound."""
-    numbers = [check.numbers for one in found for check in one.checks if check.name == "robust" and check.passed]
-    worst = min(numbers, key=lambda n: n["bound"])
-    return f"{worst['solved']} of {worst['runs']} (> {worst['bound']:.0%})"
-
-
-def _passed(found: Sequence[StoredCertificate], name: str) -> str:
-    checks = [check for one in found for check in one.checks if check.name == name]
-    passed = sum(check.passed is True for check in checks)
-    return str(passed) if passed or not all(check.waived for check in checks) else "not checked"
-
-
-def _accessibility(parts: Sequence[Part], told: Sequence[Sequence[StoredCertificate]]) -> list[list[Any]]:
+def _accessibility(parts: Sequence[Part], told: Sequence[Tally]) -> list[list[Any]]:
     """How often adversaries reached the goals: those of the checks, and those of the pools as a whole."""
     lines = []
     for part, found in zip(parts, told, strict=True):
         counted = [Rate(r["tier"], r["raw"], r["rollouts"], r["hits"]) for r in _attacks(part.pool)]
-        for check in (check for one in found for check in one.checks if check.name == "attack" and check.passed):
-            for key, numbers in check.numbers.items():
-                tier, _, how = key.rpartition("_")
-                counted.append(Rate(tier, how == spelled(True), numbers["rollouts"], numbers["hits"]))
-        for rate in rates(counted):
+        for rate in rates([*counted, *found.rates]):
             hits = f"{rate.hits} of {rate.rollouts}"
             lines.append([f"`{part.name}`", rate.tier, spelled(rate.raw), hits, f"< {rate.bound:.1%}"])
     return lines

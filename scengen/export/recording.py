@@ -148,13 +148,12 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
-    tasks = {name: config.task(name, search) for name in sorted({n for pool in pools for (n,) in pool.columns("task")})}
+    tasks = {name: config.task(name, search) for name in sorted({n for pool in pools for n in pool.kinds("task")[0]})}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
         raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
     streams = streams_of(robot)
     if settings.privileged:
-        scenes = {name: {x for p in pools for n, x in p.columns("task", "scene_xml") if n == name} for name in tasks}
-        bodies = all_bodies(bodies_of(task, scenes[name]) for name, task in tasks.items())
+        bodies = all_bodies(bodies_of(task, _scenes(pools, name)) for name, task in tasks.items())
         state = ObjectState(bodies, len(hands(robot)))
         streams[NAME] = Stream(state.names, state.bounds, state.read)
     failed = []
@@ -179,6 +178,12 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
         _discard(settings.unfinished)
         raise
     return Summary(writer.episodes, writer.rows, tuple(failed), lost)
+
+
+def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
+    """Texts of the scenes of a task."""
+    holding = [pool for pool in pools if task in pool.kinds("task")[0]]
+    return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
 
 
 def _begin(settings: Settings) -> None:
@@ -331,7 +336,7 @@ def _robot(pools: list[Pool]) -> str:
     robots = set()
     for pool in pools:
         check_versions(pool.versions, str(pool.folder))
-        robots |= {embodiment for (embodiment,) in pool.columns("embodiment")}
+        robots |= {*pool.kinds("embodiment")[0]}
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
     if len(robots) > 1:

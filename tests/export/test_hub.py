@@ -97,7 +97,7 @@ def test_accessibility_adds_up_hits_of_checks():
     numbers = {"random_raw": {"rollouts": 30, "hits": 1}, "retry_filtered": {"rollouts": 10, "hits": 0}}
     checks = [replace(c, passed=True, numbers=numbers) if c.name == "attack" else c for c in row.certificate.checks]
     part = hub.Part(Pool.open(POOLS[0]), "quick", "")
-    lines = hub._accessibility([part], [[replace(row.certificate, checks=tuple(checks))] * 2])
+    lines = hub._accessibility([part], [hub.Tally.of([replace(row.certificate, checks=tuple(checks))] * 2)])
     assert lines == [
         ["`domino_single-wide_gaps@2`", "random", "raw", "2 of 60", "< 10.1%"],
         ["`domino_single-wide_gaps@2`", "retry", "filtered", "0 of 20", "< 13.9%"],
