@@ -409,7 +409,7 @@ def write(
     folder: Path,
     about: Mapping[str, Any],
     rows: Iterable[PoolRow],
-    kept: Sequence[PoolRow] = (),
+    kept: Iterable[PoolRow] = (),
     ready: Sequence[Mapping[str, Any]] = (),
 ) -> Pool:
     """Write a pool: shards first, the manifest last, each under its final name only when complete.
@@ -425,7 +425,9 @@ def write(
     while (first := next(left, None)) or not found:
         some = itertools.chain([first] if first else [], itertools.islice(left, SHARD_ROWS - 1))
         found.append(write_shard(folder, len(found), some))
-    extra = {"rejected": _written(folder / REJECTED, kept)} if kept else {}
+    rejects = iter(kept)
+    first = next(rejects, None)
+    extra = {"rejected": _written(folder / REJECTED, itertools.chain([first], rejects))} if first else {}
     text = json.dumps({"format": FORMAT, **about, "shards": found, **extra}, indent=1, sort_keys=True) + "\n"
     shards.replace(folder / MANIFEST, text.encode())
     return Pool.open(folder)

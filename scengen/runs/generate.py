@@ -4,7 +4,8 @@ import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from ..validate.certify import Certified, certify
 from ..validate.identity import fingerprint, source_sha256
 from ..validate.settings import CertifySettings
 from ..versions import versions
+from .filling import Filling, placed
 from .journal import Journal, Record
 
 
@@ -149,15 +151,26 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
         _extend(job, settings, records, journal, progress)
         asked = settings.attack and _chosen(records, settings.n)
         report = _attack(job, settings, records, journal, progress) if asked else None
-        try:
+        with _writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
             shards.replace(folder / lock.FILE, locked.encode())
             return _finish(folder, identity, settings, records, journal, report)
-        except OSError as error:
-            why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"
-            raise PoolError(why) from None
     finally:
         journal.close()
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Tell of a place that cannot be written.
+
+    Raises:
+        PoolError: in one line, with the remedy.
+    """
+    try:
+        yield
+    except OSError as error:
+        why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"
+        raise PoolError(why) from None
 
 
 def row_of(task: Task, draw: Draw, certified: Certified) -> pool.PoolRow:
@@ -238,6 +251,7 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     verdicts = Counter(r.verdict for r in records.values())
     lost_in_a_row = 0
+    filling = Filling(journal, 0 if settings.attack else settings.n)  # an attack has the last word on what is in a pool
 
     def needed(index: int) -> bool:
         """Whether index can still be among the first n certified ones."""
@@ -245,9 +259,13 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
             return True
         return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
 
+    with _writing(journal.folder):
+        filling.follow(records)
     for record in each(job, itertools.takewhile(needed, missing), settings.workers, limits, job.lost):
         journal.add(record)
-        records[record.index] = replace(record, row=None)
+        records[record.index] = record.light()
+        with _writing(journal.folder):
+            filling.follow(records)
         verdicts[record.verdict] += 1
         lost_in_a_row = lost_in_a_row + 1 if record.check == pool.PROCESS else 0
         if lost_in_a_row == MOST_LOST:
@@ -317,6 +335,8 @@ def _finish(
     }
     if report is not None:
         manifest["attack"] = attacks.stored(report, folder)
-    written = pool.write(folder, manifest, journal.rows(certified), list(journal.rows(kept)))
+    ready = placed(journal, certified, folder)
+    rest = journal.rows(certified[len(ready) * pool.SHARD_ROWS :])
+    written = pool.write(folder, manifest, rest, journal.rows(kept), ready)
     cpu = math.fsum(r.cpu for r in counted)
     return Summary(written, len(certified), len(counted), counts, dict(reasons), first, report, cpu)

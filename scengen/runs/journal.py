@@ -3,9 +3,10 @@
 import json
 import shutil
 import sqlite3
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from ..sim.world import action_size
 from ..targets import refused, try_folder
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Record:
     """What became of one index."""
 
@@ -36,6 +37,15 @@ class Record:
     """The scenario, if it goes into the pool or is kept on request; None in what `Journal.records` gives."""
     cpu: float
     """Processor time spent [s]; differs from run to run and stays out of the pool."""
+
+    def light(self) -> "Record":
+        """The same without its row, its words shared with all other records: a million of them take 400 MB."""
+        words = {name: sys.intern(getattr(self, name)) for name in ("verdict", "check", "reason")}
+        return replace(self, row=None, infeasible=self.infeasible or NOTHING, **words)
+
+
+NOTHING: dict[str, int] = {}
+"""The infeasible draws of an index that had none."""
 
 
 class Journal:
@@ -80,6 +90,7 @@ class Journal:
             self._db = sqlite3.connect(self._path)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("CREATE TABLE IF NOT EXISTS run (identity TEXT)")
+            self._db.execute("CREATE TABLE IF NOT EXISTS shard (number INTEGER PRIMARY KEY, key TEXT, entry TEXT)")
             self._db.execute(
                 "CREATE TABLE IF NOT EXISTS record"
                 " (idx INTEGER PRIMARY KEY, body TEXT, scene TEXT, actions BLOB, cpu REAL)"
@@ -100,7 +111,7 @@ class Journal:
         """All records so far by index, without their rows: those of a large run do not fit into memory."""
         with self._told():
             found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
-            return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu) for body, cpu in found)}
+            return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu).light() for body, cpu in found)}
 
     def rows(self, indices: Iterable[int]) -> Iterator[PoolRow]:
         """The stored scenarios of these indices, one after the other."""
@@ -125,6 +136,22 @@ class Journal:
                 "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",
                 (record.index, json.dumps(body), scene, actions, record.cpu),
             )
+
+    def add_shard(self, number: int, key: str, entry: Mapping[str, Any]) -> None:
+        """Remember that a shard was written.
+
+        Args:
+            key: of what is in it.
+            entry: what a manifest says of it.
+        """
+        with self._told(), self._db:
+            self._db.execute("INSERT OR REPLACE INTO shard VALUES (?, ?, ?)", (number, key, json.dumps(entry)))
+
+    def shard(self, number: int, key: str) -> dict[str, Any] | None:
+        """What a manifest says of a shard that was written; None if there is none with that in it."""
+        with self._told():
+            found = self._db.execute("SELECT entry FROM shard WHERE number = ? AND key = ?", (number, key)).fetchone()
+            return json.loads(found[0]) if found else None
 
     @contextmanager
     def _told(self) -> Iterator[None]:
