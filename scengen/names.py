@@ -74,8 +74,7 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
     if len(found) > 1:
         told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more of one: {_listed(found, name)}"
         raise BadConfig(told)
-    called = name(found[0])
-    if before and not str(called).startswith(f"{before}/"):
+    if before and not str(called := name(found[0])).startswith(f"{before}/"):
         told = f"{cut(text)} is {called}: the id counts, what stands before it is wrong"
         warnings.warn(told, Misnamed, stacklevel=3)
     return found[0]

@@ -45,7 +45,7 @@ def command(arguments: Arguments) -> int:
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_parts(pools)
     strict, seed = settings.expired == "fail", secrets.randbelow(2**32)
-    options = Options(settings.level, settings.sample, seed, settings.workers, LIMITS, strict, attacked)
+    options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, strict, attacked)
     parts = []
     for pool in pools:
         with ProgressBar(err, f"verify {pool.folder}", len(pool), settings.workers) as progress_bar:

@@ -3,7 +3,7 @@
 import secrets
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, several, warn, wr
 SHOWN = 20
 """Differences and faults that are told; the files hold all."""
 EXPIRED = ("fail", "report")
+SKIP = "skip"
+OTHERS = ("check", SKIP)
 STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
 WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound")}
 """Exit statuses, the one that counts most among several pools first."""
@@ -44,6 +46,7 @@ class Settings:
     hits: str | None
     level: str
     sample: int | None
+    others: str
     seed: int | None
     json: str | None
     junit: str | None
@@ -55,9 +58,11 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("verify", arguments, Settings)
-    for name, known in (("expired", EXPIRED), ("level", LEVELS)):
+    for name, known in (("expired", EXPIRED), ("level", LEVELS), ("others", OTHERS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    if settings.others == SKIP and settings.sample is None:
+        raise BadConfig(f"others = {SKIP}; it leaves out what is not in a sample: say sample=N too")
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
     try_file(settings.json)
     try_file(settings.junit)
@@ -70,6 +75,7 @@ def command(arguments: Arguments) -> int:
     options = Options(
         settings.level,
         settings.sample,
+        settings.others != SKIP,
         secrets.randbelow(2**32) if settings.seed is None else settings.seed,
         settings.workers,
         limits,
@@ -82,7 +88,7 @@ def command(arguments: Arguments) -> int:
         pool = Pool.open(folder)
         with ProgressBar(err, f"verify {folder}", len(pool), settings.workers) as progress_bar:
             report = reports[folder] = verified(pool, options, search_path(arguments), progress_bar.show)
-        about = {key: value for key, value in asdict(report).items() if key != "names"}
+        about = {key: value for key, value in vars(report).items() if key != "names"}
         plain[folder] = {"pool_sha256": pool.sha256, **about}
         _tell(pool, report)
     if settings.json:

@@ -19,7 +19,7 @@ MANIFEST = "manifest.json"
 """What stands for the pool as a whole where an id is told."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Examination:
     """What was found about one scenario."""
 

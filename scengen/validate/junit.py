@@ -24,7 +24,8 @@ def junit(reports: Mapping[str, Report]) -> str:
 
 def _suite(pool: str, report: Report) -> ET.Element:
     name = _UNWRITABLE.sub("?", pool)
-    of_pool = [f for f in report.failed if f["id"] not in {e["id"] for e in report.examinations}]
+    scenarios = {e["id"] for e in report.examinations}
+    of_pool = [f for f in report.failed if f["id"] not in scenarios]
     tests = [*of_pool, *report.examinations]
     counts = {kind: sum(t["verdict"] == kind for t in tests) for kind in ("refuted", "declined")}
     suite = ET.Element("testsuite", {

@@ -2,8 +2,8 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from ..certificate import CHECKS, STAGES
 from ..errors import Infeasible
@@ -27,6 +27,34 @@ class Drawn:
     infeasible: Mapping[str, int]
     """Infeasible draws by reason."""
     feasible: bool
+
+
+@dataclass
+class Survey:
+    """What came of the indices that have been drawn again so far."""
+
+    indices: int = 0
+    proposals: int = 0
+    feasible: int = 0
+    """Indices that gave a feasible scenario."""
+    infeasible: Counter[str] = field(default_factory=Counter)
+    """Infeasible draws by reason."""
+    left: list[int] = field(default_factory=list)
+    """Indices with a feasible scenario that was not certified."""
+
+    def add(self, found: Mapping[int, Drawn], certified: Collection[int]) -> None:
+        """Count some more.
+
+        Args:
+            certified: all indices that were.
+        """
+        for index, drawn in found.items():
+            self.indices += 1
+            self.proposals += drawn.proposals
+            self.feasible += drawn.feasible
+            self.infeasible.update({f"feasible: {why}": times for why, times in drawn.infeasible.items()})
+            if drawn.feasible and index not in certified:
+                self.left.append(index)
 
 
 def draw_again(indices: Sequence[int], claims: Claims) -> dict[int, Drawn]:
@@ -86,17 +114,15 @@ def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:
         yield f"the manifest counts {pool.indices} indices, but a run ends with the last scenario, index {indices[-1]}"
 
 
-def wrong_funnel(pool: Pool, certified: Mapping[int, int], drawn: Mapping[int, Drawn]) -> Iterator[str]:
+def wrong_funnel(pool: Pool, certified: int, first: int, drawn: Survey) -> Iterator[str]:
     """Where funnel, reasons and counts of a manifest do not follow from its rows and from what was drawn again.
 
     Args:
-        certified: attempt of every row by index.
+        certified: how many rows there are.
+        first: how many of them are first draws.
         drawn: every index of the run.
     """
-    proposals = sum(d.proposals for d in drawn.values())
-    infeasible, failed = Counter[str](), Counter[str]()
-    for d in drawn.values():
-        infeasible.update({f"feasible: {why}": times for why, times in d.infeasible.items()})
+    infeasible, failed = drawn.infeasible, Counter[str]()
     told = {key: times for key, times in pool.reasons.items() if key.startswith("feasible: ")}
     if told != dict(infeasible):
         yield f"the reasons of infeasible draws are not those that come out again, {_told(infeasible)}"
@@ -106,17 +132,16 @@ def wrong_funnel(pool: Pool, certified: Mapping[int, int], drawn: Mapping[int, D
             yield f"the reasons name a check {name[:40]!r} that nobody makes"
         elif name != "feasible":
             failed[name] += times
-    left = sum(d.feasible for d in drawn.values()) - len(certified)
+    left = drawn.feasible - certified
     if failed.total() != left:
         yield f"the reasons tell of {failed.total()} rejected scenarios, and {left} were drawn and not certified"
     order = [*reversed(CHECKS)]
     failed["compiles"] += failed.pop(PROCESS, 0)  # such a scenario is feasible, and got through nothing else
-    expected = {"proposed": proposals}
+    expected = {"proposed": drawn.proposals}
     for stage, checks in STAGES.items():
-        expected[stage] = len(certified) + sum(n for k, n in failed.items() if order.index(k) < order.index(checks[-1]))
+        expected[stage] = certified + sum(n for k, n in failed.items() if order.index(k) < order.index(checks[-1]))
     if dict(pool.funnel) != expected:
         yield f"the funnel is not what comes out again, {expected}"
-    first = sum(attempt == 0 for attempt in certified.values())
     if pool.manifest["first_draws"] != first:
         yield f"first_draws = {pool.manifest['first_draws']}, and {first} first draws were certified"
 
@@ -143,16 +168,16 @@ class Reject:
         return cls(row.index, uncounted(row.certificate.reason))
 
 
-def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Mapping[int, int]) -> Iterator[str]:
+def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Collection[int]) -> Iterator[str]:
     """Where the kept rejects are not those of the reasons.
 
     Args:
-        certified: the indices of the rows, and more.
+        certified: the indices of the rows.
     """
     indices = [reject.index for reject in kept]
     if any(a >= b for a, b in itertools.pairwise(indices)):
         yield "the rejects do not stand in the order of their indices, each once"
-    if both := certified.keys() & set(indices):
+    if both := {index for index in indices if index in certified}:
         yield f"index {min(both)} is a reject, and certified too"
     expected = {
         key: times

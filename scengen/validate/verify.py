@@ -2,13 +2,15 @@
 
 import random
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from ..errors import PoolError, ScengenError, cut
 from ..parallel import Limits, Workers, each
-from ..pool import Pool
+from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from . import survey
 from .certify import Adversary
@@ -35,6 +37,9 @@ class Options:
     """See `recheck.LEVELS`."""
     sample: int | None = None
     """How many scenarios are simulated, chosen at random; None for all."""
+    others: bool = True
+    """Whether the scenarios that are not simulated are looked at, too. Else they, and the run as a whole, are taken at
+    their author's word."""
     seed: int = 0
     """Decides which. An author who knows it forges the others."""
     workers: Workers = 1
@@ -96,13 +101,18 @@ class _Run:
     found: Findings
     chosen: set[int] | None
     """Places of the rows that are simulated; None for all."""
-    indices: list[int] = field(default_factory=list)
+    indices: "array[int]" = field(default_factory=lambda: array("q"))
     """Of the rows, as they stand."""
-    ids: list[str] = field(default_factory=list)
-    certified: dict[int, int] = field(default_factory=dict)
-    """Attempt of every row by index."""
+    places: dict[str, int] = field(default_factory=dict)
+    """By id where the row stands, or its last one."""
+    twice: set[str] = field(default_factory=set)
+    """Ids that stand in several rows."""
+    certified: set[int] = field(default_factory=set)
+    """Indices of the rows."""
+    first: int = 0
+    """Rows that are first draws of their index."""
     rejected: list[survey.Reject] = field(default_factory=list)
-    drawn: dict[int, survey.Drawn] = field(default_factory=dict)
+    drawn: survey.Survey = field(default_factory=survey.Survey)
     """What came of the indices that were drawn again."""
     faults: int = 0
     """Refuted scenarios."""
@@ -112,20 +122,22 @@ class _Run:
     def examine(self, examiner: Examiner, progress: Callable[[int], None]) -> None:
         """Let workers look at everything, and collect what they find."""
         seen: list[Examination] = []
-        options = self.options
-        for one in each(examiner, self._jobs(), options.workers, options.limits, lost):
+        options, names = self.options, self.found.names
+        jobs = self._jobs() if options.others or self.chosen is None else self._sampled(sorted(self.chosen))
+        for one in each(examiner, jobs, options.workers, options.limits, lost):
             if isinstance(one, dict):
-                self.drawn.update(one)
+                self.drawn.add(one, self.certified)
             elif isinstance(one, Failed) or one.id == MANIFEST:
                 self._note(one)
             else:
                 seen.append(one)
                 self.faults += one.verdict == "refuted"
+                if one.verdict == "sound" and one.id not in self.twice:
+                    names.pop(one.id, None)  # of a million nobody wants to be told
                 progress(min(len(seen), len(self.pool)))
-        order = {id_: place for place, id_ in enumerate(self.ids)}
-        twice = {id_ for id_, times in Counter(self.ids).items() if times > 1}
-        for one in sorted(seen, key=lambda e: order.get(e.id, len(order))):
-            if one.id in twice:
+        seen.sort(key=lambda e: self.places.get(e.id, len(self.places)))
+        for one in seen:
+            if one.id in self.twice:
                 one = replace(one, verdict="refuted", reasons=(*one.reasons, "the id occurs twice"))
             self.found.examinations.append(one)
 
@@ -133,10 +145,8 @@ class _Run:
         """Rows first: how many there are is known then, and a manifest that promises others is not drawn again."""
         try:
             for place, row in enumerate(self.pool.rows()):
-                self.indices.append(row.index)
-                self.ids.append(row.id)
-                self.found.names[row.id] = cut(str(row.name))
-                self.certified[row.index] = row.attempt
+                self._count(row)
+                self.first += row.attempt == 0
                 if self._hopeless():
                     return
                 yield row, self.chosen is None or place in self.chosen, True
@@ -152,6 +162,34 @@ class _Run:
         self.whole = True
         if not self.pool.chosen and len(self.indices) == len(self.pool):
             yield from self._pieces()
+
+    def _count(self, row: PoolRow) -> None:
+        """Note which row is looked at."""
+        if row.id in self.places:
+            self.twice.add(row.id)
+        self.places[row.id] = len(self.indices)
+        self.indices.append(row.index)
+        self.found.names[row.id] = cut(str(row.name))
+        self.certified.add(row.index)
+
+    def _sampled(self, places: Sequence[int]) -> Iterator[Job]:
+        """The sample alone, and of the others that their ids and indices can be those of a run."""
+        told = "the scenarios that are not in the sample were not looked at"
+        self.found.remarks.append(f"{told}: they, the funnel and the reasons are the author's word")
+        try:
+            directory = self.pool.directory
+            if id_ := directory.twice:
+                self.found.of_pool(MANIFEST, "refuted", f"the id {id_} occurs twice")
+            if later := np.flatnonzero(np.diff(directory.indices) <= 0).tolist():
+                index = int(directory.indices[later[0] + 1])
+                self.found.of_pool(MANIFEST, "refuted", f"index {index} stands twice, or after a later one")
+            for what in survey.wrong_order(directory.indices.tolist(), self.pool):
+                self.found.of_pool(MANIFEST, "refuted", what)
+            for row in self.pool.some(places):
+                self._count(row)
+                yield row, True, True
+        except PoolError as error:
+            self.found.of_pool("shards", "refuted", str(error))
 
     def _hopeless(self) -> bool:
         """Whether so much is false already that nobody needs to know about the rest; the report says so."""
@@ -174,7 +212,7 @@ class _Run:
         limits, begun = self.options.limits, time.monotonic()
         patience = survey.patience(self.pool, limits.seconds) if limits else float("inf")
         for piece in survey.chunks(self.pool.indices):
-            if why := survey.too_many(self.pool, len(self.drawn), sum(d.proposals for d in self.drawn.values())):
+            if why := survey.too_many(self.pool, self.drawn.indices, self.drawn.proposals):
                 self.found.of_pool(MANIFEST, "refuted", why)
                 return
             if time.monotonic() - begun > patience:
@@ -187,7 +225,7 @@ class _Run:
         """Certify what the run has drawn and left out: else an author might leave out what a policy is bad at."""
         if self.pool.chosen or self.options.sample is not None:
             return
-        left = [Left(index) for index, drawn in self.drawn.items() if drawn.feasible and index not in self.certified]
+        left = [Left(index) for index in sorted(self.drawn.left)]
         for one in each(examiner, left, self.options.workers, self.options.limits, lost):
             self._note(one)
         if certified := sum(not why for why in self.found.left_out.values()):
@@ -217,8 +255,8 @@ class _Run:
             return
         yield from survey.wrong_attack(self.pool)
         yield from survey.wrong_rejects(self.pool, self.rejected, self.certified)
-        if len(self.drawn) == self.pool.indices:
-            yield from survey.wrong_funnel(self.pool, self.certified, self.drawn)
+        if self.drawn.indices == self.pool.indices:
+            yield from survey.wrong_funnel(self.pool, len(self.indices), self.first, self.drawn)
 
 
 def _sample(pool: Pool, options: Options, found: Findings) -> set[int] | None:
