@@ -23,7 +23,7 @@ from scengen.pool import Pool
 COMMANDS = {
     "show": "show pool={pool}",
     "show id=": "show pool={pool} id={id}",
-    "show to=, 200 images": "show pool={pool} to={to}.html images=200 films=0",
+    "show to=, 10 images": "show pool={pool} to={to}.html images=10 films=0",
     "report": "report pool={pool} to={to}.html",
     "compare": "compare pool={pool}",
     "bias": "bias pool={pool}",
@@ -51,9 +51,9 @@ def accesses(folder: str) -> dict[str, list[float]]:
     chosen, found = random.Random(0), dict[str, list[float]]()
 
     def timed(what: str, of: object) -> object:
-        start = time.perf_counter()
+        start = time.process_time()
         result = of()  # type: ignore[operator]
-        found.setdefault(what, []).append(1000 * (time.perf_counter() - start))
+        found.setdefault(what, []).append(1000 * (time.process_time() - start))
         return result
 
     pool: Pool = timed("Pool.open", lambda: Pool.open(folder))  # type: ignore[assignment]
