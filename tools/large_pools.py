@@ -91,14 +91,15 @@ def main(*folders: str) -> None:
     """Print the table."""
     sizes = [len(Pool.open(folder)) for folder in folders]
     print("| |", " | ".join(str(size) for size in sizes), "| CPU s for 1000 more |\n|---|" + "---:|" * (len(sizes) + 1))
-    times = [accesses(folder) for folder in folders]
-    for what in times[0]:
-        cells = (f"{statistics.median(t[what]):.1f} ms (at most {max(t[what]):.1f})" for t in times)
-        print(f"| {what} | {' | '.join(cells)} | |", flush=True)
     told = [commands(folder) for folder in folders]
     for what in COMMANDS:
         slope = (told[-1][what][0] - told[0][what][0]) / max(1, sizes[-1] - sizes[0]) * 1000
         print(f"| {what} | {' | '.join(t[what][1] for t in told)} | {slope:.3f} |", flush=True)
+    # last, because a process counts the memory of the one that started it
+    times = [accesses(folder) for folder in folders]
+    for what in times[0]:
+        cells = (f"{statistics.median(t[what]):.1f} ms (at most {max(t[what]):.1f})" for t in times)
+        print(f"| {what} | {' | '.join(cells)} | |", flush=True)
 
 
 if __name__ == "__main__":
