@@ -1,4 +1,4 @@
-"""A shelf with one slot: two upright dividers on a base, chamfered at the mouth between them."""
+"""A shelf with one slot: two upright dividers on a base, chamfered at the mouth; its ends may be closed."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class SlotShelf(Prop):
     """Between the dividers."""
     height: float = param(0.140, "m", 0.02, 0.28)
     """Of the dividers above the base, on which a thing in the slot stands."""
-    length: float = param(0.200, "m", 0.05, 0.30)
+    length: float = param(0.200, "m", 0.05, 0.32)
     """Of the slot, along y."""
     divider: float = param(0.018, "m", 0.012, 0.04)
     """Thickness of a divider."""
@@ -33,6 +33,8 @@ class SlotShelf(Prop):
     """Of the dividers' upper inner edges, at 45 deg."""
     base: float = param(0.020, "m", 0.005, 0.04)
     """Thickness of the base."""
+    ends: float = param(0.0, "m", 0.0, 0.04)
+    """Thickness of the walls that close the slot at both ends, as high as the dividers; 0: open."""
     friction: float = param(0.1, "1", 0.02, 1.5)
     """Polished: its own counts, whatever touches it, and nothing sticks fast between the dividers."""
     rgba: Rgba = (0.55, 0.42, 0.30, 1.0)
@@ -47,9 +49,13 @@ class SlotShelf(Prop):
         """Height of the dividers' upper edges above the foot [m]."""
         return self.base + self.height
 
+    @property
+    def long(self) -> float:
+        """Along y, with what closes the ends [m]."""
+        return self.length + 2 * self.ends
+
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        half = self.length / 2
-        foot = [self.width / 2, half, self.base / 2]
+        half, foot = self.length / 2, [self.width / 2, self.long / 2, self.base / 2]
         look = {"friction": self.friction, "rgba": self.rgba, "priority": PRIORITY + 1}
         solid(body, "base", foot, [0.0, 0.0, self.base / 2], **look)
         inner, outer = self.gap / 2, self.width / 2
@@ -65,7 +71,13 @@ class SlotShelf(Prop):
             spec.add_mesh(name=name, uservert=np.array(corners).ravel().tolist())
             wall = solid(body, name, (), type=MESH, **look)
             wall.meshname = name
+        if self.ends:
+            end = [self.width / 2, self.ends / 2, self.height / 2]
+            for name, side in (("right", -1.0), ("left", 1.0)):
+                at = [0.0, side * (half + self.ends / 2), self.base + self.height / 2]
+                solid(body, f"{name}_end", end, at, **look)
 
 
 if __name__ == "__main__":
     show(SlotShelf())
+    show(SlotShelf(ends=0.018))

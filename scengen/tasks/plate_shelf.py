@@ -12,17 +12,17 @@ it in. What is done wrong costs the episode: a plate that is dropped breaks.
 
 Decisions, where the paper (App. B, T05 and T06) says no more than "cutlery plate", "slot" and "incline":
 
-* The plate is deep, on a small foot, with a level lip: its "slight incline". Its thickness and its two diameters in
+* The plate stands on a small foot, with a level lip: its "slight incline". Its thickness and its two diameters in
   training are of the paper's list (App. C); the others are axes.
+* One jaw alone: a steep hand that is pressed against the rim as deep as it gets lifted a plate with a lip 20 mm above
+  the table at a friction of 0.6, and sometimes of 0.4. The lip is at 12 mm and glazed: there the pads slip off at 0.5.
 * The dividers are as high as the plate: closed fingers go down between them with it, by their thickness of 35 mm, but a
   cup sits across the slot. Even on the lip, its uppermost part, it meets them 11 mm before the plate is down. Between
   dividers that are 6 cm lower than the plate a cup on the lip puts it in alone.
-* A plate that falls faster than 0.35 m/s, as from 6 mm, breaks, and the episode is lost: else the cup could let it
-  drop the rest of the way. No hand lowers anything faster than 0.3 m/s. Speeds are looked at every 10 ms, in which a
-  fall gains 0.1 m/s: from 10 mm on, less than what is left under a cup, it is seen for certain. The shelf is polished,
-  so that a plate that is let go in the slot does fall.
-* In the slot means: on edge within 10 deg, along the slot, with its middle between the dividers and its rim on the
-  slot's floor, and let go. Leaning against the shelf from outside is not.
+* The slot is closed at both ends. Beside an open end a cup on the foot lowers the plate until it stands half in the
+  slot, lets go, and rolls it in.
+* A plate that falls breaks: else the cup could let it drop the rest of the way, from 10 mm on. What else the two tasks
+  with a plate share stands in `plate_and_slot`.
 """
 
 import math
@@ -34,6 +34,7 @@ import numpy as np
 
 from ..assets.plate import Plate
 from ..assets.prop import TABLE_TOP
+from ..assets.slot_shelf import SlotShelf
 from ..geometry import UP, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
@@ -60,12 +61,16 @@ from ..skills.motion import (
     turn_to,
     until,
 )
-from .plate_and_slot import AIR, DEEP, OVER, PlateAndSlot
+from .plate_and_slot import AIR, ALONG, DEEP, EDGE, OVER, PlateAndSlot
 
 MEETING: Vec3 = np.array([-0.15, 0.0, TABLE_TOP + 0.22])
 """Where the plate changes hands [m]. The palm of a level hand that closes up and down reaches 0.104 m below the lip."""
-ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
-"""Where the cup's hand is out of the way [m]."""
+CLOSED_BY = 0.018
+"""Thickness of the walls at the slot's ends, as of its dividers [m]."""
+FORCED = 0.03
+"""How far beyond the grip site a jaw tries to get that takes the rim alone, as far as the table lets it [m]."""
+SPARE = 0.005
+"""How far a plate that the cup is pressed on may move, where it lies nearest to the table's edge [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +82,15 @@ class PlateShelf(PlateAndSlot):
     shelf_x: float = param(0.07, "m", -0.1, 0.3)
     shelf_y: float = param(0.03, "m", -0.3, 0.3)
     shelf_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    plate: Plate = Plate(foot=0.045, rise=0.020)
-    gap: float = param(0.046, "m", 0.02, 0.09)
+    plate: Plate = Plate(foot=0.045, rise=0.012, friction=0.4)
+    gap: float = param(0.038, "m", 0.02, 0.09)
     """Width of the slot."""
     proud: float = param(0.0, "m", -0.01, 0.1)
     """How far the plate stands out of the slot."""
+
+    @property
+    def shelf(self) -> SlotShelf:
+        return replace(super().shelf, ends=CLOSED_BY)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -107,10 +116,6 @@ class PlateShelf(PlateAndSlot):
         yield from suction.suck(arm, face, down)
         yield from suction.carry(arm, "plate", arm.world.pos("plate") + 0.12 * UP, 0.0, Pace(0.15, 0.01))
 
-    def lip(self, world: World) -> Vec3:
-        """The leftmost point of the lip, at half its thickness, while the plate is level [m]."""
-        return world.pos("plate") + (self.plate.rise + self.plate.thickness / 2) * UP + self.plate.radius * LEFT
-
     def wait_beside(self, arm: Arm) -> Plan:
         """Bring the open jaw beside the place where the lip is going to be, and where it comes up."""
         away = max(MEETING[1], self.plate_y) + self.plate.radius + STAND_OFF
@@ -119,12 +124,7 @@ class PlateShelf(PlateAndSlot):
 
     def hand_over(self, world: World) -> Plan:
         """The jaw takes the lip, then the cup lets go."""
-        yield from hand_over(*world.arms, lambda: self.lip(world), SIDEWAYS)
-
-    def leave(self, arm: Arm) -> Plan:
-        """Up, and out of the way."""
-        yield from retreat(arm, 0.10)
-        yield from go_to(arm, ASIDE, pace=COARSE)
+        yield from hand_over(*world.arms, lambda: self.rim(world), SIDEWAYS)
 
     # --- what must not work ---------------------------------------------------------------
 
@@ -136,7 +136,10 @@ class PlateShelf(PlateAndSlot):
             ),
             "cup_alone_flat_on_the_slot": Shortcut(self._lay_flat),
             "let_go_without_partner": Shortcut(self._let_go),
+            "cup_at_an_end": Shortcut(self._cup_at_an_end),
             "jaw_alone": Shortcut(self._jaw_alone),
+            "jaw_takes_it_flat": Shortcut(lambda world: self.grip_flat(world.arms[1], self.flat_tilt, FORCED)),
+            "jaw_slides_it_to_the_edge": Shortcut(self._slide),
             "jaw_inserts_flat": Shortcut(self._insert_flat),
         }
 
@@ -147,25 +150,60 @@ class PlateShelf(PlateAndSlot):
             beside: how far from the plate's middle the cup sits [m].
             above: how much higher than its foot [m].
         """
-        arm, rot = world.arms[0], about_z(math.radians(self.shelf_yaw)) @ FORWARDS
-        over = self.foot + (self.shelf.top + self.plate.radius + OVER) * UP
-        upper = facing_down() @ rot.T @ UP  # the side of the plate that will be its upper one
+        arm = world.arms[0]
 
         def plan() -> Plan:
-            face = world.pos("plate") + beside * upper + (self.plate.thickness + above) * UP
-            yield from go_to(arm, face + 0.03 * UP, facing_down(), STEADY, OPEN)
-            yield from suction.suck(arm, face, facing_down(), 0.04)
-            yield from go_to(arm, arm.hand + (self.shelf.top + 2 * self.plate.radius) * UP, pace=Pace(0.15, 0.01))
-            yield from go_to(arm, [over[0] - 0.08, over[1], arm.hand[2]], pace=Pace(0.10, 0.02))
-            yield from until(turn_to(arm, rot, 0.5, give_up=9.0), _after(world, 6.0))
-            for pace in (Pace(0.10, 0.01), Pace(0.05, 0.004)):
-                yield from until(go_to(arm, arm.hand + over - self.middle(world), pace=pace), _after(world, 4.0))
+            yield from self._hold_on_edge(arm, beside * UP, above, self.foot)
             yield from push(arm, -0.05 * UP, _after(world, 4.0), give_up=5.0)
             yield from suction.let_go(arm)
             yield from go_to(arm, world.com("plate") + (self.plate.radius + 0.05) * UP, facing_down(), COARSE)
             yield from push(arm, -0.05 * UP, _after(world, 2.0), give_up=3.0)
 
         yield from alone(arm, plan())
+
+    def _cup_at_an_end(self, world: World) -> Plan:
+        """Hold the plate on edge with the cup, on its left side, stand it half in the slot's left end, roll it in."""
+        arm, rot = world.arms[0], about_z(math.radians(self.shelf_yaw)) @ FORWARDS
+        along, ahead, beside = rot[:, 1], rot[:, 2], self.plate.foot - REACHES - 0.006
+        out = (self.shelf.length / 2 + TUBE - beside) * along
+
+        def home() -> bool:
+            return float((self.middle(world) - self.foot) @ along) < ALONG / 2
+
+        def plan() -> Plan:
+            yield from self._hold_on_edge(arm, beside * along, 0.0, self.foot + out)
+            yield from self.lower(arm, self.seat(world) + out)
+            yield from hold(arm, 0.2, OPEN)
+            yield from go_to(arm, arm.hand + 0.008 * along, pace=Pace(0.05, 0.003))
+            yield from go_to(arm, arm.hand - 0.08 * ahead)
+            clear = self.middle(world) + (self.plate.radius + 0.03) * along
+            yield from go_to(arm, clear - 0.06 * ahead, rot, COARSE)
+            yield from go_to(arm, clear + 0.03 * ahead, rot)
+            yield from push(arm, -0.04 * along, home, give_up=5.0)
+            yield from go_to(arm, arm.hand + 0.05 * along)
+
+        yield from alone(world.arms[1], self.leave(world.arms[1]))
+        yield from alone(arm, plan())
+
+    def _hold_on_edge(self, arm: Arm, beside: Vec3, above: float, foot: Vec3) -> Plan:
+        """Lift the plate with the cup, and turn it on edge over the slot.
+
+        Args:
+            beside: where the cup sits on the plate that is on edge, from its middle [m].
+            above: how much higher than the foot of a plate that lies [m].
+            foot: over which the plate is held [m].
+        """
+        world, rot = arm.world, about_z(math.radians(self.shelf_yaw)) @ FORWARDS
+        over = foot + (self.shelf.top + self.plate.radius + OVER) * UP
+        face = world.pos("plate") + facing_down() @ rot.T @ beside + (self.plate.thickness + above) * UP
+        yield from go_to(arm, face + 0.03 * UP, facing_down(), STEADY, OPEN)
+        yield from suction.suck(arm, face, facing_down(), 0.04)
+        yield from go_to(arm, arm.hand + (self.shelf.top + 2 * self.plate.radius) * UP, pace=Pace(0.15, 0.01))
+        before = over + beside - 0.08 * rot[:, 2]
+        yield from go_to(arm, [before[0], before[1], arm.hand[2]], pace=Pace(0.10, 0.02))
+        yield from until(turn_to(arm, rot, 0.5, give_up=9.0), _after(world, 6.0))
+        for pace in (Pace(0.10, 0.01), Pace(0.05, 0.004)):
+            yield from until(go_to(arm, arm.hand + over - self.middle(world), pace=pace), _after(world, 4.0))
 
     def _lay_flat(self, world: World) -> Plan:
         """Lay the plate over the slot with the cup, in the hope that it falls in."""
@@ -195,6 +233,12 @@ class PlateShelf(PlateAndSlot):
         yield from alone(arm, go_to(arm, self.foot + (self.shelf.top + self.plate.radius + OVER) * UP))
         yield from alone(arm, jaw.release(arm))
 
+    def _slide(self, world: World) -> Plan:
+        """Push the plate to the table's edge with the jaw, and take it there with the jaw."""
+        right, left = world.arms
+        yield from alone(right, self.leave(right))
+        yield from self.slide_to_the_edge(left, left)
+
     def _insert_flat(self, world: World) -> Plan:
         """Hand the plate over, and lower it on the slot without turning it on edge."""
         giver, taker = world.arms
@@ -216,7 +260,7 @@ class PlateShelf(PlateAndSlot):
 
     def constraints(self) -> Iterator[Refutation | None]:
         plate, shelf = self.plate, self.shelf
-        yield on_table("the plate", corners(self.start, 0.0, 2 * [2 * plate.radius]))
+        yield on_table("the plate", corners(self.start, 0.0, 2 * [2 * plate.radius]), EDGE + SPARE)
         yield on_table("the shelf", self._outline)
         apart = gap(self._outline, corners(self.start, 0.0, 2 * [2 * plate.radius]))
         yield require(apart > 0.01, "plate and shelf stand in each other's place", apart=apart)
@@ -228,6 +272,10 @@ class PlateShelf(PlateAndSlot):
         yield require(room > 0.0, "the fingers that hold the lip meet the dividers", room=room)
         left = TUBE - self.proud  # the dividers stop the tube
         yield require(left > 2 * DEEP, "a cup on the lip puts the plate into the slot alone", left=left)
+        slips = 2 * math.atan(plate.friction)
+        yield require(
+            self.flat_tilt > slips, "one jaw takes the plate from the table", askew=self.flat_tilt, slips=slips
+        )
         grip, weight = plate.friction * pinch(plate.thickness), GRAVITY * plate.mass
         yield require(grip > 2 * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
         right, left = panda.bases(2)

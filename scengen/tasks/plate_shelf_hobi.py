@@ -35,39 +35,31 @@ import mujoco
 import numpy as np
 
 from ..assets.dish import Dish
-from ..assets.prop import TABLE_HALF, TABLE_TOP
-from ..assets.slot_shelf import SlotShelf
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, rotation, shortest
+from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import FINGER, PAD, PALM_ABOVE, PALM_ALONG, TIP, pinch
+from ..robots.jaw import FINGER, PAD, PALM_ABOVE, TIP, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
-from ..skills.handover import CLOSING, LEFT, OVERLAP, STAND_OFF, take_rim
+from ..skills.handover import OVERLAP, STAND_OFF, steepness, take_rim
 from ..skills.motion import (
     CLOSED,
-    COARSE,
     OPEN,
     STEADY,
     Pace,
     alone,
     facing_down,
     go_to,
-    push,
-    retreat,
     steer,
     together,
     until,
 )
-from .plate_and_slot import AIR, LEAN, PlateAndSlot
+from .plate_and_slot import AIR, EDGE, LEAN, LIFT, PROBING, SLOWLY, PlateAndSlot
 
-EDGE, LOW = 0.06, 0.010
-"""How far from the table's edge the rim must stay [m], where a palm that passes the edge finds room for a grip, as long
-as it is not this much higher than that of a plate that lies on the table [m]."""
 ASTRAY = math.radians(30.0)
 """By how much a plate that touches the shelf may be off the slot [rad]."""
 PRESS_AT, PRESSED = 0.008, 0.96
@@ -82,23 +74,13 @@ UNDER_THE_PALM, ASKEW = 0.005, math.radians(12.0)
 """Air between palm and table [m], and how much steeper than the rim a hand may be for it [rad]: less than friction."""
 HOLDS = 1.5
 """How many times the plate's weight the friction of the pads must hold."""
-LIFT, SLOWLY = 0.25, Pace(0.10, 0.01)
-"""How high the plate is lifted before it is turned on edge [m], and how: it turns in the pinch."""
-ASIDE: Vec3 = np.array([-0.15, 0.35, TABLE_TOP + 0.35])
-"""Where the left hand is out of the way [m]; the right one at its mirror image."""
-PROBING = Pace(0.06, 0.003, 1.5)
-"""How a single hand tries to get hold of the rim."""
 SQUEEZED = 0.02
 """How much nearer to each other than the plate allows two hands are sent that squeeze it [m]."""
-ENDS = 0.02
-"""By how much the slot is longer than the plate at either end [m]: more than a finger tip."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlateShelfHobi(PlateAndSlot):
     """A plate on the table and a shelf with a slot."""
-
-    FIRM = 1.0  # the slot leaves more room; a thin plate would swing in the pinch, until it falls
 
     plate_x: float = param(-0.15, "m", -0.3, 0.2)
     plate_y: float = param(-0.03, "m", -0.35, 0.35)
@@ -111,14 +93,7 @@ class PlateShelfHobi(PlateAndSlot):
     proud: float = param(0.04, "m", 0.0, 0.1)
     """How far the plate stands out of the slot."""
 
-    @property
-    def shelf(self) -> SlotShelf:
-        return replace(super().shelf, length=2 * (self.plate.radius + ENDS))
-
     def failure(self, world: World) -> str | None:
-        low = self.lowest(world) < TABLE_TOP + self.plate.rise + LOW
-        if low and float(np.abs(self.middle(world)[:2]).max()) > TABLE_HALF - EDGE - self.plate.radius:
-            return "the plate was pushed to the table's edge"
         if world.touching("plate", "shelf") and not self.over_slot(world):
             return "the plate knocked against the shelf"
         return super().failure(world)
@@ -145,12 +120,6 @@ class PlateShelfHobi(PlateAndSlot):
         yield from self.both(world, self.press(presser), self.wait_beside(taker))
         yield from take_rim(taker, lambda: self.rim(world), self.gripping(world))
 
-    def deliver(self, arm: Arm) -> Plan:
-        """Lift the plate that is held by its rim, turn it on edge, put it in."""
-        yield from alone(arm, go_to(arm, arm.hand + LIFT * UP, pace=SLOWLY))
-        yield from alone(arm, self.put_on_edge(arm))
-        yield from alone(arm, self.put_in(arm))
-
     def roles(self, world: World) -> tuple[Arm, Arm]:
         """The arm that presses and the one that takes the plate."""
         right, left = world.arms
@@ -175,11 +144,6 @@ class PlateShelfHobi(PlateAndSlot):
         rim = self.start + out * self.outside + (plate.raised + plate.thickness / 2) * UP
         yield from go_to(arm, rim - STAND_OFF * hand[:, 2], hand, STEADY, OPEN)
 
-    def leave(self, arm: Arm) -> Plan:
-        """Up, and out of the way."""
-        yield from retreat(arm, 0.10)
-        yield from go_to(arm, ASIDE * [1.0, -self.side, 1.0], pace=COARSE)
-
     def edgewise(self, arm: Arm) -> Mat3:
         """The hand with the plate upright, its upper face towards the robot: as the rim slopes, the hand looks away.
 
@@ -190,14 +154,6 @@ class PlateShelfHobi(PlateAndSlot):
         turn = about_z(math.remainder(polar(across)[0] - polar(normal)[0], 2 * math.pi))
         return shortest(turn @ normal, across) @ turn @ arm.hand_rot
 
-    def hand(self, tilt: float) -> Mat3:
-        """A hand that points at the other arm, `tilt` below the level [rad], and closes up and down.
-
-        Of the two rolls it is the one with which an arm gets there; with the other one it runs into joint 6.
-        """
-        level = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -self.side], [-self.side, 0.0, 0.0]])
-        return rotation(np.array([self.side * tilt, 0.0, 0.0])) @ level
-
     def gripping(self, world: World) -> Mat3:
         """The hand along the rim as it lies now, or steeper where the table asks for it."""
         return self.hand(max(self.plate.slope + self.tilt(world), self.raised_tilt))
@@ -206,38 +162,18 @@ class PlateShelfHobi(PlateAndSlot):
         """By how much the side of the plate that is taken comes up [rad]."""
         return math.asin(float(self.outwards(world) @ UP))
 
-    def outwards(self, world: World) -> Vec3:
-        """Unit vector in the plane of the plate, towards the side of it that is taken."""
-        normal = world.rot("plate")[:, 2]
-        along = self.outside - (self.outside @ normal) * normal
-        return along / math.sqrt(along @ along)
-
-    def rim(self, world: World) -> Vec3:
-        """The outermost point on the side that is taken, at half the rim's thickness [m]."""
-        middle = self.plate.rise + self.plate.thickness / 2
-        return world.pos("plate") + middle * world.rot("plate")[:, 2] + self.plate.radius * self.outwards(world)
-
     # --- what must not work ---------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "grip_it_flat": Shortcut(lambda world: self._grip_flat(world, self.flat_tilt)),
-            "grip_it_from_above": Shortcut(lambda world: self._grip_flat(world, math.pi / 2)),
+            "grip_it_flat": Shortcut(lambda world: self.grip_flat(self.roles(world)[1], self.flat_tilt)),
+            "grip_it_from_above": Shortcut(lambda world: self.grip_flat(self.roles(world)[1], math.pi / 2)),
             "pry_it_up": Shortcut(self._pry),
             "slide_it_to_the_edge": Shortcut(self._slide),
             "let_it_fall_back": Shortcut(self._too_early),
             "squeeze_it_between_the_hands": Shortcut(self._squeeze),
             "insert_it_flat": Shortcut(self._insert_flat),
         }
-
-    def _grip_flat(self, world: World, tilt: float) -> Plan:
-        """Take the rim of the plate as it lies, with one arm: as deep as the table lets the lower finger go."""
-        _, taker = self.roles(world)
-        hand = self.hand(tilt)
-        yield from alone(taker, go_to(taker, self.rim(world) - STAND_OFF * hand[:, 2], hand, STEADY, OPEN))
-        with suppress(GaveUp):
-            yield from alone(taker, go_to(taker, self.rim(world) + OVERLAP * hand[:, 2], hand, PROBING, OPEN))
-        yield from self._go_on_with(taker)
 
     def _pry(self, world: World) -> Plan:
         """Put a finger under the rim, lift and level the hand, close."""
@@ -249,40 +185,18 @@ class PlateShelfHobi(PlateAndSlot):
             high = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
             with suppress(GaveUp):
                 yield from alone(taker, go_to(taker, high, self.hand(tilt), PROBING, OPEN))
-        yield from self._go_on_with(taker)
-
-    def _go_on_with(self, arm: Arm) -> Plan:
-        """Close the jaw and lift; what it then holds, put in."""
-        yield from alone(arm, jaw.grasp(arm, CLOSING))
-        yield from alone(arm, retreat(arm, 0.05, SLOWLY))
-        if arm.world.touching(arm.label, "plate"):
-            yield from self.deliver(arm)
+        yield from self.go_on_with(taker)
 
     def _slide(self, world: World) -> Plan:
-        """Push the plate beyond the side of the table, where there is room for a palm, and take it there."""
-        pusher, taker = self.roles(world)
-        plate, hand = self.plate, self.hand(self.plate.slope)
-        behind = self.start - (plate.radius + 0.03) * self.outside + (plate.rise + TIP) * UP
-        there = TABLE_HALF + 0.03 - plate.radius
-
-        def arrived() -> bool:
-            return float(world.pos("plate") @ self.outside) > there
-
-        yield from alone(pusher, go_to(pusher, behind + 0.1 * UP, facing_down(), STEADY, CLOSED))
-        yield from alone(pusher, go_to(pusher, behind, facing_down(), STEADY))
-        yield from alone(pusher, push(pusher, 0.06 * self.outside, arrived, give_up=8.0))
-        yield from alone(pusher, self.leave(pusher))
-        away = self.rim(world) - 2 * STAND_OFF * hand[:, 2]
-        yield from alone(taker, go_to(taker, away + 0.15 * UP, hand, STEADY, OPEN))
-        yield from take_rim(taker, lambda: self.rim(world), hand)
-        yield from self.deliver(taker)
+        """Push it to the table's edge with one arm, and take it there with the other."""
+        yield from self.slide_to_the_edge(*self.roles(world), self.plate.slope)
 
     def _too_early(self, world: World) -> Plan:
         """Press the rim, let go, and take the plate then."""
         presser, taker = self.roles(world)
         yield from self.both(world, self.press(presser), self.wait_beside(taker))
         yield from alone(presser, self.leave(presser))
-        yield from self._grip_flat(world, self.flat_tilt)
+        yield from self.grip_flat(taker, self.flat_tilt)
 
     def _squeeze(self, world: World) -> Plan:
         """Lift the plate between the fingers of both hands, lower it on the slot, let go."""
@@ -368,29 +282,10 @@ class PlateShelfHobi(PlateAndSlot):
         return math.copysign(1.0, self.shelf_y)
 
     @property
-    def outside(self) -> Vec3:
-        """Level unit vector from the side that is pressed to the one that is taken."""
-        return self.side * LEFT
-
-    @property
     def raised_tilt(self) -> float:
         """Tilt of the hand that takes the raised rim [rad]: along it, or as steep as the table asks of the palm."""
         height = self.plate.raised + self.plate.thickness / 2 - UNDER_THE_PALM
-        return max(2 * self.plate.slope, _steepness(height, PALM_ABOVE - OVERLAP))
-
-    @property
-    def flat_tilt(self) -> float:
-        """Least tilt of a hand whose finger tips hold the rim of the plate as it lies [rad]."""
-        return _steepness(self.plate.rise + self.plate.thickness / 2, PALM_ABOVE + TIP)
-
-
-def _steepness(height: float, before: float) -> float:
-    """Least tilt below the level at which the palm of a hand that closes up and down is over the table [rad].
-
-    With the rim `height` over the table [m], and `before` the palm's front [m], the palm's lower edge is at
-    height + before * sin(tilt) - PALM_ALONG * cos(tilt).
-    """
-    return math.atan2(PALM_ALONG, before) - math.asin(min(1.0, height / math.hypot(PALM_ALONG, before)))
+        return max(2 * self.plate.slope, steepness(height, PALM_ABOVE - OVERLAP))
 
 
 def _carry_between(arm: Arm, inwards: Vec3, way: Vec3) -> Plan:

@@ -15,6 +15,7 @@ from controls import (
     play_shortcut,
     solution,
     unchecked,
+    unguarded,
 )
 from helpers import anywhere
 from hypothesis import given, settings
@@ -23,7 +24,7 @@ from scengen import config
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, rotation
 from scengen.params import values, with_values
-from scengen.tasks.plate_and_slot import ALONG, BREAKS, DEEP, LEAN
+from scengen.tasks.plate_and_slot import ALONG, BREAKS, DEEP, LEAN, PlateAndSlot
 from scengen.tasks.plate_shelf import PlateShelf
 from scengen.validate.rollout import replay
 
@@ -43,6 +44,12 @@ def standing(world, scenario, along=0.0, up=0.0, lean=0.0, yaw=0.0):
     return world
 
 
+def open_ended(scenario):
+    """The scenario, its slot without walls at the ends."""
+    family = type("OpenEnded", (PlateShelf,), {"shelf": PlateAndSlot.shelf})
+    return with_values(family(), values(scenario))
+
+
 @pytest.fixture(scope="module")
 def world():
     """One world for tests that put the plate somewhere themselves; each resets it."""
@@ -53,8 +60,6 @@ def world():
     ("change", "counts"),
     [
         ({}, True),
-        ({"along": ALONG - 0.003}, True),
-        ({"along": ALONG + 0.003}, False),
         ({"up": DEEP - 0.002}, True),
         ({"up": DEEP + 0.002}, False),
         ({"lean": 0.07}, True),
@@ -64,6 +69,12 @@ def world():
 def test_what_counts_as_in_the_slot(world, change, counts):
     world.reset()
     assert NOMINAL.success(standing(world, NOMINAL, **change)) == counts
+
+
+@pytest.mark.parametrize(("along", "counts"), [(ALONG - 0.003, True), (ALONG + 0.003, False)])
+def test_how_far_along_an_open_slot_it_counts(along, counts):
+    open_slot = open_ended(NOMINAL)
+    assert open_slot.success(standing(load(TASK, open_slot), open_slot, along=along)) == counts
 
 
 def test_a_plate_that_leans_or_is_askew_by_more_than_ten_degrees_does_not_count(world):
@@ -109,10 +120,40 @@ def test_ablations_fail_at_what_they_take_away():
 
 def test_a_cup_on_the_lip_does_alone_between_low_dividers_what_it_cannot_between_high_ones():
     scenario = TASK.draw("id", 0, 1).scenario
-    low = with_values(unchecked(PlateShelf)(), {**values(scenario), "proud": 0.065})
+    rough = {**values(scenario), "plate.friction": 0.6}  # the cup on the lip slips off the glaze as it turns
+    low, high = (with_values(unchecked(PlateShelf)(), {**rough, "proud": proud}) for proud in (0.065, 0.0))
     assert play_shortcut(TASK, low, "cup_on_the_lip").solved
-    end = play_shortcut(TASK, scenario, "cup_on_the_lip")
+    end = play_shortcut(TASK, high, "cup_on_the_lip")
     assert end.outcome == "failure" and end.reason == "the plate was dropped"
+
+
+# --- one hand alone -------------------------------------------------------------------------
+
+
+def test_at_an_open_end_the_cup_alone_stands_the_plate_in_the_slot():
+    """What the walls at the ends are for."""
+    scenario = TASK.draw("id", 0, 2).scenario
+    assert play_shortcut(TASK, open_ended(scenario), "cup_at_an_end").solved
+    assert play_shortcut(TASK, scenario, "cup_at_an_end").reason == "the plate was dropped"
+
+
+def test_one_jaw_takes_a_rough_plate_with_a_high_lip_and_no_other():
+    """The law of the constraint: at a friction of 0.6 the pads hold a lip at 20 mm that is 57 deg askew to them."""
+    scenario = TASK.draw("id", 0, 2).scenario
+    rough = {**values(scenario), "plate.friction": 0.6, "plate.rise": 0.020, "gap": 0.046}
+    held = with_values(unchecked(PlateShelf)(), rough)
+    assert held.flat_tilt < 2 * math.atan(0.6) and scenario.flat_tilt > 2 * math.atan(scenario.plate.friction)
+    assert play_shortcut(TASK, held, "jaw_takes_it_flat").solved
+    world = load(TASK, scenario)
+    assert not play_shortcut(TASK, scenario, "jaw_takes_it_flat", world).solved
+    assert world.touched("robot1", "plate") and world.touching("plate", "table")
+
+
+def test_beside_the_table_the_jaw_finds_room_but_for_the_rule():
+    free = with_values(unguarded(PlateShelf)(), values(NOMINAL))
+    assert play_shortcut(TASK, free, "jaw_slides_it_to_the_edge").solved
+    end = play_shortcut(TASK, NOMINAL, "jaw_slides_it_to_the_edge")
+    assert end.reason == "the plate was pushed to the table's edge"
 
 
 # --- what must hold -------------------------------------------------------------------------
@@ -122,15 +163,16 @@ def test_every_constraint_refutes_what_violates_it():
     plate = NOMINAL.plate
     each_refuted_for_its_own_reason(
         [
-            PlateShelf(plate_y=-0.35),
+            PlateShelf(plate_y=-0.23),
+            PlateShelf(plate=replace(plate, friction=0.7)),
             PlateShelf(shelf_y=0.3, shelf_x=0.3, shelf_yaw=-30.0, gap=0.09),
             PlateShelf(plate_x=-0.05),
             PlateShelf(plate=replace(plate, foot=0.028)),
-            PlateShelf(gap=0.026),
-            PlateShelf(gap=0.036),
+            PlateShelf(gap=0.020),
+            PlateShelf(gap=0.030),
             PlateShelf(proud=0.05),
             PlateShelf(plate=replace(plate, mass=0.9)),
-            PlateShelf(plate_x=0.2, plate_y=0.28, shelf_x=-0.1),
+            PlateShelf(plate_x=0.2, plate_y=0.224, shelf_x=-0.1, shelf_y=-0.1),
             PlateShelf(shelf_x=0.3, shelf_y=-0.2),
         ]
     )
