@@ -193,7 +193,12 @@ class Scenario(abc.ABC):
         return UPRIGHT
 
     @property
+    def material(self) -> str:
+        """Hashes of what the scene is made of besides parameters, such as scans; empty where parameters decide all."""
+        return ""
+
+    @property
     def id(self) -> str:
-        """Twelve hex digits that depend on the family and every parameter, and on nothing else."""
-        text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}"
+        """Twelve hex digits that depend on the family, every parameter and `material`, and on nothing else."""
+        text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}{self.material}"
         return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -16,7 +16,7 @@ LAYERS = (
     ("control",),
     ("log", "parallel", "sim"),
     ("assets",),
-    ("directory", "predicates", "scenario", "schema"),
+    ("directory", "mesh_prop", "predicates", "scenario", "schema"),
     ("columns", "episode"),
     ("shards", "skills"),
     ("tasks",),

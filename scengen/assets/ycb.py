@@ -3,11 +3,12 @@
 Masses are those of the set's object list (B. Calli et al., "The YCB object and model set", 2015). Dimensions are
 measured on its scans where `Item.scanned` says so, else taken from that list. Friction is not published: it is ours, by
 material. A proxy is no scan: it has the size, the weight and the balance of the thing, and the few faces that a hand or
-a table meets. `mesh_of` finds the scan of an object in a folder of them, for `scengen asset mesh=`.
+a table meets. `mesh_of` finds the scan of an object in a folder of them, and `Ycb.scans` puts it in the proxy's place.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
@@ -304,6 +305,15 @@ ITEMS = (
 )
 
 
+@dataclass(frozen=True)
+class Scan:
+    """The solid of a scanned object, as it stands or lies."""
+
+    sha256: str
+    """Of the solid, as a manifest holds it."""
+    prop: Prop
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ycb(Prop):
     """One of `ITEMS`, which stands or lies where its docstring says."""
@@ -311,6 +321,26 @@ class Ycb(Prop):
     item: int = param(0, "index", 0, len(ITEMS) - 1)
     low: int = param(0, "1", 0, 1)
     """1: a carton lies on its narrow side, where that is lower than it stands; all else stands as it does."""
+
+    scans: Mapping[str, Scan] = field(default_factory=dict, compare=False, repr=False)
+    """By `called`: solids made of scans. Where there are any, no proxy is used."""
+
+    @property
+    def called(self) -> str:
+        """What the object is called in `scans`: by its folder in the set, and by how it lies."""
+        return f"{self.row.folder}/low" if self.low else self.row.folder
+
+    @property
+    def scan(self) -> Scan | None:
+        """The scan in the proxy's place, or None.
+
+        Raises:
+            BadConfig: there are scans, but none of this object.
+        """
+        if self.scans and self.called not in self.scans:
+            known = ", ".join(self.scans)
+            raise BadConfig(f"there is no scan of {self.called}; known: {known}; give ycb=FOLDER one that has it")
+        return self.scans.get(self.called)
 
     @property
     def row(self) -> Item:
@@ -331,7 +361,7 @@ class Ycb(Prop):
         return float(self.spec().compile().body_mass.sum())
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        self.prop.fill(body, spec)
+        (self.scan.prop if self.scan else self.prop).fill(body, spec)
 
 
 PLACES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")

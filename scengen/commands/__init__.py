@@ -4,7 +4,9 @@ import json
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from .. import collection
@@ -36,6 +38,18 @@ def warn(text: str, style: str = "red") -> None:
 def remark(text: str) -> None:
     """Say on standard error what is missing though all went well."""
     warn(f"scengen: {text}", "yellow")
+
+
+def intake(module: str) -> ModuleType:
+    """A module of `scengen.intake`, which needs packages of an extra.
+
+    Raises:
+        BadConfig: one of them is not installed.
+    """
+    try:
+        return import_module(f"scengen.intake.{module}")
+    except ImportError as error:
+        raise BadConfig(f"no {error.name} to take in meshes; say pip install 'scengen[mesh]'") from None
 
 
 def one(pool: str | list[str] | None) -> str:

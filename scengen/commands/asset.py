@@ -14,7 +14,7 @@ from ..export.mesh import FORMATS, encode
 from ..params import parameters
 from ..pictures import render
 from ..targets import try_file, try_folder
-from . import FAILED, OK, Arguments, out, remark, say, write
+from . import FAILED, OK, Arguments, intake, out, remark, say, write
 
 if TYPE_CHECKING:
     from ..intake.asset import Taken
@@ -76,10 +76,7 @@ def _write_mesh(name: str, target: Path) -> int:
 
 
 def _take_in(settings: Settings, folder: Path) -> int:
-    try:
-        from ..intake import asset
-    except ImportError as error:
-        raise BadConfig(f"no {error.name} to take in meshes; say pip install 'scengen[mesh]'") from None
+    asset = intake("asset")
     request = asset.Request(**{field.name: getattr(settings, field.name) for field in fields(asset.Request)})
     request.check()
     try_folder(folder)

@@ -19,7 +19,7 @@ from ..samplers.designs import SOBOL
 from ..samplers.split import Split
 from ..samplers.task import Task
 from ..validate.settings import CertifySettings
-from . import FAILED, OK, Arguments, err, out, say, warn
+from . import FAILED, OK, Arguments, err, intake, out, say, warn
 
 T = TypeVar("T")
 
@@ -83,6 +83,8 @@ def command(arguments: Arguments) -> int:
 
 def _run(asked: Combination) -> Run:
     settings, task, certify_settings = read_task("generate", asked.overrides, Settings)
+    if settings.ycb is not None:
+        task = intake("ycb").with_scans(task, settings.split, settings.ycb)
     return Run(task, certify_settings, settings)
 
 

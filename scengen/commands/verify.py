@@ -15,7 +15,7 @@ from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig, at_least, cut
 from ..parallel import Limits, WorkerDied, Workers, apart
 from ..pool import Pool
 from ..runs.progress import ProgressBar
@@ -25,8 +25,9 @@ from ..task_files import search_path
 from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
+from ..validate.stored import task_of_manifest as stored_task
 from ..validate.verify import LIMITS, Options, Report, verify
-from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, several, warn, write, write_json
+from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
 
 SHOWN = 20
 """Differences and faults that are told; the files hold all."""
@@ -48,6 +49,7 @@ class Settings:
     sample: int | None
     others: str
     seed: int | None
+    ycb: str | None
     json: str | None
     junit: str | None
     workers: Workers
@@ -87,7 +89,8 @@ def command(arguments: Arguments) -> int:
     for folder in folders:
         pool = Pool.open(folder)
         with ProgressBar(err, f"verify {folder}", len(pool), settings.workers) as progress_bar:
-            report = reports[folder] = verified(pool, options, search_path(arguments), progress_bar.show)
+            report = verified(pool, options, search_path(arguments), progress_bar.show)
+        report = reports[folder] = _with_scans(report, pool, settings.ycb)
         about = {key: value for key, value in vars(report).items() if key != "names"}
         plain[folder] = {"pool_sha256": pool.sha256, **about}
         _tell(pool, report)
@@ -123,6 +126,28 @@ def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report
         found, verdict = [("attack", str(error))], "declined"
     wrong = [{"id": name, "verdict": verdict, "reason": why} for name, why in found]
     return replace(report, failed=[*report.failed, *wrong], verdict=verdict) if wrong else report
+
+
+def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
+    """The report on a pool that holds so far, with what can be said of the scans that its manifest holds.
+
+    Raises:
+        BadConfig: a folder is given, and lacks one of them, or the pool holds none.
+    """
+    scans = pool.task_node.get("scans", {})
+    if folder is not None and not scans:
+        raise BadConfig(f"ycb = {cut(folder)}, but {pool.folder} holds no scans; leave it out")
+    if report.verdict != "sound" or not scans:
+        return report
+    told = f"{len(scans)} solids of scans ({', '.join(scans)})"
+    if folder is None:
+        why = "whether they are made of the files that the manifest names is not checked; give ycb=FOLDER for that"
+        return replace(report, remarks=[*report.remarks, f"{told} stand in the pool: {why}"])
+    task = stored_task(pool, config.task(pool.task))
+    if wrong := intake("ycb").other_files(task, folder):
+        failed = [{"id": "manifest.json", "verdict": "refuted", "reason": why} for why in wrong]
+        return replace(report, failed=[*report.failed, *failed], verdict="refuted")
+    return replace(report, remarks=[*report.remarks, f"{told} are those of the files in {folder}"])
 
 
 def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:

@@ -22,7 +22,7 @@ from typing import Any
 from filelock import FileLock
 
 from ..errors import BadConfig, ScengenError, cut, nearest
-from ..targets import refused
+from ..targets import cache_folder, refused
 
 READY = "ready"
 """The file that is written last: without it an environment is unfinished and made again."""
@@ -97,7 +97,7 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
         raise BadConfig(f"mujoco = {cut(mujoco)}; give whole versions, as in mujoco=[3.4.0,3.5.0]")
     shared = _shared()
     key = hashlib.sha256("\n".join([shared, platform.python_version(), sys.executable]).encode()).hexdigest()[:12]
-    folder = cache() / f"mujoco-{mujoco}-{key}"
+    folder = cache_folder() / f"mujoco-{mujoco}-{key}"
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with FileLock(folder.with_suffix(f"{folder.suffix}.lock")):
@@ -111,11 +111,6 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
     except OSError as error:
         raise refused(folder, error) from None
     return Environment(mujoco, folder)
-
-
-def cache() -> Path:
-    """Where environments are kept: `scengen` in the user's folder of cached files, as the XDG specification says."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "scengen")
 
 
 def _shared() -> str:

@@ -14,10 +14,11 @@ import numpy as np
 from ..assets.prop import TABLE_TOP, Prop, place, table
 from ..assets.turned import FOOT
 from ..errors import BadConfig, UnknownName, cut
+from ..geometry import Mat3
+from ..mesh_prop import MeshProp
 from ..sim.scene_text import emit
 from .feet import feet
 from .pieces import Pieces, Surface, cut_up, one_hull
-from .prop import MeshProp
 from .solid import UNITS, Solid, as_mesh, content, read
 
 WATER = 1000.0
@@ -114,6 +115,10 @@ class Taken:
     """The convex hull alone, for comparison."""
     prop: MeshProp
 
+    def turned(self, rot: Mat3) -> MeshProp:
+        """The asset turned from how its file shows it, to stand on what is then below."""
+        return _prop(self.request, self.solid, self.pieces, rot)
+
     @cached_property
     def rest(self) -> Rest:
         return dropped(self.prop)
@@ -166,10 +171,12 @@ def take_in(request: Request) -> Taken:
     return Taken(request, found, pieces, hull, _prop(request, found, pieces))
 
 
-def _prop(request: Request, found: Solid, pieces: Pieces) -> MeshProp:
+def _prop(request: Request, found: Solid, pieces: Pieces, rot: Mat3 | None = None) -> MeshProp:
     mesh = found.mesh
     mesh.density = request.mass / mesh.volume if request.mass else (request.density or WATER)
-    com, corners = np.asarray(mesh.center_mass), np.vstack(pieces.corners)
+    turn = np.eye(3) if rot is None else rot
+    parts = [points if rot is None else points @ rot.T for points in pieces.corners]
+    com, corners = turn @ np.asarray(mesh.center_mass), np.vstack(parts)
     stands = feet(corners, com)
     lowest = np.concatenate([corners[:, 2], stands[:, 2] - FOOT]).min()
     origin = np.array([com[0], com[1], lowest])
@@ -178,13 +185,13 @@ def _prop(request: Request, found: Solid, pieces: Pieces) -> MeshProp:
         look, tolerance = found.manifold.simplify(tolerance), 1.5 * tolerance
     seen = as_mesh(look)
     return MeshProp(
-        corners=tuple(points - origin for points in pieces.corners),
+        corners=tuple(points - origin for points in parts),
         feet=stands - origin,
-        vertices=np.asarray(seen.vertices) - origin,
+        vertices=np.asarray(seen.vertices) @ turn.T - origin,
         faces=np.asarray(seen.faces),
         mass=float(mesh.mass),
         com=com - origin,
-        inertia=np.asarray(mesh.moment_inertia),
+        inertia=turn @ np.asarray(mesh.moment_inertia) @ turn.T,
         friction=request.friction,
     )
 

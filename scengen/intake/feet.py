@@ -7,7 +7,7 @@ from manifold3d import Manifold
 
 from ..assets.turned import FEET, FOOT, PROUD
 from ..geometry import Vec3
-from .prop import Points
+from ..mesh_prop import Points
 
 LEVEL = 0.0003
 """How far above the plane that it stands on a corner may be to have a foot [m]."""

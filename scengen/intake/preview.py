@@ -8,10 +8,10 @@ import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, heading
+from ..mesh_prop import MeshProp
 from ..pictures.render import VIEWS, Picture, camera
 from ..sim.scene_text import emit
 from ..sim.world import JAW
-from .prop import MeshProp
 
 SIZE = 480
 """Edge of each half [pixels]."""

@@ -11,8 +11,8 @@ from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 
 from ..errors import BadConfig, UnknownName, cut, nearest
+from ..mesh_prop import Points
 from ..targets import remedy
-from .prop import Points
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in a unit."""

@@ -39,6 +39,7 @@ class Settings:
     seed: int = 0
     workers: Workers = 1
     pool: str | None = None
+    ycb: str | None = None
     keep: list[str] = field(default_factory=list)
     limit: int | None = None
     limit_seconds: float = 600.0

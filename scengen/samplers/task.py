@@ -1,14 +1,18 @@
 """Task: a scenario family plus the distributions that we test it on. One file each in conf/task/."""
 
+import hashlib
 import importlib
+import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ..assets.ycb import Scan, Ycb
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
+from ..mesh_prop import MeshProp
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
 from ..sim.world import EMBODIMENTS
@@ -22,7 +26,7 @@ from .split import ID, Part, Split
 REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
 LONGEST = 3600.0
 """Largest horizon of a task [s]: what a certificate may take, and far beyond any task."""
-OPTIONAL = ("axes", "certify", "embodiment", "limits")
+OPTIONAL = ("axes", "certify", "embodiment", "limits", "scans")
 
 
 @dataclass(frozen=True)
@@ -80,15 +84,25 @@ class Task:
     """Settings of the certificate that differ from conf/certify for this task."""
     node: Mapping[str, Any] = field(repr=False)
     """The file that all this was read from, with measured limits and what a command line changed."""
+    scans: Mapping[str, Scan] = field(default_factory=dict, repr=False)
+    """Solids in the place of the proxies of YCB objects, by `Ycb.called`."""
+
+    @cached_property
+    def nominal(self) -> Scenario:
+        """The family with its nominal parameters, and with the scans in the place of proxies."""
+        found = self.family()
+        if not self.scans:
+            return found
+        return replace(found, **{name: replace(thing, scans=self.scans) for name, thing in things(self.family).items()})
 
     @cached_property
     def known(self) -> dict[str, Parameter]:
         """The family's parameters by name."""
-        return {p.name: p for p in parameters(self.family())}
+        return {p.name: p for p in parameters(self.nominal)}
 
     def scenario(self, params: Mapping[str, Value]) -> Scenario:
         """The scenario with these parameter values, such as those of a pool's row."""
-        return with_values(self.family(), params)
+        return with_values(self.nominal, params)
 
     def of_paper(self, axis: Axis) -> bool:
         """Whether an axis is the one that the paper's table of OOD conditions (App. I) has for this task."""
@@ -209,7 +223,7 @@ class Task:
         index: int,
         design: Design,
     ) -> Iterator[Proposal]:
-        start, varied = trained or self.family(), [n for n, d in space.items() if not isinstance(d, Fixed)]
+        start, varied = trained or self.nominal, [n for n, d in space.items() if not isinstance(d, Fixed)]
         for attempt in range(design.tries if varied else 1):  # without anything varied all tries are the same
             quantiles = {name: design.number(name, seed, index, attempt) for name in varied}
             scenario = with_values(start, {n: d.quantile(quantiles.get(n, 0.5)) for n, d in space.items()})
@@ -262,6 +276,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
         axes,
         _group(f"{name}.certify", node.get("certify")),
         node,
+        _scans(name, family, _group(f"{name}.scans", node.get("scans"))),
     )
     _ = task.proofs
     for axis in task.axes.values():
@@ -269,6 +284,34 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
             for severity in range(1, axis.severities + 1):
                 task.axis(Part(axis.name, severity))
     return task
+
+
+def things(family: type[Scenario]) -> dict[str, Ycb]:
+    """The YCB objects of a family, by field."""
+    found = family()
+    every = {field.name: getattr(found, field.name) for field in fields(found)}
+    return {name: value for name, value in every.items() if isinstance(value, Ycb)}
+
+
+def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[str, Scan]:
+    """The scans that a task holds: each with the file that it was made of, and the solid itself.
+
+    Raises:
+        BadConfig: the family has no place for them, or one is no solid.
+    """
+    if node and not things(family):
+        raise BadConfig(f"{name}.scans: {family.__name__} has no YCB object; leave them out")
+    found = {}
+    for called, told in node.items():
+        where = f"{name}.scans.{cut(str(called))}"
+        _check_keys(where, _group(where, told), ("file", "sha256", "settings", "solid"), ())
+        try:
+            prop = MeshProp.read(told["solid"])
+        except (ValueError, TypeError) as error:
+            raise BadConfig(f"{where}.solid is no solid: {cut(str(error))}") from None
+        text = json.dumps(told["solid"], sort_keys=True)
+        found[str(called)] = Scan(hashlib.sha256(text.encode()).hexdigest(), prop)
+    return found
 
 
 def _family(name: str, path: Any) -> type[Scenario]:

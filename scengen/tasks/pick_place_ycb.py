@@ -223,6 +223,10 @@ class PickPlaceYcb(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     @property
+    def material(self) -> str:
+        return self.thing.scan.sha256 if self.thing.scan else ""
+
+    @property
     def start(self) -> Vec3:
         """Where the thing stands [m]."""
         return np.array([self.x, self.y, TABLE_TOP])

@@ -1,0 +1,111 @@
+"""A body of convex pieces, and how it is written in a manifest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from .assets.prop import Prop, Rgba, shown, solid
+from .assets.turned import FOOT
+from .geometry import Mat3, Vec3
+
+Points = NDArray[np.float64]
+"""Shape (n, 3) [m]."""
+
+DIGITS = 7
+"""Decimals of a length in a manifest [m]; what is simulated is always read from such numbers."""
+MOST = 100_000
+"""Numbers in an array of a manifest, at most."""
+SHAPES = {"feet": (-1, 3), "vertices": (-1, 3), "com": (3,), "inertia": (3, 3)}
+
+MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
+HUES: tuple[Rgba, ...] = (
+    (0.90, 0.62, 0.00, 1.0),
+    (0.34, 0.71, 0.91, 1.0),
+    (0.00, 0.62, 0.45, 1.0),
+    (0.94, 0.89, 0.26, 1.0),
+    (0.00, 0.45, 0.70, 1.0),
+    (0.84, 0.37, 0.00, 1.0),
+    (0.80, 0.47, 0.65, 1.0),
+)
+"""Colours that neighbouring pieces are told apart by (Okabe and Ito)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshProp(Prop):
+    """A body of convex pieces, with the mesh that they stand for to be looked at. It stands on z = 0.
+
+    Points are in axes that are parallel to the mesh file's; the origin is below the centre of mass.
+    """
+
+    corners: tuple[Points, ...]
+    """Vertices of each piece."""
+    feet: Points
+    """Centres of the spheres that it stands on."""
+    vertices: Points
+    faces: NDArray[np.int64]
+    """What is shown: vertices [m], and triangles, shape (n, 3)."""
+    mass: float
+    com: Vec3
+    inertia: Mat3
+    """About the centre of mass [kg m^2]."""
+    friction: float = 0.6
+    rgba: Rgba = (0.72, 0.66, 0.55, 1.0)
+    bare: bool = False
+    """Whether its pieces are shown instead of the mesh."""
+
+    def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        body.explicitinertial, body.mass, body.ipos = True, self.mass, self.com
+        i = self.inertia
+        body.fullinertia = np.array([*np.diag(i), i[0, 1], i[0, 2], i[1, 2]])
+        for k, points in enumerate(self.corners):
+            spec.add_mesh(name=f"piece_{k}", uservert=points.ravel().tolist())
+            piece = solid(body, f"piece_{k}", (), type=MESH, friction=self.friction, mass=0.0, rgba=HUES[k % len(HUES)])
+            piece.meshname, piece.group = f"piece_{k}", 0 if self.bare else 3
+        for k, foot in enumerate(self.feet):
+            solid(body, f"foot_{k}", [FOOT], foot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
+        if self.bare:
+            return
+        spec.add_mesh(name="look", uservert=self.vertices.ravel().tolist(), userface=self.faces.ravel().tolist())
+        shown(body, "look", self.rgba, type=MESH).meshname = "look"
+
+    def written(self) -> dict[str, Any]:
+        """The body as plain data, in which inertias keep all their digits."""
+        return {
+            "corners": [np.round(points, DIGITS).tolist() for points in self.corners],
+            "faces": self.faces.tolist(),
+            **{name: np.round(getattr(self, name), DIGITS).tolist() for name in ("feet", "vertices", "com")},
+            **{name: np.asarray(getattr(self, name)).tolist() for name in ("inertia", "mass", "friction")},
+        }
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> Self:
+        """The body that `written` gave.
+
+        Raises:
+            ValueError: that is none.
+        """
+        known = {field.name for field in fields(cls)} - {"rgba", "bare"}
+        if not isinstance(data, Mapping) or set(data) != known:
+            raise ValueError(f"expected {', '.join(sorted(known))}")
+        corners = tuple(_numbers("corners", points, (-1, 3)) for points in data["corners"])
+        arrays = {name: _numbers(name, data[name], shape) for name, shape in SHAPES.items()}
+        faces = _numbers("faces", data["faces"], (-1, 3)).astype(np.int64)
+        if not corners or not len(faces) or faces.min() < 0 or faces.max() >= len(arrays["vertices"]):
+            raise ValueError("its pieces or triangles are missing, or refer to nothing")
+        mass, friction = (float(_numbers(name, data[name], ())) for name in ("mass", "friction"))
+        return cls(corners=corners, faces=faces, mass=mass, friction=friction, **arrays)
+
+
+def _numbers(name: str, told: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Finite numbers as an array of a shape, in which -1 stands for any length."""
+    found = np.asarray(told, np.float64)
+    if not len(shape) and found.ndim == 0 and np.isfinite(found):
+        return found
+    fits = found.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, found.shape, strict=True))
+    if not fits or not shape or found.size > MOST or not np.isfinite(found).all():
+        raise ValueError(f"its {name} are no finite numbers of that shape")
+    return found
