@@ -328,7 +328,7 @@ class Ycb(Prop):
     @property
     def called(self) -> str:
         """What the object is called in `scans`: by its folder in the set, and by how it lies."""
-        return f"{self.row.folder}/low" if self.low else self.row.folder
+        return f"{self.row.folder}/low" if self.lies else self.row.folder
 
     @property
     def scan(self) -> Scan | None:
@@ -348,12 +348,23 @@ class Ycb(Prop):
         return ITEMS[self.item]
 
     @property
-    def prop(self) -> Prop:
-        """The solid, as it stands or lies."""
+    def lies(self) -> bool:
+        """Whether it is a carton that lies on its narrow side."""
         prop = self.row.prop
-        if self.low and isinstance(prop, Carton) and prop.height > prop.width:
+        return bool(self.low) and isinstance(prop, Carton) and prop.height > prop.width
+
+    @property
+    def prop(self) -> Prop:
+        """The proxy, as it stands or lies."""
+        prop = self.row.prop
+        if self.lies and isinstance(prop, Carton):
             return replace(prop, width=prop.height, height=prop.width)
         return prop
+
+    @property
+    def told(self) -> dict[str, float]:
+        """A feature of scenarios with a scan in the place of the proxy; none of others."""
+        return {"scanned": 1.0} if self.scan else {}
 
     @property
     def mass(self) -> float:

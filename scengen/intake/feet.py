@@ -25,7 +25,7 @@ def feet(corners: Points, com: Vec3) -> Points:
         corners: of all its pieces [m].
         com: centre of mass [m].
     """
-    side = _side(corners, com)
+    side = side_below(corners, com)
     if side is None:
         return np.zeros((0, 3))
     up, height = side
@@ -42,7 +42,7 @@ def feet(corners: Points, com: Vec3) -> Points:
     return base + inwards @ flat
 
 
-def _side(corners: Points, com: Vec3) -> tuple[Vec3, float] | None:
+def side_below(corners: Points, com: Vec3) -> tuple[Vec3, float] | None:
     """The unit vector from the side that a body stands on to the body, and that side's distance from the origin [m]."""
     hull = Manifold.hull_points(np.ascontiguousarray(corners)).to_mesh64()
     triangles = np.asarray(hull.vert_properties)[:, :3][np.asarray(hull.tri_verts, np.int64)]

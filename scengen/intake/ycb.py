@@ -12,14 +12,15 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from ..assets.prop import Prop
-from ..assets.ycb import ITEMS, Carton, Ycb, mesh_of
+from ..assets.ycb import ITEMS, Ycb, mesh_of
 from ..errors import BadConfig
-from ..geometry import Mat3, about_z
+from ..geometry import UP, Mat3, about_z, shortest
 from ..mesh_prop import Points
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
 from ..targets import cache_folder, try_folder, write
-from .asset import Request, key, take_in
+from .asset import Request, Taken, key, take_in
+from .feet import side_below
 from .solid import content
 
 LIES: Mat3 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -58,23 +59,24 @@ def other_files(task: Task, folder: str) -> list[str]:
 
 
 def _known(scans: Mapping[str, Any]) -> list[Ycb]:
-    every = [Ycb(item=item, low=low) for item in range(len(ITEMS)) for low in (0, 1)]
-    return [thing for thing in every if thing.called in scans]
+    every = {thing.called: thing for item in range(len(ITEMS)) for thing in (Ycb(item=item), Ycb(item=item, low=1))}
+    return [every[called] for called in scans]
 
 
 def _drawn(task: Task, split: str) -> list[Ycb]:
     """Every YCB object that may be drawn, in training or in the split."""
     found = {}
-    for name, thing in things(task.family).items():
+    for name in things(task.family):
         shifts = task.shifts(Split.parse(split))
         for space in (task.training, {**task.training, **shifts}):
             items, lows = (
                 sorted({int(interval.low) for interval in space[f"{name}.{what}"].support}) for what in ("item", "low")
             )
-            found |= {(item, low): thing for item in items for low in lows}
+            every = (Ycb(item=item, low=low) for item in items for low in lows)
+            found |= {thing.called: thing for thing in every}
     if not found:
         raise BadConfig(f"task {task.name} has no YCB object; leave ycb= out")
-    return [Ycb(item=item, low=low) for item, low in sorted(found)]
+    return [found[called] for called in sorted(found)]
 
 
 def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
@@ -82,7 +84,7 @@ def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
     path = mesh_of(folder, thing.row)
     request = Request(str(path), mass=thing.mass, friction=_friction(thing.row.prop))
     made_of = key(request, hashlib.sha256(content(request.mesh)).hexdigest())
-    kept = cache_folder() / "scans" / f"{made_of}-{thing.low}.json"
+    kept = cache_folder() / "scans" / f"{made_of}{'-low' * thing.lies}.json"
     if kept.is_file():
         return json.loads(kept.read_text())
     try_folder(kept.parent)
@@ -92,7 +94,7 @@ def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
         "file": f"{thing.row.folder}/{path.relative_to(Path(folder) / thing.row.folder)}",
         "sha256": taken.solid.sha256,
         "settings": {**figures["settings"], "versions": figures["versions"]},
-        "solid": taken.turned(_upright(thing, np.vstack(taken.pieces.corners))).written(),
+        "solid": taken.turned(_upright(thing, taken)).written(),
     }
     write(kept, json.dumps(found))
     return found
@@ -103,12 +105,19 @@ def _friction(proxy: Prop) -> float:
     return float(proxy.spec().compile().geom_friction[0, 0])
 
 
-def _upright(thing: Ycb, corners: Points) -> Mat3:
-    """The turn from a scan's axes to those of the proxy: about the vertical until its narrow side lies as there, and
-    to the side of a carton that lies on it. Scans of the set stand or lie as their proxies do, but askew."""
+def _upright(thing: Ycb, taken: Taken) -> Mat3:
+    """The turn from a scan's axes to those of the proxy: scans of the set stand or lie as their proxies do, but askew.
+
+    About the vertical, until the narrow side lies as the proxy's; to its side, if it is a carton that lies; and by
+    what the side that it then stands on is off the level: else it would turn as it comes to rest.
+    """
+    corners, com = np.vstack(taken.pieces.corners), np.asarray(taken.solid.mesh.center_mass)
     turn = about_z(_askew(corners, _broad(thing.row.prop)))
-    lies = thing.low and isinstance(thing.row.prop, Carton) and thing.prop is not thing.row.prop
-    return LIES @ turn if lies else turn
+    turn = LIES @ turn if thing.lies else turn
+    side = side_below(corners @ turn.T, turn @ com)
+    if side is None:
+        raise BadConfig(f"the scan of {thing.called} does not stand as its file shows it; turn it upright there")
+    return shortest(side[0], UP) @ turn
 
 
 def _askew(corners: Points, broad: float) -> float:

@@ -16,8 +16,8 @@ location; after 1-3 relocations, the patch locks in place":
   puts it down early and shoves it home gains nothing. The square never jumps to a place as near to the thing again.
 * It jumps a given way, to a place on the field in front of the robot, where all places can be reached.
 * Locked means that it lies with its dark side up; only then does it count. Nothing else shows it.
-* The objects are proxies, solids of their size, mass and balance (`assets.ycb`), not scans. Cartons lie on their narrow
-  side, as a jaw must take them; the master chef can of the paper's list is too wide for it.
+* The objects are proxies, solids of their size, mass and balance (`assets.ycb`), or scans where `ycb=FOLDER` is given.
+  Cartons lie on their narrow side, as a jaw must take them; the master chef can of the paper's list is too wide for it.
 """
 
 import functools
@@ -218,6 +218,7 @@ class PickPlaceYcb(Scenario):
             "near_over_size": self.near / self.patch.size,
             "size": self.patch.size,
             "mass": self.thing.mass,
+            **self.thing.told,
         }
 
     # --- geometry -------------------------------------------------------------------------

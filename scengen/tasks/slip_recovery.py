@@ -21,7 +21,8 @@ and "sliding the object is not allowed":
 * During the window the gripper is open whatever is commanded, and then obeys again. The window lasts longer than that
   fall: shorter ones are refuted.
 * Placed means: lifted again after the last slip, and let go in the region, at rest. What falls into it is not placed.
-* The paper names no YCB object. These are proxies, solids of their size, mass and balance (`assets.ycb`), not scans.
+* The paper names no YCB object. These are proxies, solids of their size, mass and balance (`assets.ycb`), or
+  scans where `ycb=FOLDER` is given.
 * Slid is what has gone `SLID` over the table pushed by the robot, all stretches added up: touched while it lay, and as
   long as it lies after that. Where it goes after a fall does not count.
 """
@@ -290,6 +291,7 @@ class SlipRecovery(Scenario):
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,
             "mass": self.thing.mass,
+            **self.thing.told,
             "narrow_side_along_the_way": abs(float(side)) / math.dist(self.start, self.goal),
         }
 
