@@ -375,6 +375,12 @@ class Ycb(Prop):
         (self.scan.prop if self.scan else self.prop).fill(body, spec)
 
 
+def by_name() -> dict[str, Ycb]:
+    """Every object by what it is called in `Ycb.scans`."""
+    every = (Ycb(item=item, low=low) for low in (0, 1) for item in range(len(ITEMS)))
+    return {thing.called: thing for thing in every}
+
+
 PLACES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")
 """Where the scan of an object lies in its folder, best first."""
 

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from ..assets.prop import Prop
-from ..assets.ycb import ITEMS, Ycb, mesh_of
+from ..assets.ycb import Ycb, by_name, mesh_of
 from ..errors import BadConfig
 from ..geometry import UP, Mat3, about_z, shortest
 from ..mesh_prop import Points
@@ -49,18 +48,13 @@ def other_files(task: Task, folder: str) -> list[str]:
         BadConfig: a scan is not there, or a mesh is no solid.
     """
     wrong = []
-    for thing in _known(task.scans):
-        told, made = task.node["scans"][thing.called], _scan(thing, folder)
+    for called, told in task.node["scans"].items():
+        made = _scan(by_name()[called], folder)
         if told["sha256"] != made["sha256"]:
-            wrong.append(f"the scan of {thing.called} was made of another file, {told['file']}")
+            wrong.append(f"the scan of {called} was made of another file, {told['file']}")
         elif told["settings"] == made["settings"] and told["solid"] != made["solid"]:
-            wrong.append(f"the solid of {thing.called} is not what is made of its file")
+            wrong.append(f"the solid of {called} is not what is made of its file")
     return wrong
-
-
-def _known(scans: Mapping[str, Any]) -> list[Ycb]:
-    every = {thing.called: thing for item in range(len(ITEMS)) for thing in (Ycb(item=item), Ycb(item=item, low=1))}
-    return [every[called] for called in scans]
 
 
 def _drawn(task: Task, split: str) -> list[Ycb]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
-from ..assets.ycb import Scan, Ycb
+from ..assets.ycb import Scan, Ycb, by_name
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..mesh_prop import MeshProp
 from ..params import Parameter, Value, parameters, with_values
@@ -301,16 +301,19 @@ def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[s
     """
     if node and not things(family):
         raise BadConfig(f"{name}.scans: {family.__name__} has no YCB object; leave them out")
-    found = {}
+    every, found = by_name(), {}
     for called, told in node.items():
         where = f"{name}.scans.{cut(str(called))}"
+        if called not in every:
+            raise UnknownName(f"scan of {name}", cut(str(called)), every)
         _check_keys(where, _group(where, told), ("file", "sha256", "settings", "solid"), ())
         try:
             prop = MeshProp.read(told["solid"])
         except (ValueError, TypeError) as error:
             raise BadConfig(f"{where}.solid is no solid: {cut(str(error))}") from None
         text = json.dumps(told["solid"], sort_keys=True)
-        found[str(called)] = Scan(hashlib.sha256(text.encode()).hexdigest(), prop)
+        sha256 = hashlib.sha256(text.encode()).hexdigest()
+        found[called] = Scan(sha256, replace(prop, rgba=getattr(every[called].prop, "rgba", prop.rgba)))
     return found
 
 
