@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 from typing import Any
 
 import mujoco
@@ -122,7 +123,7 @@ def judge(folder: str, search: Sequence[str], level: str, first: int | None, wor
     """
     pool = Pool.open(folder).check()
     task = task_of_manifest(pool, config.task(pool.task, search))
-    rows = (row for place, row in enumerate(pool.rows()) if first is None or place < first)
+    rows = islice(pool.rows(), first)
     return each(Judge(task, settings_of(pool.manifest["config"]["certify"]), level), rows, workers, limits, lost)
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from rich.table import Table
@@ -45,13 +46,11 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
     """
     scenarios = []
     for pool in pools:
-        certified = {row.id: _certified(row.certificate, row.horizon) for row in pool.rows(witness=False)}
+        certified = {row.id: _certified(row.certificate, row.horizon) for row in islice(pool.rows(witness=False), n)}
         judged = {
             mujoco: {one["id"]: one for one in told["judged"][str(pool.folder)]} for mujoco, told in found.items()
         }
-        for place, name in enumerate(pool.names()):
-            if n is not None and place >= n:
-                break
+        for name in islice(pool.names(), n):
             by = {mujoco: _entry(told[name.id]) for mujoco, told in judged.items()}
             about = {"pool": str(pool.folder), "task": pool.task, "id": name.id, "name": str(name)}
             scenarios.append({**about, "certificate": certified[name.id], "mujoco": by})
