@@ -57,7 +57,7 @@ class Directory:
     def twice(self) -> str:
         """An id that stands in two rows; empty if there is none."""
         same = np.flatnonzero(self._sorted[1:] == self._sorted[:-1])
-        return self._sorted[same[0]].decode() if len(same) else ""
+        return self.id(int(self._order[same[0]])) if len(same) else ""
 
     def find(self, text: str, name: Callable[[int], Name], where: str) -> int:
         """Place of the scenario of a name, see `names.find`.

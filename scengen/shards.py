@@ -219,7 +219,8 @@ def keys(path: Path, rows: int) -> tuple[NDArray[np.bytes_], NDArray[np.int64]]:
     ids, indices = [np.zeros(0, "S12")], [np.zeros(0, np.int64)]
     for batch in _small(path, ("id", "index"), rows):
         texts, numbers = (batch.column(name) for name in ("id", "index"))
-        if not pc.all(pc.match_substring_regex(texts, f"^{columns.ID.pattern}$"), min_count=0).as_py():
+        right = pc.match_substring_regex(texts, f"^{columns.ID.pattern}$")  # type: ignore[attr-defined]
+        if not pc.all(right, min_count=0).as_py():  # type: ignore[attr-defined]
             raise PoolError(f"{path} holds an id that is not of the form {columns.ID.pattern}; see scengen verify")
         ids.append(np.array(texts.to_pylist(), "S12"))
         indices.append(numbers.to_numpy())
