@@ -50,7 +50,7 @@ CALM = 0.02
 BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
 FIELD = np.array([[-0.22, 0.05], [-0.32, 0.32]])
-"""Where the middle of the square can be, in x and y [m]: 0.34 to 0.70 from the robot's first axis, where a hand that
+"""Where the middle of the square can be, in x and y [m]: 0.34 to 0.69 from the robot's first axis, where a hand that
 points down comes without leaning or folding up."""
 APART = 0.03
 """By how much farther than `near` the thing is from the square after any jump [m]."""
