@@ -90,7 +90,7 @@ class Task:
     @cached_property
     def nominal(self) -> Scenario:
         """The family with its nominal parameters, and with the scans in the place of proxies."""
-        found = self.family()
+        found: Any = self.family()
         if not self.scans:
             return found
         return replace(found, **{name: replace(thing, scans=self.scans) for name, thing in things(self.family).items()})
@@ -288,7 +288,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
 
 def things(family: type[Scenario]) -> dict[str, Ycb]:
     """The YCB objects of a family, by field."""
-    found = family()
+    found: Any = family()
     every = {field.name: getattr(found, field.name) for field in fields(found)}
     return {name: value for name, value in every.items() if isinstance(value, Ycb)}
 
