@@ -92,7 +92,7 @@ class MeshProp(Prop):
         if not isinstance(data, Mapping) or set(data) != known:
             raise ValueError(f"expected {', '.join(sorted(known))}")
         corners = tuple(_numbers("corners", points, (-1, 3)) for points in data["corners"])
-        arrays = {name: _numbers(name, data[name], shape) for name, shape in SHAPES.items()}
+        arrays: dict[str, Any] = {name: _numbers(name, data[name], shape) for name, shape in SHAPES.items()}
         faces = _numbers("faces", data["faces"], (-1, 3)).astype(np.int64)
         if not corners or not len(faces) or faces.min() < 0 or faces.max() >= len(arrays["vertices"]):
             raise ValueError("its pieces or triangles are missing, or refer to nothing")
