@@ -41,7 +41,7 @@ wheel:
 
 # Tests that simulate for minutes: coverage of intervals, power.
 slow: setup
-	$(BIN)/python -m pytest -n 2 -m slow
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
 
 # The commands of the README as they are written, but for the long ones; ALL=all runs those too: hours.
 ALL ?=
