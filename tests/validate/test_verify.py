@@ -367,6 +367,7 @@ def test_a_false_claim_of_a_manifest_is_noticed(mine, name):
 def test_older_software_is_declined(mine):
     of = Pool.open(mine)
     older = {**of.versions, "mujoco": "3.3.0"}
+    (mine / "scengen.lock").unlink()  # which tells of the other
     pool.write(mine, {**of.about, "versions": older}, [certificate_of(r, versions=older) for r in of.rows()])
     found = report(mine)
     assert found.verdict == "declined" and "certified with mujoco 3.3.0" in found.failed[0]["reason"]
