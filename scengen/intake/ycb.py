@@ -69,7 +69,7 @@ def _drawn(task: Task, split: str) -> list[Ycb]:
             every = (Ycb(item=item, low=low) for item in items for low in lows)
             found |= {thing.called: thing for thing in every}
     if not found:
-        raise BadConfig(f"task {task.name} has no YCB object; leave ycb= out")
+        raise BadConfig(f"task {task.name} has no YCB object; name one that has, or leave ycb= out")
     return [found[called] for called in sorted(found)]
 
 

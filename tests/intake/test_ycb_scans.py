@@ -103,7 +103,7 @@ def test_a_pool_with_scans_stands_alone(folder, tmp_path, capsys):
     ("arguments", "says"),
     [
         (["task=pick_place_ycb"], "no folder 005_tomato_soup_can"),
-        (["task=domino_single"], "task domino_single has no YCB object; leave ycb= out"),
+        (["task=domino_single"], "task domino_single has no YCB object; name one that has, or leave ycb= out"),
         (["task=pick_place_ycb", ONE, "ycb=nowhere"], "ycb = nowhere is no folder"),
     ],
 )
