@@ -4,7 +4,6 @@ import importlib.util
 import os
 import secrets
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -13,13 +12,13 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-import numpy as np
 import pytest
+from faults import lost, work
 
 from scengen import cli, cluster, config
 from scengen.cluster import QUIET, Cluster, ClusterError, about
 from scengen.commands.verify import Settings as Asked
-from scengen.errors import BadConfig, ScengenError, UnknownName
+from scengen.errors import BadConfig, ScengenError
 from scengen.parallel import Executor, Limits, WorkerDied, each
 from scengen.runs.progress import ProgressBar
 
@@ -32,27 +31,9 @@ def on_nodes(test):
     return pytest.mark.slow(pytest.mark.xdist_group("cluster")(test))
 
 
-def work(item):
-    if item == "hang":
-        time.sleep(60)
-    if item == "crash":
-        os.kill(os.getpid(), signal.SIGSEGV)
-    if item == "memory":
-        np.ones(100_000_000)
-    if item == "error":
-        raise UnknownName("letter", "x", "ab")
-    if item == "kill":  # the worker that has started this process
-        os.kill(os.getppid(), signal.SIGKILL)
-    return item
-
-
 def node_of(item):
     time.sleep(0.3)  # so that every worker gets some
     return os.environ.get("ODD", "like ours")
-
-
-def lost(item, reason):
-    return f"{item} {reason}"
 
 
 # --- without a cluster ------------------------------------------------------------------------------

@@ -4,32 +4,16 @@ import os
 import signal
 import time
 
-import numpy as np
 import pytest
+from faults import lost, work
 
 from scengen import parallel
 from scengen.commands.verify import Settings as Asked
 from scengen.config import read
-from scengen.errors import BadConfig, UnknownName
+from scengen.errors import BadConfig
 from scengen.parallel import Limits, WorkerDied, cores, each
 
 LIMITS = Limits(0.5, 200)
-
-
-def work(item):
-    if item == "hang":
-        time.sleep(60)
-    if item == "crash":
-        os.kill(os.getpid(), signal.SIGSEGV)
-    if item == "memory":
-        np.ones(100_000_000)
-    if item == "error":
-        raise UnknownName("letter", "x", "ab")
-    return item
-
-
-def lost(item, reason):
-    return f"{item} {reason}"
 
 
 @pytest.mark.parametrize("workers", [1, 3])
