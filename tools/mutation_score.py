@@ -176,8 +176,8 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
 
 
 def flagged(task: str) -> dict[str, Any]:
-    """How many varied runs of the oracle lack a contact that is taken for causal."""
-    runs, lacking = 0, []
+    """How many varied runs of the oracle lack a contact that is taken for causal, and which."""
+    runs, taken, lacking = 0, 0, set()
     subjects = drawn(config.task(task), "id", 4, 7)
     for subject in subjects:
         arena = arena_of(subject)
@@ -188,8 +188,10 @@ def flagged(task: str) -> dict[str, Any]:
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
             if rollout.solved:
                 runs += 1
-                lacking += sorted(causal.lacking(pairs(world)))
-    return {"task": task, "mutant": "", "runs": runs, "flagged": lacking}
+                found = causal.lacking(pairs(world))
+                taken += bool(found)
+                lacking |= found
+    return {"task": task, "mutant": "", "runs": runs, "flagged": taken, "lacking": sorted(lacking)}
 
 
 def _hit(arena: Arena, attempt: Attempt, played: Any) -> Hit:
@@ -218,8 +220,8 @@ def _summary(records: Sequence[dict[str, Any]]) -> str:
         hits, all_hits = sum(bool(r[what]) for r in exploited), sum(bool(r[what]) for r in scores)
         lines.append(f"{what}: {hits} of {len(exploited)}, {all_hits} of all")
     varied = [record for record in records if not record["mutant"]]
-    runs = sum(record["runs"] for record in varied)
-    lines.append(f"varied oracle runs flagged: {sum(bool(r['flagged']) for r in varied)} tasks, of {runs} runs")
+    runs, taken = (sum(record[what] for record in varied) for what in ("runs", "flagged"))
+    lines.append(f"varied oracle runs flagged: {taken} of {runs}")
     return "\n".join(lines)
 
 

@@ -2,8 +2,9 @@
 
 First a hypercube over all regions outside training, one or two parameters at a time, each point in a twin of its own.
 Then a forest learns from it, and points are tried where it is least sure: at the edges of what was found. What two
-parameters do together is tried with one of them alone. What is left is confirmed on fresh twins, each beside its
-control, and only that counts: a search among hundreds of points finds something by luck.
+parameters do together is tried with one of them alone, and what broke a memory is tried again, and around it, until
+it is known where it ends. What is left is confirmed on fresh twins, each beside its control, and only that counts: a
+search among hundreds of points finds something by luck.
 
 One trial is a memory played in one scenario, and its oracle where the memory fails.
 """
@@ -19,6 +20,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from scipy.stats import binomtest
+from scipy.stats.qmc import Halton
 
 from ..errors import BadConfig, ScengenError
 from ..log import Log
@@ -42,12 +44,20 @@ BREAKS, HOLDS, UNSOLVED, UNSOUND, INFEASIBLE = "breaks", "holds", "unsolved", "u
 scene fails a check that comes before the oracle; a constraint does not hold."""
 TWINS = 8
 """Training scenarios whose memories are played while searching."""
-FRESH, DRAWS = 10, 5
+FRESH, DRAWS = 20, 5
 """Twins in which a finding is confirmed, each in a scenario of its own, and draws until that is feasible."""
-SHARES = (0.4, 0.7, 0.8)
-"""Which share of the budget is spent when the hypercube ends, the forest ends, the shrinking ends."""
+MISSES = 5
+"""A box that fails so many of them is given up, and counts as if it failed all that are left."""
+SHARES = (0.35, 0.55, 0.7)
+"""Which share of the budget is spent when the hypercube ends, the forest ends, the narrowing ends."""
 BATCH = 8
-"""Points that are tried before the forest learns anew."""
+"""Points that are tried before the forest learns anew, or boxes are drawn anew."""
+CANDIDATES = 12
+"""How many boxes are narrowed, those with most evidence first."""
+AROUND = 0.3
+"""How far around a box it is tried [shares of the box, and at least 0.05 of the region]."""
+EVIDENCE = 3
+"""So many more breaks than twice the other outcomes must a box hold to be confirmed."""
 POOL = 4000
 """Points among which the forest chooses."""
 LEVEL = 0.05
@@ -136,9 +146,12 @@ def discover(
         else:
             asked.ask("hypercube", _hypercube(ends[1] - asked.spent, len(known), random))
         asked.ask("shrink", _alone(asked.records)[: max(0, ends[2] - asked.spent)])
-        boxes = _boxes(asked.records)
-        room = max(1, (settings.budget - asked.spent) // FRESH)
-        tested = [(box, asked.confirm(number, box)) for number, box in enumerate(boxes[:room])]
+        while asked.spent < ends[2] and (around := _around(asked.records)):
+            asked.ask("narrow", around[: ends[2] - asked.spent])
+        tested = list[tuple[_Box, list[dict[str, Any]]]]()
+        for score, box in _boxes(asked.records):
+            if score >= EVIDENCE and asked.spent + FRESH <= settings.budget:
+                tested.append((box, asked.confirm(len(tested), box)))
     found = [_finding(task, known, box, asked.records, outcomes) for box, outcomes in tested]
     sure = _holm(found)
     return Search(
@@ -186,11 +199,16 @@ class _Asked:
         self._run(partial(_try, self.trials), items)
 
     def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
-        """Try a box in fresh twins."""
-        begin = self.spent
-        items = [_Item(begin + k, "confirm", box.ranges, TWINS + number * FRESH + k) for k in range(FRESH)]
-        self._run(partial(_confirm, self.trials), items)
-        return self._numbered(begin)
+        """Try a box in fresh twins, some at a time, until all are tried or too many of them fail."""
+        begin, outcomes = self.spent, list[dict[str, Any]]()
+        for first in range(0, FRESH, MISSES):
+            some = range(first, first + MISSES)
+            items = [_Item(begin + k, "confirm", box.ranges, TWINS + number * FRESH + k) for k in some]
+            self._run(partial(_confirm, self.trials), items)
+            outcomes = self._numbered(begin)
+            if len(outcomes) - _confirmed(outcomes) >= MISSES:
+                break
+        return outcomes
 
     def _run(self, work: Callable[["_Item"], dict[str, Any]], items: Sequence["_Item"]) -> None:
         tried = {record["number"] for record in self.log.records}
@@ -357,6 +375,25 @@ def _alone(records: list[dict[str, Any]]) -> list[tuple[Point, int]]:
     ]
 
 
+def _around(records: list[dict[str, Any]]) -> list[tuple[Point, None]]:
+    """A point in each of the boxes with most evidence, or a little outside: where does it end?
+
+    Points of one box come evenly spread, however many there will be (Halton's).
+    """
+    points = list[tuple[Point, None]]()
+    for _, box in _boxes(records)[:CANDIDATES]:
+        keys = {i for i, *_ in box.ranges}
+        tried = sum(r["stage"] == "narrow" and {int(i) for i, _ in r["point"]} == keys for r in records)
+        shares = Halton(len(keys), scramble=False).fast_forward(tried + 1).random()[0]
+        place = list[tuple[int, float]]()
+        for share, (i, low, high) in zip(shares, box.ranges, strict=True):
+            spare = max(AROUND * (high - low), 0.05)
+            begin, end = max(0.0, low - spare), min(1.0, high + spare)
+            place.append((i, round(begin + float(share) * (end - begin), 6)))
+        points.append((tuple(place), None))
+    return points
+
+
 # --- what was found -----------------------------------------------------------------------------
 
 
@@ -373,8 +410,8 @@ class _Box:
         )
 
 
-def _boxes(records: list[dict[str, Any]]) -> list[_Box]:
-    """Boxes in which memories broke, those with most evidence first; pairs only where neither does it alone."""
+def _boxes(records: list[dict[str, Any]]) -> list[tuple[int, _Box]]:
+    """Boxes in which memories broke with their evidence, most first; pairs only where neither does it alone."""
     where: dict[tuple[int, ...], list[dict[str, Any]]] = {}
     for record in records:
         where.setdefault(tuple(int(i) for i, _ in record["point"]), []).append(record)
@@ -386,7 +423,7 @@ def _boxes(records: list[dict[str, Any]]) -> list[_Box]:
         if best := _best(key, where[key]):
             found.append(best)
             alone.update(key if len(key) == 1 else ())
-    return [box for _, box in sorted(found, key=lambda f: (-f[0], len(f[1].ranges), f[1].ranges))]
+    return sorted(found, key=lambda f: (-f[0], len(f[1].ranges), f[1].ranges))
 
 
 def _best(key: tuple[int, ...], records: list[dict[str, Any]]) -> tuple[int, _Box] | None:
@@ -403,12 +440,7 @@ def _best(key: tuple[int, ...], records: list[dict[str, Any]]) -> tuple[int, _Bo
             size = sum(high - low for _, low, high in ranges)
             if best is None or (score, size) > best[:2]:
                 best = (score, size, box)
-    if best is None:
-        return None
-    grown = tuple(
-        (i, round(max(0.0, low - 0.02), 6), round(min(1.0, high + 0.02), 6)) for i, low, high in best[2].ranges
-    )
-    return best[0], _Box(grown)
+    return (best[0], best[2]) if best else None
 
 
 def _finding(
@@ -416,15 +448,19 @@ def _finding(
 ) -> Finding:
     moved = {known[i].parameter.name: _dist(known[i], low, high) for i, low, high in box.ranges}
     name = "_and_".join(known[i].name for i, *_ in box.ranges)
-    confirmed = sum(r["outcome"] == BREAKS and r["control"] for r in outcomes)
+    confirmed = _confirmed(outcomes)
     why = f"An object-centric memory fails in {confirmed} of {len(outcomes)} fresh twins that the oracle solves."
     single = len(box.ranges) == 1 and known[box.ranges[0][0]].beyond and not known[box.ranges[0][0]].parameter.integer
     axis = Axis(name, why, "scengen discover", moved, 5 if single else 0)
     inside = [r["outcome"] for r in records if box.holds(r["point"]) and r["outcome"] != INFEASIBLE]
     same = [a.name for a in task.axes.values() if any(_same(known[i], a.replace) for i, *_ in box.ranges)]
-    test = binomtest(confirmed, max(1, len(outcomes)), CHANCE, "greater").pvalue
+    test = binomtest(confirmed, FRESH, CHANCE, "greater").pvalue
     seen, fresh = inside.count(BREAKS), len(outcomes)
     return Finding(axis, task.prove(axis), seen, len(inside), confirmed, fresh, float(test), tuple(same))
+
+
+def _confirmed(outcomes: list[dict[str, Any]]) -> int:
+    return sum(r["outcome"] == BREAKS and r["control"] for r in outcomes)
 
 
 def _dist(region: Region, low: float, high: float) -> Dist:
