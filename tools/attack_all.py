@@ -32,7 +32,7 @@ witness, and what the family says is asked for.
 * **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, given one after
   the other without looking: share of fresh draws that they solve, and its bound. "-" where what is asked for is no
   number, or where a wrong answer ends the episode.
-* **refuting**: hits that lack a contact which the oracle has in its witness and in twenty varied runs: a way around the
+* **refuting**: hits that lack a contact which the oracle has in its witness and in forty varied runs: a way around the
   task. There may be none; whoever finds one, please tell us. (The three of `ramp_sort` are its own witness played
   faster: two balls do not meet in their bin.)
 

@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 from .. import config
+from ..analysis.redraw import task_of
 from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
@@ -60,7 +61,7 @@ def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Su
         task = config.task(name, [*search_path(arguments), *others])
         return task, drawn(task, settings.split, settings.n, settings.seed)
     pool = Pool.open(str(settings.pool)).check()
-    task = config.task(pool.task, search_path(arguments))
+    task = task_of(pool, search_path(arguments))
     if not (subjects := certified(task, islice(pool.rows(), settings.n))):
         raise BadConfig(f"{pool.folder} holds no scenario; nothing can be attacked")
     return task, subjects

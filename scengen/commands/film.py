@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import config
-from ..attack.evidence import Hit
+from ..analysis.redraw import task_of
+from ..attack.campaign import task_of_hit
+from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..config import read
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
@@ -44,7 +45,7 @@ class Settings:
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that make no sense."""
-        if (self.hit is None) == (self.pool is None or self.id is None):
+        if (self.hit is None) == (self.pool is None or self.id is None) or (self.hit and self.id):
             raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; name a .png file for a film strip, an .mp4 file for a video")
@@ -71,8 +72,9 @@ def command(arguments: Arguments) -> int:
 
 def _of_pool(settings: Settings, arguments: Arguments) -> Take:
     """The witness of a scenario in a pool, or one of its shortcuts."""
-    row = check_row(chosen(holder(settings.pool, str(settings.id)), str(settings.id)))
-    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
+    pool = holder(settings.pool, str(settings.id))
+    row = check_row(chosen(pool, str(settings.id)))
+    scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     if settings.of == WITNESS:
         return Take.witness(row, scenario)
     take, rollout = shortcut(row, scenario, settings.of, settings.raw)
@@ -84,7 +86,9 @@ def _of_pool(settings: Settings, arguments: Arguments) -> Take:
 def _hit(settings: Settings, arguments: Arguments) -> Take:
     """What the adversary did."""
     hit = Hit.load(Path(str(settings.hit)))
-    task = config.task(hit.task, search_path(arguments))
+    task = task_of_hit(hit, settings.pool, search_path(arguments))
     scenario = task.scenario(hit.params)
+    if scenario.id != hit.scenario:
+        raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")
     say(str(hit))
     return Take(scenario, scene_text.emit(scenario.build())[0], task.embodiment, hit.actions)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import config
 from ..analysis.redraw import task_of
 from ..config import read
 from ..errors import BadConfig, at_least
@@ -58,11 +57,12 @@ def command(arguments: Arguments) -> int:
         if target and target.suffix != ".png":
             raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")
         try_file(target)
-        row = chosen(holder(settings.pool, settings.id), settings.id)
+        pool = holder(settings.pool, settings.id)
+        row = chosen(pool, settings.id)
         for table in report.scenario_tables(row):
             out.print(table)
         if target:
-            scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
+            scenario = task_of(pool, search_path(arguments)).scenario(row.params)
             write(target, render.encode(film.strip(film.Take.witness(check_row(row), scenario)), "png"))
     if target:
         say(f"wrote {target}")

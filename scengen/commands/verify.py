@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .. import config
-from ..attack.campaign import wrong_hits
+from ..attack.campaign import task_of_hit, wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read
@@ -68,11 +68,11 @@ def command(arguments: Arguments) -> int:
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
     try_file(settings.json)
     try_file(settings.junit)
-    if (settings.pool is None) == (settings.hits is None):
-        raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
     if settings.hits is not None:
-        return _hits(settings.hits, arguments)
-    folders = several(settings.pool or "")
+        return _hits(settings.hits, settings.pool, search_path(arguments))
+    if settings.pool is None:
+        raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
+    folders = several(settings.pool)
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     options = Options(
         settings.level,
@@ -121,7 +121,7 @@ def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report
         return report
     verdict: Verdict = "refuted"
     try:
-        found = apart(_wrong_hits, (pool, task), limits, "replaying the hits of its attack")
+        found = apart(_wrong_hits, (pool, stored_task(pool, task)), limits, "replaying the hits of its attack")
     except WorkerDied as error:
         found, verdict = [("attack", str(error))], "declined"
     wrong = [{"id": name, "verdict": verdict, "reason": why} for name, why in found]
@@ -154,7 +154,7 @@ def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
     return list(wrong_hits(*of))
 
 
-def _hits(hits: str, arguments: Arguments) -> int:
+def _hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
     """Replay hits of the adversary: files, or all of a folder."""
     paths = sorted(Path(hits).glob("*.npz")) if Path(hits).is_dir() else [Path(hits)]
     if not paths:
@@ -162,7 +162,7 @@ def _hits(hits: str, arguments: Arguments) -> int:
     wrong = 0
     for path in paths:
         hit = Hit.load(path)
-        reason = unsound(hit, config.task(hit.task, search_path(arguments)))
+        reason = unsound(hit, task_of_hit(hit, pool, search))
         wrong += bool(reason)
         say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from .. import config
+from ..analysis.redraw import task_of
 from ..config import read
 from ..pictures.view import check_display, view
 from ..task_files import search_path
@@ -21,8 +21,9 @@ class Settings:
 
 def command(arguments: Arguments) -> int:
     settings = read("view", arguments, Settings)
-    row = chosen(holder(settings.pool, settings.id), settings.id)
-    scenario = config.task(row.task, search_path(arguments)).scenario(row.params)
+    pool = holder(settings.pool, settings.id)
+    row = chosen(pool, settings.id)
+    scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     check_display()
     check_row(row)
     view(row, scenario, settings.replay)

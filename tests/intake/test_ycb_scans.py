@@ -80,6 +80,21 @@ def test_another_scan_is_another_scenario(folder, tmp_path):
     assert len({t.draw("id", 0, 1).scenario.id for t in tasks}) == 2
 
 
+def test_a_pool_with_scans_is_attacked_as_it_is(folder, tmp_path, capsys):
+    pool, found = tmp_path / "pool", tmp_path / "found"
+    made = ["generate", "task=pick_place_ycb", ONE, "n=1", "limit=12", "attack=8", f"ycb={folder}", f"pool={pool}"]
+    assert cli.run(made) == 0
+    assert cli.run(["verify", f"pool={pool}", "level=replay"]) == 0, "the hits that it tells of are replayed with scans"
+    assert cli.run(["attack", f"pool={pool}", "budget=12", f"to={found}"]) == 0
+    assert list(found.glob("*.npz")), "a perturbed witness still reaches the goal"
+    capsys.readouterr()
+    assert cli.run(["verify", f"hits={found}", f"pool={pool}"]) == 0
+    assert cli.run(["verify", f"hits={found}"]) == 1
+    assert "one of a pool with scans needs pool=FOLDER too" in capsys.readouterr().out
+    assert cli.run(["film", f"hit={next(found.glob('*.npz'))}", f"to={tmp_path / 'film.png'}"]) == 2
+    assert "one of a pool with scans needs pool=FOLDER too" in capsys.readouterr().err
+
+
 def test_what_a_split_draws_needs_a_scan_too(folder):
     with pytest.raises(BadConfig, match="no folder 008_pudding_box .*; known: 004_sugar_box"):
         with_scans(task(), "unseen_item", str(folder))
