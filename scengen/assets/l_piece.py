@@ -34,14 +34,14 @@ class LPiece(Prop):
     The paper gives no sizes (App. B, T33); an arm must be wide enough for a 27 mm suction cup.
     """
 
-    width: float = param(0.080, "m", 0.03, 0.30)
-    length: float = param(0.080, "m", 0.03, 0.30)
+    width: float = param(0.080, "m", 0.03, 0.40)
+    length: float = param(0.080, "m", 0.03, 0.40)
     upright: float = param(0.038, "m", 0.01, 0.20)
     lying: float = param(0.038, "m", 0.01, 0.20)
     thickness: float = param(0.020, "m", 0.006, 0.05)
     rounding: float = param(0.003, "m", 0.0005, 0.005)
     """Radius of the lower edges, as a moulded or sanded piece has them."""
-    mass: float = param(0.060, "kg", 0.005, 1.0)
+    mass: float = param(0.060, "kg", 0.001, 10.0)
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: Rgba = (0.86, 0.55, 0.24, 1.0)
 

@@ -46,9 +46,10 @@ from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, between, corners, gap, yaw_of
 from ..params import check_bounds, param
+from ..physics import GRAVITY
 from ..predicates import fallen, inside
 from ..robots.panda import WRIST_MIDDLE
-from ..robots.suction import REACHES
+from ..robots.suction import PULL, REACHES
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, facing_down, go_to, retreat, until
@@ -243,6 +244,8 @@ class Packing(Scenario):
         yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=floor)
         narrow = min(min(piece.upright, piece.lying) for piece in self.pieces)
         yield require(narrow >= 2 * REACHES, "an arm is too narrow for the cup", arm=narrow, cup=2 * REACHES)
+        weight = GRAVITY * max(piece.mass for piece in self.pieces)
+        yield require(weight <= PULL / 2, "a piece is too heavy for the cup", weight=weight, most=PULL / 2)
         near = self._nearest()
         yield require(near >= APART, "the pieces or the bin overlap at the start", distance=near, least=APART)
         poses = [(i, *pose) for i in range(self.count) for pose in (self.start(i), self.goal(i))]

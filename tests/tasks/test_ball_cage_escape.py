@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -19,8 +18,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.ball import Ball
@@ -259,9 +256,3 @@ def test_every_constraint_refutes_for_its_own_reason():
             BallCageEscape(x=0.268, y=0.268, stool=Stool(height=0.021)),
         ]
     )
-
-
-@given(scenario=anywhere(BallCageEscape))
-@settings(max_examples=60, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -5,9 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controls import ablated, builds_or_is_refuted, each_refuted_for_its_own_reason, load, play_shortcut, replayed
-from helpers import anywhere
-from hypothesis import given, settings
+from controls import ablated, each_refuted_for_its_own_reason, load, play_shortcut, replayed
 
 from scengen import config
 from scengen.assets.ball import Ball
@@ -137,9 +135,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
             replace(BACK, aim=0.0, speed=0.1, enclosure=Enclosure(restitution=0.3)),
         ]
     )
-
-
-@given(scenario=anywhere(BounceIntercept))
-@settings(max_examples=30, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     parked,
@@ -17,8 +16,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.bowl import Bowl
@@ -190,12 +187,6 @@ def test_every_constraint_refutes_what_violates_it():
             BowlTable(goal_x=0.3, goal_y=-0.3),
         ]
     )
-
-
-@settings(deadline=None, max_examples=20)
-@given(anywhere(BowlTable))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)
 
 
 def test_no_finger_gets_in_beside_the_rim_and_each_thing_is_on_its_own_side_in_training():

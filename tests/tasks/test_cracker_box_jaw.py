@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     play,
@@ -16,8 +15,6 @@ from controls import (
     solution,
     unchecked,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.params import values, with_values
@@ -116,9 +113,3 @@ def test_whether_it_passes_is_a_matter_of_shape_alone():
         scenario = replace(NOMINAL, box=replace(BOX, scale=scale), clearance=NOMINAL.clearance * scale / BOX.scale)
         assert scenario.passes / scale == pytest.approx(NOMINAL.passes / BOX.scale)
     assert NOMINAL.passes > PASSES
-
-
-@settings(deadline=None, max_examples=20)
-@given(anywhere(CrackerBoxJaw))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)

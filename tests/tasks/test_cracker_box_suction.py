@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     play,
@@ -17,8 +16,6 @@ from controls import (
     solution,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.geometry import UP, about_z, axes
@@ -180,9 +177,3 @@ def test_the_largest_box_that_is_carried_by_its_side_is_that_of_the_law():
     largest = (TORQUE / 1.5 / torque) ** 0.25
     for scale, carried in ((largest - 0.01, True), (largest + 0.01, False)):
         assert (replace(NOMINAL, box=replace(BOX, scale=scale)).infeasible() is None) == carried
-
-
-@settings(deadline=None, max_examples=20)
-@given(anywhere(CrackerBoxSuction))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)

@@ -8,15 +8,12 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
     not_certified,
     play_shortcut,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.prop import TABLE_TOP
@@ -201,9 +198,3 @@ def test_every_refutation_has_its_own_reason():
             )
         ]
     )
-
-
-@given(scenario=anywhere(CupExtract))
-@settings(max_examples=20, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     not_certified,
     play_shortcut,
     replayed,
     unguarded,
 )
-from helpers import anywhere
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,9 +121,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     """What certificates make of scenes that are tampered with is in tests/validate/test_certify.py."""
     chains = DominoSingle(gap_ratio=2.2), DominoSingle(x=0.35), DominoSingle(count=2, x=0.34, y=0.34, heading=-135.0)
     each_refuted_for_its_own_reason(chains)
-
-
-@given(scenario=anywhere(DominoSingle))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -8,7 +8,6 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -19,8 +18,6 @@ from controls import (
     spared,
     unchecked,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.board import Board
@@ -204,9 +201,3 @@ def test_every_refutation_has_its_own_reason():
             EdgeSlide(x=0.34),
         ]
     )
-
-
-@given(scenario=anywhere(EdgeSlide))
-@settings(max_examples=60, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

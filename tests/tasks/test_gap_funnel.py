@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -16,8 +15,6 @@ from controls import (
     solution,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.ball import Ball
@@ -127,9 +124,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
             replace(PLAIN, wall_x=0.29, run=0.05, gap_y=0.3, offset=-0.1),
         ]
     )
-
-
-@given(scenario=anywhere(GapFunnel))
-@settings(max_examples=25, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -8,7 +8,6 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -17,8 +16,6 @@ from controls import (
     replayed,
     spared,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.geometry import UP
@@ -173,9 +170,3 @@ def test_every_refutation_has_its_own_reason():
             replace(NOMINAL, block_2=Spot(x=0.0, y=0.19)),
         ]
     )
-
-
-@given(scenario=anywhere(IndirectPush))
-@settings(max_examples=60, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

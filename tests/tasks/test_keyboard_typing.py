@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -17,8 +16,6 @@ from controls import (
     replayed,
     solution,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.glyph import STROKES
@@ -292,9 +289,3 @@ def test_every_constraint_refutes_what_violates_it():
             KeyboardTyping(x=-0.2, y=0.1, yaw=-10.0),
         ]
     )
-
-
-@settings(deadline=None, max_examples=15)
-@given(anywhere(KeyboardTyping))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)

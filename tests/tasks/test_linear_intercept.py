@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     play,
     play_shortcut,
     replayed,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.ball import Ball
@@ -107,9 +104,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
             LinearIntercept(ball=Ball(radius=0.035, density=1200.0)),
         ]
     )
-
-
-@given(scenario=anywhere(LinearIntercept))
-@settings(max_examples=30, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

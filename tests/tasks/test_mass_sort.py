@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -17,8 +16,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.attack.priors import fit
@@ -185,9 +182,3 @@ def test_a_scene_in_the_order_in_which_the_cubes_lie_would_be_solved_blindly():
 
 def test_masses_that_are_refuted_as_too_near_differ_by_less_than_ten_errors_of_a_weighing():
     assert 9.81 * APART > 0.02 * 9.81 * SCENE.light * 10
-
-
-@given(scenario=anywhere(MassSort))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

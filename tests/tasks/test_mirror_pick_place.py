@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from controls import (
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -15,8 +14,7 @@ from controls import (
     play_shortcut,
     replayed,
 )
-from helpers import REFERENCE, anywhere, pictures_are_possible
-from hypothesis import given, settings
+from helpers import REFERENCE, pictures_are_possible
 
 from scengen import config, pool
 from scengen.assets.box import Cube
@@ -231,9 +229,3 @@ def test_every_refutation_has_its_own_reason():
             MirrorPickPlace(x=0.35, y=0.3),
         ]
     )
-
-
-@given(scenario=anywhere(MirrorPickPlace))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

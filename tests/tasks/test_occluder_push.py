@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -16,8 +15,6 @@ from controls import (
     play_shortcut,
     replayed,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.box import Cube, Lid
@@ -217,9 +214,3 @@ def test_every_refutation_has_its_own_reason():
             OccluderPush(middle=Spot(x=0.31)),
         ]
     )
-
-
-@given(scenario=anywhere(OccluderPush))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

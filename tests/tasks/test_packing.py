@@ -173,6 +173,7 @@ def test_invalid_scenarios_are_refuted_each_for_its_own_reason():
             Packing(unit=0.015, clearance=0.002),
             Packing(spot_0=Spot(x=-0.08, y=0.14)),
             Packing(spot_0=Spot(x=0.35, y=0.3)),
+            Packing(thickness=0.04, density=4000.0, unit=0.025, left=3, spot_0=Spot(x=-0.1, y=0.3)),
             replace(NOMINAL, **nearly),
         ]
     )

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -17,8 +16,6 @@ from controls import (
     solution,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.pendulum import Pendulum
@@ -123,9 +120,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
             PendulumGrasp(pivot_x=0.37, pivot_y=0.19, amplitude=21.0, pendulum=Pendulum(length=0.2, height=1.0)),
         ]
     )
-
-
-@given(scenario=anywhere(PendulumGrasp))
-@settings(max_examples=30, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

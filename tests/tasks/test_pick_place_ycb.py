@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from controls import (
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -17,8 +16,6 @@ from controls import (
     replayed,
     unchecked,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.ycb import Ycb
@@ -222,9 +219,3 @@ def test_every_refutation_has_its_own_reason():
             PickPlaceYcb(x=0.319, y=0.3),
         ]
     )
-
-
-@given(scenario=anywhere(PickPlaceYcb))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

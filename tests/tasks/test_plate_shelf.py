@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     parked,
@@ -17,8 +16,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.prop import TABLE_TOP
@@ -176,12 +173,6 @@ def test_every_constraint_refutes_what_violates_it():
             PlateShelf(shelf_x=0.3, shelf_y=-0.2),
         ]
     )
-
-
-@settings(deadline=None, max_examples=20)
-@given(anywhere(PlateShelf))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)
 
 
 def test_the_plate_stands_on_the_cups_side_in_training():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     parked,
@@ -16,8 +15,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.prop import TABLE_TOP
@@ -145,9 +142,3 @@ def test_every_constraint_refutes_what_violates_it():
             replace(NOMINAL, plate_x=0.2, plate_y=0.214, shelf_x=-0.1, shelf_y=0.0),
         ]
     )
-
-
-@settings(deadline=None, max_examples=20)
-@given(anywhere(PlateShelfHobi))
-def test_anything_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -16,8 +15,6 @@ from controls import (
     replayed,
     solution,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.crowned_ramp import CrownedRamp
@@ -164,12 +161,6 @@ def test_every_refutation_has_its_own_reason():
             RampSort(box_y=-0.2),
         ]
     )
-
-
-@given(scenario=anywhere(RampSort))
-@settings(max_examples=30, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)
 
 
 def test_the_barrier_is_below_the_hand_as_it_is_after_a_reset():

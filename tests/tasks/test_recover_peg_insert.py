@@ -9,7 +9,6 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -18,8 +17,6 @@ from controls import (
     replayed,
     solution,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.peg import Peg
@@ -222,12 +219,6 @@ def test_the_turn_must_be_more_than_the_slot_lets_pass():
     steepest = math.degrees(NOMINAL.board.steepest(NOMINAL.peg.width))
     for beyond, valid in ((3.01, True), (2.99, False)):
         assert (replace(NOMINAL, turn=-steepest - beyond).infeasible() is None) == valid
-
-
-@settings(deadline=None, max_examples=30)
-@given(scenario=anywhere(RecoverPegInsert))
-def test_whatever_is_within_bounds_builds_or_is_refuted(scenario):
-    builds_or_is_refuted(scenario)
 
 
 def test_no_certificate_where_the_turn_leaves_the_way_in_open():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 from controls import (
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -13,8 +12,6 @@ from controls import (
     replayed,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.shape import FRUSTUM, Shape
@@ -142,9 +139,3 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
             replace(THREE, a=Piece(x=0.33, y=0.3)),
         ]
     )
-
-
-@given(scenario=anywhere(ShapeStack))
-@settings(max_examples=25, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -9,7 +9,6 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     not_certified,
@@ -18,8 +17,6 @@ from controls import (
     replayed,
     spared,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.box import Cube
@@ -233,9 +230,3 @@ def test_every_refutation_has_its_own_reason():
             ShelteredGrasp(tray_y=0.1),
         ]
     )
-
-
-@given(scenario=anywhere(ShelteredGrasp))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

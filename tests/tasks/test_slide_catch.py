@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     ablated,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -19,8 +18,6 @@ from controls import (
     unchecked,
     unguarded,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.catch_bin import CatchBin
@@ -173,9 +170,3 @@ def test_every_refutation_has_its_own_reason():
             SlideCatch(y=0.2, incline=Incline(width=0.5)),
         ]
     )
-
-
-@given(scenario=anywhere(SlideCatch))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

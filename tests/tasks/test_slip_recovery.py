@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from controls import (
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -16,8 +15,6 @@ from controls import (
     replayed,
     unchecked,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.prop import TABLE_TOP
@@ -233,9 +230,3 @@ def test_every_refutation_has_its_own_reason():
             SlipRecovery(x=0.32, y=0.3, goal_x=0.3),
         ]
     )
-
-
-@given(scenario=anywhere(SlipRecovery))
-@settings(max_examples=40, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from controls import (
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -16,8 +15,6 @@ from controls import (
     replayed,
     solution,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.box import LoadedCube
@@ -221,9 +218,3 @@ def test_every_refutation_has_its_own_reason():
             replace(NOMINAL, x=0.1, blow_0=Blow(heading=0.0)),
         ]
     )
-
-
-@given(scenario=anywhere(StackCollapseRecovery))
-@settings(max_examples=30, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)

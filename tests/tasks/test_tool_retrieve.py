@@ -9,7 +9,6 @@ import pytest
 from controls import (
     ablated,
     after_oracle,
-    builds_or_is_refuted,
     each_refuted_for_its_own_reason,
     load,
     mistaken,
@@ -20,8 +19,6 @@ from controls import (
     spared,
     unchecked,
 )
-from helpers import anywhere
-from hypothesis import given, settings
 
 from scengen import config
 from scengen.assets.hook import LHook
@@ -198,9 +195,3 @@ def test_every_refutation_has_its_own_reason():
             ToolRetrieve(hook_x=0.30, hook_y=0.0, hook_yaw=-90.0),
         ]
     )
-
-
-@given(scenario=anywhere(ToolRetrieve))
-@settings(max_examples=60, deadline=None)
-def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
-    builds_or_is_refuted(scenario)
