@@ -80,6 +80,7 @@ def test_another_scan_is_another_scenario(folder, tmp_path):
     assert len({t.draw("id", 0, 1).scenario.id for t in tasks}) == 2
 
 
+@pytest.mark.slow
 def test_a_pool_with_scans_is_attacked_as_it_is(folder, tmp_path, capsys):
     pool, found = tmp_path / "pool", tmp_path / "found"
     made = ["generate", "task=pick_place_ycb", ONE, "n=1", "limit=12", "attack=8", f"ycb={folder}", f"pool={pool}"]

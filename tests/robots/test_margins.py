@@ -25,6 +25,8 @@ from scengen.tasks import (
     tool_retrieve,
 )
 
+pytestmark = pytest.mark.slow
+
 SPARE = 0.1
 """What a plan that follows a path needs at least [rad]: hands are turned to within 0.05 rad of what is asked for."""
 BEARINGS = np.radians([-20.0, 20.0])
