@@ -19,8 +19,10 @@ Decisions, where the paper (App. B, T20) is silent or cannot be meant as it is w
 * One block must not do: the zone begins beyond what the arm at full stretch reaches with one, by the triangle
   inequality and no search. Two do in training; three do, without stretching the arm to its limit, where the zone is
   farther or the blocks are smaller.
-* A push, not a blow: a target that moves faster than 0.25 m/s is lost. An arm that is driven through its full stretch
-  jumps, and the block before it flies at 0.6 m/s: so one block, shot at the target, brought it anywhere.
+* A push, not a blow: the target may move only while a chain of blocks that touch leads from the hand to it; one that
+  slides on by itself faster than 80 mm/s is lost. An arm that is driven through its full stretch jumps, and the block
+  before it flies at 0.6 m/s: so one block, shot at the target, brought it anywhere. And one block that was knocked on
+  again and again, each time some millimetres farther than a hand comes, brought it into the zone in a dozen knocks.
 * In the zone is a target whose middle is over it, on the table and at rest, for 0.3 s, 30 steps as in the paper's T12
   and T13. Touching the target loses the episode: nothing but a block may come to it.
 * What else is done with the blocks is free. A block that is held in the jaw reaches less far than one that is pushed.
@@ -57,8 +59,8 @@ ZONE = 0.036
 FRONT = 0.829
 """How far from the robot's first axis the tips of a hand come that leans outwards, at the height of a block's middle,
 without trouble [m]. Measured; up to 25 mm farther the arm is nearly straight and jumps."""
-STRUCK = 0.25
-"""Speed of the target at which it has been struck and not pushed [m/s]: twice that of the chain."""
+COASTING = 0.08
+"""Speed at which the target may slide on when nothing pushes it any more [m/s]: for half a millimetre."""
 HAND = (0.36, 0.72)
 """Nearest and farthest distance from the robot's first axis at which a hand that points down takes a block [m]."""
 PLACED, APART = 0.690, 0.004
@@ -69,7 +71,7 @@ LEAN, OVER = math.radians(35.0), (0.45, 0.76)
 """By how much the hand leans outwards at the end of a push [rad], and between which distances it goes over to that from
 pointing down [m]: farther in joint 6 allows no more, farther out the arm asks for it."""
 PUSHING, SLOWLY, LAST = 0.12, 0.05, 0.02
-"""How fast the chain is pushed, how fast at the end [m/s], and over what distance that is [m]."""
+"""How fast the chain is pushed, how fast from just before it meets the target on [m/s], and how far before [m]."""
 BEHIND, PATIENCE = 0.03, 1.0
 """How far behind the chain the hand comes down [m], and how long it stays at full stretch before a push ends [s]."""
 LEVELLING = 4.0
@@ -140,9 +142,20 @@ class IndirectPush(Scenario):
     def failure(self, world: World) -> str | None:
         if world.touched(ROBOT, "target"):
             return "the robot touched the target"
-        if not still(world, "target", STRUCK):
+        if not still(world, "target", COASTING) and not self._pushed(world):
             return "the target was struck"
         return "the target fell off the table" if fallen(world, "target") else None
+
+    def _pushed(self, world: World) -> bool:
+        """Whether a chain of blocks that touch leads from the robot to the target."""
+        chain, ends = {ROBOT}, [ROBOT]
+        while ends:
+            beside = world.touching_bodies(ends.pop()) - chain - {"table", "zone"}
+            if "target" in beside:
+                return True
+            chain |= beside
+            ends += beside
+        return False
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -188,15 +201,23 @@ class IndirectPush(Scenario):
         yield from go_to(world.arm, [*at[:2], self.height], rot, STEADY)
 
     def _push(self, world: World, left: Callable[[], float], speed: float, last: float) -> Plan:
-        """Push outwards at one height, leaning more and more, until nothing is `left` [m] or the arm is stretched."""
+        """Push outwards at one height, leaning more and more, until nothing is `left` [m] or the arm is stretched.
+
+        From just before the chain meets the target on it goes at the `last` speed.
+        """
         arm, setpoint = world.arm, world.arm.hand
         end = world.time + (FRONT - self.out(setpoint)) / speed + LAST / last + PATIENCE
         while left() > 0.0 and world.time < end:
             ahead, rise = self.out(setpoint), LEVELLING * (self.height - arm.hand[2])
-            pace = speed if left() > LAST else last
+            pace = last if self._near(world) else speed
             velocity = (pace if ahead < FRONT + 0.01 else 0.0) * self.u + rise * UP
             setpoint = setpoint + velocity * Loop.PERIOD
             yield steer(arm, setpoint, velocity, between(arm.hand_rot, self.leaning(ahead)), CLOSED)
+
+    def _near(self, world: World) -> bool:
+        """Whether a block touches the target, or is about to."""
+        head = max(self.out(world.com(f"block_{i}")) for i in range(len(self.spots)))
+        return self.out(world.com("target")) - head - self.edge < LAST
 
     def leaning(self, distance: float) -> Mat3:
         """Orientation of the hand that pushes: it leans outwards, its fingers side by side across the push."""
@@ -234,7 +255,7 @@ class IndirectPush(Scenario):
         yield on_table("the target or the zone", [self.outline, self.zone_outline])
         yield require(self.out_of_touch > 0, "the hand may touch the target without a block", gap=self.out_of_touch)
         entered = self.distance + self.way - ZONE / 2
-        reaches = self.stretch + 1.5 * self.edge + STRUCK**2 / (2 * GRAVITY * self.friction)
+        reaches = self.stretch + 1.5 * self.edge + COASTING**2 / (2 * GRAVITY * self.friction)
         yield require(reaches < entered, "one block would do", reaches=reaches, zone=entered)
         yield require(self.needed <= len(self.spots), "no chain is long enough", needed=self.needed)
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
