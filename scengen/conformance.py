@@ -229,9 +229,9 @@ def _solvable(made: card.Card) -> None:
 
 def _breaks(made: card.Card) -> None:
     """A memory that works in training fails; where none works there, a feature of the physics leaves training."""
-    weak = all(rung.finding in ("too weak", "not tried") for rung in made.rungs)
+    weak = all(baseline.finding in ("too weak", "not tried") for baseline in made.baselines)
     leaves = weak and any(departure.leaves for departure in made.features)
-    told = ", ".join(f"{rung.name} {rung.finding}" for rung in made.rungs)
+    told = ", ".join(f"{baseline.name} {baseline.finding}" for baseline in made.baselines)
     helps = "more twins may tell" if made.verdict == behaviour.CANNOT_TELL else "say in its why what it asks of the eye"
     _ask(made.verdict.startswith("breaks") or leaves, f"{made.task}/{made.axis}: {made.verdict} ({told}); {helps}")
 

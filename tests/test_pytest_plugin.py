@@ -70,10 +70,10 @@ def test_bad_input_is_one_line_with_the_remedy(checked, argv, says):
 
 
 def card(verdict="breaks replay", oracle=1.0, findings=("breaks", "too weak"), leaves=False):
-    rungs = [SimpleNamespace(name=f"rung_{i}", finding=finding) for i, finding in enumerate(findings)]
+    baselines = [SimpleNamespace(name=f"baseline_{i}", finding=finding) for i, finding in enumerate(findings)]
     features = [SimpleNamespace(leaves=leaves)]
     rate = None if oracle is None else SimpleNamespace(value=oracle)
-    return SimpleNamespace(task="t", axis="a", verdict=verdict, oracle=rate, rungs=rungs, features=features)
+    return SimpleNamespace(task="t", axis="a", verdict=verdict, oracle=rate, baselines=baselines, features=features)
 
 
 def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
@@ -93,7 +93,7 @@ def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
             "say in its why what it asks of the eye",
         ),
         (conformance._breaks, card("cannot tell", findings=("holds",), leaves=True), "more twins may tell"),
-        (conformance._breaks, card("cannot tell", findings=("too weak",)), "rung_0 too weak"),
+        (conformance._breaks, card("cannot tell", findings=("too weak",)), "baseline_0 too weak"),
     ],
 )
 def test_an_axis_that_is_unsolvable_or_asks_nothing_new_fails(check, made, says):

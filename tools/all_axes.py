@@ -87,7 +87,7 @@ def _line(card: dict[str, Any]) -> str:
         ", ".join(leaving) or "stays",
         f"{card['funnel']['certified']} of {card['indices']}" if card["indices"] else "not tried",
         card["verdict"].replace("_", "-").replace("any-", "any "),
-        *map(_rung, card["rungs"]),
+        *map(_baseline, card["baselines"]),
         _boundary(card, "replay"),
         _boundary(card, "oracle"),
         str(Energy(**card["energy"])),
@@ -99,13 +99,13 @@ def _row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _rung(rung: dict[str, Any]) -> str:
-    if not rung["excess"]:
-        return rung["finding"]
-    n, lost = rung["excess"]["twins"], rung["excess"]
-    solved = [round(rung[arm]["value"] * n) for arm in ("training", "here")]
-    held_out = ", held out" if rung["control"].startswith("held") and not rung["name"].startswith("any") else ""
-    weak = "weak, " if rung["finding"] == "too weak" else ""
+def _baseline(baseline: dict[str, Any]) -> str:
+    if not baseline["excess"]:
+        return baseline["finding"]
+    n, lost = baseline["excess"]["twins"], baseline["excess"]
+    solved = [round(baseline[arm]["value"] * n) for arm in ("training", "here")]
+    held_out = ", held out" if baseline["control"].startswith("held") and not baseline["name"].startswith("any") else ""
+    weak = "weak, " if baseline["finding"] == "too weak" else ""
     how = f"{lost['value']:+.2f} [{lost['low']:.2f}, {lost['high']:.2f}]"
     return f"{weak}{solved[0]} → {solved[1]} of {n}, {how}{held_out}"
 

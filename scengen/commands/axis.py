@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.table import Table
 
 from ..config import read_task
-from ..ood.behaviour import Rung
+from ..ood.behaviour import Baseline
 from ..ood.card import Card, Settings, make
 from ..runs.progress import ProgressBar
 from ..targets import try_folder
@@ -30,13 +30,13 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _tell(rung: Rung) -> str:
+def _tell(memory: Baseline) -> str:
     """What one kind of memory does, in words."""
-    if not (rung.training and rung.here and rung.excess):
-        return rung.finding
-    rates = f"{rung.training.value:.0%} of {rung.control}, {rung.here.value:.0%} of {rung.excess.twins} twins"
-    lost = f"{rung.excess.value:.0%} lost, 95 % interval {rung.excess.low:.0%} to {rung.excess.high:.0%}"
-    return f"{rung.finding}: {rates} ({lost})"
+    if not (memory.training and memory.here and memory.excess):
+        return memory.finding
+    rates = f"{memory.training.value:.0%} of {memory.control}, {memory.here.value:.0%} of {memory.excess.twins} twins"
+    lost = f"{memory.excess.value:.0%} lost, 95 % interval {memory.excess.low:.0%} to {memory.excess.high:.0%}"
+    return f"{memory.finding}: {rates} ({lost})"
 
 
 def _table(card: Card) -> Table:
@@ -52,8 +52,8 @@ def _table(card: Card) -> Table:
         told = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
         table.add_row("solvable", told)
     table.add_row("verdict", card.verdict)
-    for rung in card.rungs:
-        table.add_row(f"memory {rung.name}", _tell(rung))
+    for baseline in card.baselines:
+        table.add_row(f"memory {baseline.name}", _tell(baseline))
     if card.oracle:
         table.add_row("oracle", f"solves {card.oracle.value:.0%} of {card.oracle.scenarios} twins")
     for who, edge in card.boundaries.items():

@@ -1,8 +1,8 @@
 """What memories of training are worth on an axis, each beside its control.
 
-That a memorised motion fails out of distribution says nothing as long as it fails within training too. So every kind of
-memory (a rung) is played in two arms: in OOD twins, and in training scenarios that differ from what it remembers as
-much as training scenarios do. `excess` is what it loses from the one to the other, twin by twin.
+That a memorised motion fails out of distribution says nothing as long as it fails within training too. So every kind
+of memory (a replay baseline) is played in two arms: in OOD twins, and in training scenarios that differ from what it
+remembers as much as training scenarios do. `excess` is what it loses from the one to the other, twin by twin.
 
 * `replay`: the actions that solve the training twin; `object_centric`: its path relative to bodies, see `memory`.
   Control: the same scenario with the axis' own parameters redrawn within training. Where training knows one value
@@ -36,14 +36,14 @@ from ..validate.identity import source_sha256
 from ..validate.rollout import replay, run
 from .memory import Memory, remember
 
-RUNGS = ("replay", "any_replay", "object_centric", "any_object_centric")
+BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")
 """From the weakest memory to the strongest."""
 LIBRARY = 16
 """How many training solutions `any_...` may choose from: those of the first indices of another seed."""
 OWN = 0.9
-"""A rung counts if it solves its own scenario again this often, for example."""
+"""A baseline counts if it solves its own scenario again this often, for example."""
 WORKS = 0.3
-"""A rung that solves fewer scenarios of its control arm is too weak to tell anything about an axis."""
+"""A baseline that solves fewer scenarios of its control arm is too weak to tell anything about an axis."""
 HALF = 0.5
 """An axis is cosmetic if a memory solves more than this share of it, by the lower end of the interval."""
 MOVES = 20
@@ -54,7 +54,7 @@ COSMETIC, CANNOT_TELL = "cosmetic to memory", "cannot tell"
 
 
 @dataclass(frozen=True)
-class Rung:
+class Baseline:
     """What one kind of memory does on an axis; twins count that the oracle solves in both arms."""
 
     name: str
@@ -79,16 +79,16 @@ class Rung:
         return "breaks" if self.excess.low > 0 else "holds"
 
 
-def verdict(rungs: Iterable[Rung]) -> str:
+def verdict(baselines: Iterable[Baseline]) -> str:
     """The strongest memory that an axis breaks; else `COSMETIC` if some memory solves most of it, or `CANNOT_TELL`."""
-    tried = {rung.name: rung for rung in rungs}
-    if broken := [name for name in RUNGS if name in tried and tried[name].finding == "breaks"]:
+    tried = {baseline.name: baseline for baseline in baselines}
+    if broken := [name for name in BASELINES if name in tried and tried[name].finding == "breaks"]:
         return f"breaks {broken[-1]}"
-    solved = any(rung.here is not None and rung.here.low > HALF for rung in tried.values())
+    solved = any(baseline.here is not None and baseline.here.low > HALF for baseline in tried.values())
     return COSMETIC if solved else CANNOT_TELL
 
 
-def climb(
+def measure(
     task: Task,
     split: str,
     folder: Path,
@@ -98,7 +98,7 @@ def climb(
     seed: int = 0,
     workers: Workers = 1,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
-) -> tuple[list[Rung], Rate | None]:
+) -> tuple[list[Baseline], Rate | None]:
     """Play all memories on the first twins of a split, continuing what stands in both folders.
 
     Args:
@@ -108,7 +108,7 @@ def climb(
         progress: told what is being done, how far it is, and how much there is.
 
     Returns:
-        The rungs in the order of `RUNGS`, and how often the oracle solves the split.
+        The baselines in the order of `BASELINES`, and how often the oracle solves the split.
     """
 
     def play(work: Callable[..., dict], where: Path, which: str, count: int, what: str, library: bool) -> list[dict]:
@@ -128,7 +128,7 @@ def climb(
     any_id = play(_any, controls / "any.jsonl", ID, any_n, "any memory in training", True)
     twins = play(_twin, folder / "twins.jsonl", split, n, "memories in twins", not _moves(task, split))
     any_ood = play(_any, folder / "any.jsonl", split, any_n, "any memory in twins", True)
-    return _rungs(own, any_id, twins, any_ood), _oracle(twins)
+    return _baselines(own, any_id, twins, any_ood), _oracle(twins)
 
 
 def _oracle(twins: list[dict[str, Any]]) -> Rate | None:
@@ -136,31 +136,31 @@ def _oracle(twins: list[dict[str, Any]]) -> Rate | None:
     return rate(tried) if tried else None
 
 
-def _rungs(
+def _baselines(
     own: list[dict[str, Any]],
     any_id: list[dict[str, Any]],
     twins: list[dict[str, Any]],
     any_ood: list[dict[str, Any]],
-) -> list[Rung]:
+) -> list[Baseline]:
     """What the records come to."""
     again = [r["again"] for r in own if r.get("again") is not None]
-    faithful = {name: sum(again) / len(again) if again and "object" in name else 1.0 for name in RUNGS}
+    faithful = {name: sum(again) / len(again) if again and "object" in name else 1.0 for name in BASELINES}
     moved = any(t.get("moved") for t in twins)
     both = [t for t in twins if t.get("control") and t["control"]["oracle"] and t["here"]["oracle"]]
     solved = {t["index"] for t in twins if t.get("here") and t["here"]["oracle"]}
     inside = {r["index"]: r for r in any_id if r.get("any_replay") is not None}
     pairs = [(inside[r["index"]], r) for r in any_ood if r["index"] in solved & inside.keys()]
     found = []
-    for name in RUNGS:
+    for name in BASELINES:
         if name.startswith("any"):
             a, b = [[p[name]] for p, _ in pairs], [[p[name]] for _, p in pairs]
         else:
             a, b = [[t["control"][name]] for t in both], [[t["here"][name]] for t in both]
         control = "moved within training" if moved and not name.startswith("any") else "held-out training"
         if a:
-            found.append(Rung(name, faithful[name], control, rate(a), rate(b), paired(a, b)))
+            found.append(Baseline(name, faithful[name], control, rate(a), rate(b), paired(a, b)))
         else:
-            found.append(Rung(name, faithful[name], control, None, None, None))
+            found.append(Baseline(name, faithful[name], control, None, None, None))
     return found
 
 

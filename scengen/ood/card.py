@@ -83,7 +83,7 @@ class Card:
     """How many of them were certified as first drawn."""
     verdict: str
     """The strongest memory that the axis breaks, see `behaviour.verdict`."""
-    rungs: list[behaviour.Rung]
+    baselines: list[behaviour.Baseline]
     oracle: Rate | None
     """How often the oracle solves the OOD twins, certified or not."""
     boundaries: dict[str, boundary.Boundary]
@@ -97,7 +97,7 @@ class Card:
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
         told = asdict(self)
-        told["rungs"] = [{**asdict(rung), "finding": rung.finding} for rung in self.rungs]
+        told["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
         told["boundaries"] = {
             k: {**asdict(b), "verdict": b.verdict, "told": str(b)} for k, b in self.boundaries.items()
         }
@@ -125,7 +125,7 @@ def make(
     certify_n, any_n = settings.count("certify_n"), settings.count("any_n")
     made = _certified(task, certify_settings, settings, certify_n, folder, progress) if certify_n else None
     controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
-    rungs, oracle = behaviour.climb(task, name, folder, controls, n, any_n, seed, settings.workers, progress)
+    baselines, oracle = behaviour.measure(task, name, folder, controls, n, any_n, seed, settings.workers, progress)
     boundaries, why_no_path = _boundaries(task, name, folder, seed, settings.rounds, progress)
     twins = list(itertools.islice(_drawn(task, name, seed), n))
     training, here = [t for t, _ in twins], [s for _, s in twins]
@@ -146,8 +146,8 @@ def make(
         made.reasons if made else {},
         made.indices if made else 0,
         made.first_draws if made else 0,
-        behaviour.verdict(rungs),
-        rungs,
+        behaviour.verdict(baselines),
+        baselines,
         oracle,
         boundaries,
         why_no_path,

@@ -8,7 +8,7 @@ import pytest
 
 from scengen import cli, config
 from scengen.ood import behaviour, features
-from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Rung, climb, verdict
+from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Baseline, measure, verdict
 from scengen.ood.memory import remember
 from scengen.samplers.split import ID
 from scengen.sim import scene_text
@@ -19,10 +19,10 @@ from scengen.validate.rollout import run
 TASK = config.task("domino_single")
 
 
-def rung(name, training, here, own=1.0):
-    """A rung that solved so many of 20 in either arm."""
+def baseline(name, training, here, own=1.0):
+    """A baseline that solved so many of 20 in either arm."""
     a, b = ([[i < solved] for i in range(20)] for solved in (training, here))
-    return Rung(name, own, "moved within training", rate(a), rate(b), paired(a, b))
+    return Baseline(name, own, "moved within training", rate(a), rate(b), paired(a, b))
 
 
 @pytest.mark.parametrize(
@@ -36,16 +36,16 @@ def rung(name, training, here, own=1.0):
     ],
 )
 def test_a_memory_counts_where_it_works_within_training(training, here, own, finding):
-    assert rung("replay", training, here, own).finding == finding
+    assert baseline("replay", training, here, own).finding == finding
 
 
 def test_the_verdict_names_the_strongest_memory_that_breaks():
-    broken, intact, weak = rung("replay", 20, 0), rung("object_centric", 20, 20), rung("any_replay", 2, 0)
+    broken, intact, weak = baseline("replay", 20, 0), baseline("object_centric", 20, 20), baseline("any_replay", 2, 0)
     assert verdict([broken, weak, intact]) == "breaks replay"
-    assert verdict([broken, rung("object_centric", 19, 2)]) == "breaks object_centric"
+    assert verdict([broken, baseline("object_centric", 19, 2)]) == "breaks object_centric"
     assert verdict([weak, intact]) == COSMETIC
     assert verdict([weak]) == verdict([]) == CANNOT_TELL, "a memory that fails in training too is no evidence"
-    assert verdict([Rung("replay", 1.0, "held-out training", None, None, None)]) == CANNOT_TELL
+    assert verdict([Baseline("replay", 1.0, "held-out training", None, None, None)]) == CANNOT_TELL
 
 
 def solved(split, index):
@@ -74,21 +74,21 @@ def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
 
 @pytest.mark.slow
 def test_a_stout_first_tile_breaks_replay_and_a_light_one_does_not(tmp_path):
-    rungs, oracle = climb(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, 4, 0)
-    assert oracle.value == 1.0 and (rungs[0].training.value, rungs[0].here.value) == (1.0, 0.0)
-    assert [r.finding for r in rungs if r.name.startswith("any")] == ["not tried", "not tried"]
-    rungs, _ = climb(TASK, "light_tiles", tmp_path / "light", tmp_path / ID, 2, 1)
-    assert rungs[0].here.value == 1.0 and {r.name: r.excess.twins for r in rungs}["any_object_centric"] == 1
+    baselines, oracle = measure(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, 4, 0)
+    assert oracle.value == 1.0 and (baselines[0].training.value, baselines[0].here.value) == (1.0, 0.0)
+    assert [r.finding for r in baselines if r.name.startswith("any")] == ["not tried", "not tried"]
+    baselines, _ = measure(TASK, "light_tiles", tmp_path / "light", tmp_path / ID, 2, 1)
+    assert baselines[0].here.value == 1.0 and {r.name: r.excess.twins for r in baselines}["any_object_centric"] == 1
 
 
 def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
-    first = climb(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0)
+    first = measure(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0)
 
     def never(*_):
         raise AssertionError
 
     monkeypatch.setattr(behaviour, "_library", never)
-    assert climb(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0) == first
+    assert measure(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0) == first
 
 
 @pytest.mark.slow
@@ -99,7 +99,7 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     card = json.loads((tmp_path / "card.json").read_text())
     assert card["proofs"][0]["parameter"] == "starter.thickness" and card["proofs"][0]["gap"] == pytest.approx(0.014)
     assert card["funnel"]["certified"] == 2 and card["oracle"]["scenarios"] == 1
-    assert [r["finding"] for r in card["rungs"]][1::2] == ["not tried", "not tried"]
+    assert [r["finding"] for r in card["baselines"]][1::2] == ["not tried", "not tried"]
     assert card["reasons"]["feasible: the chain leaves the table"] == card["funnel"]["proposed"] - 2
     assert card["boundaries"]["replay"]["trials"] == 4 and card["energy"]["distance"] > 1
     page = (tmp_path / "card.html").read_text()
