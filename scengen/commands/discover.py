@@ -6,7 +6,7 @@ from rich.table import Table
 
 from ..config import read_task
 from ..errors import UnknownName, at_least
-from ..ood.discover import METHODS, Finding, Search, Settings, as_yaml, discover
+from ..ood.discover import LEAST, METHODS, Finding, Search, Settings, as_yaml, discover
 from ..runs.progress import ProgressBar
 from ..samplers.axis import spell
 from ..targets import try_folder
@@ -15,7 +15,7 @@ from . import OK, Arguments, err, out, say, write
 
 def command(arguments: Arguments) -> int:
     settings, task, checks = read_task("discover", arguments, Settings)
-    at_least(settings, budget=20, seed=0, workers=1)
+    at_least(settings, budget=LEAST, seed=0, workers=1)
     if settings.method not in METHODS:
         raise UnknownName("method", settings.method, METHODS)
     folder = Path(settings.to or f"generated/discover/{task.name}")

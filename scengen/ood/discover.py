@@ -9,6 +9,7 @@ search among hundreds of points finds something by luck.
 One trial is a memory played in one scenario, and its oracle where the memory fails.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -50,6 +51,8 @@ MISSES = 5
 """A box that fails so many of them is given up, and counts as if it failed all that are left."""
 SHARES = (0.35, 0.55, 0.7)
 """Which share of the budget is spent when the hypercube ends, the forest ends, the narrowing ends."""
+LEAST = math.ceil(FRESH / (1 - SHARES[-1]))
+"""The least budget, of which something can be confirmed."""
 BATCH = 8
 """Points that are tried before the forest learns anew, or boxes are drawn anew."""
 CANDIDATES = 12

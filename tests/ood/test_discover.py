@@ -131,7 +131,7 @@ def test_real_trials_tell_a_memory_that_holds_from_one_that_breaks(tmp_path):
     ("argv", "says"),
     [
         (("method=forrest",), "did you mean 'forest'"),
-        (("budget=5",), "budget = 5; it must be at least 20"),
+        (("budget=5",), "budget = 5; it must be at least 67"),
         (("task=domino_singel",), "did you mean 'domino_single'"),
     ],
 )
