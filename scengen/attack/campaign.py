@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .. import config
 from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
 from ..log import Log
@@ -21,7 +20,6 @@ from ..sim import scene_text
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.rollout import run
-from ..validate.stored import task_of_manifest
 from .evidence import Hit, Rate, rates, unsound
 from .play import Arena
 from .priors import Judge, Prior, by_statics, fit, has_statics
@@ -222,12 +220,6 @@ def stored(report: Report, folder: Path) -> dict[str, Any]:
         (folder / HITS / f"{hit.name}.npz").write_bytes(content)
         files.append({"file": f"{HITS}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
     return {**report.plain(), "hits": files}
-
-
-def task_of_hit(hit: Hit, pool: str | list[str] | None, search: Sequence[str]) -> Task:
-    """The task of a hit: that of the pool that was attacked, if one is named, which may hold scans."""
-    installed = config.task(hit.task, search)
-    return installed if pool is None else task_of_manifest(Pool.open(str(pool)).check(), installed)
 
 
 def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:

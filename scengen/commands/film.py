@@ -3,14 +3,15 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from .. import config
 from ..analysis.redraw import task_of
-from ..attack.campaign import task_of_hit
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..config import read
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..sim import scene_text
 from ..targets import try_file
@@ -45,7 +46,7 @@ class Settings:
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that make no sense."""
-        if (self.hit is None) == (self.pool is None or self.id is None) or (self.hit and self.id):
+        if (self.hit is None) == (self.id is None) or (self.hit is None and self.pool is None):
             raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; name a .png file for a film strip, an .mp4 file for a video")
@@ -86,7 +87,8 @@ def _of_pool(settings: Settings, arguments: Arguments) -> Take:
 def _hit(settings: Settings, arguments: Arguments) -> Take:
     """What the adversary did."""
     hit = Hit.load(Path(str(settings.hit)))
-    task = task_of_hit(hit, settings.pool, search_path(arguments))
+    search = search_path(arguments)
+    task = task_of(Pool.open(str(settings.pool)).check(), search) if settings.pool else config.task(hit.task, search)
     scenario = task.scenario(hit.params)
     if scenario.id != hit.scenario:
         raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")

@@ -11,7 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from .. import config
-from ..attack.campaign import task_of_hit, wrong_hits
+from ..analysis.redraw import task_of
+from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read
@@ -143,7 +144,7 @@ def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
     if folder is None:
         why = "whether they are made of the files that the manifest names is not checked; give ycb=FOLDER for that"
         return replace(report, remarks=[*report.remarks, f"{told} stand in the pool: {why}"])
-    task = stored_task(pool, config.task(pool.task))
+    task = task_of(pool)
     if wrong := intake("ycb").other_files(task, folder):
         failed = [{"id": "manifest.json", "verdict": "refuted", "reason": why} for why in wrong]
         return replace(report, failed=[*report.failed, *failed], verdict="refuted")
@@ -159,10 +160,11 @@ def _hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int
     paths = sorted(Path(hits).glob("*.npz")) if Path(hits).is_dir() else [Path(hits)]
     if not paths:
         raise BadConfig(f"hits = {hits}; the folder holds no hits (*.npz) of scengen attack")
+    attacked_task = None if pool is None else task_of(Pool.open(str(pool)).check(), search)
     wrong = 0
     for path in paths:
         hit = Hit.load(path)
-        reason = unsound(hit, task_of_hit(hit, pool, search))
+        reason = unsound(hit, attacked_task or config.task(hit.task, search))
         wrong += bool(reason)
         say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")

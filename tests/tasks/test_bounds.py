@@ -10,7 +10,7 @@ from scengen.params import parameters, with_values
 DRAWS = 100
 
 
-def anywhere(parameter, random):
+def end_or_between(parameter, random):
     """Either end, or a value between them."""
     low, high = parameter.low, parameter.high
     if parameter.integer:
@@ -24,4 +24,4 @@ def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(name)
     for k in range(DRAWS):
         share = (k + 1) / DRAWS  # few parameters moved: most of these scenes can be built; all of them: hardly any
         moved = [known for known in parameters(nominal) if random.random() < share]
-        builds_or_is_refuted(with_values(nominal, {known.name: anywhere(known, random) for known in moved}))
+        builds_or_is_refuted(with_values(nominal, {known.name: end_or_between(known, random) for known in moved}))

@@ -18,6 +18,7 @@ from controls import (
 )
 
 from scengen import config
+from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.robots import ik
 from scengen.robots.jaw import TIP
@@ -79,6 +80,22 @@ def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
         w.data.joint("target_free").qvel[:3] = speed * NOMINAL.u
         mujoco.mj_forward(w.model, w.data)
         assert (NOMINAL.failure(w) == "the target was struck") == struck
+
+
+@pytest.mark.parametrize(("speed", "seen"), [(0.20, False), (0.25, False), (0.30, True), (0.60, True)])
+def test_a_block_that_is_shot_at_the_target_loses_or_knocks_it_on_by_two_millimetres_at_most(speed, seen):
+    """A dozen knocks that took it farther, each beyond a hand's reach, had brought the target into the zone."""
+    w = load(TASK, NOMINAL)
+    block, target = w.data.joint("block_0_free"), w.data.joint("target_free")
+    begin = target.qpos.copy()
+    block.qpos[:3], block.qpos[3:] = begin[:3] - (NOMINAL.edge + 0.001) * NOMINAL.u, begin[3:]
+    block.qvel[:3] = speed * NOMINAL.u
+    mujoco.mj_forward(w.model, w.data)
+    episode = Episode(NOMINAL, w)
+    seen_so = "failure" in [episode.step(w.filter(w.idle)) for _ in range(15)]
+    assert w.touched("block_0", "target")
+    assert seen_so == seen == (episode.reason == "the target was struck")
+    assert seen or (target.qpos - begin)[:3] @ NOMINAL.u < 0.0025
 
 
 def test_the_arm_stretched_out_for_the_target_never_touches_it():
