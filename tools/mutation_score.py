@@ -30,13 +30,16 @@ from scengen.attack.play import SETTLE, Arena, Attempt
 from scengen.attack.search import PRIOR, RANDOM, TIERS, Attack
 from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
+from scengen.validate.settings import Robust
 
 PAGE = Path("generated/mutation_score.jsonl")
 SCENARIOS = 3
 IDLE = 3
 """Mutants that no written cheat exploits get this share of the rollouts."""
 VARIED = 40
-"""Varied runs of the oracle for each task."""
+"""Varied runs of the oracle for each task ..."""
+WIDER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=0.04)
+"""... under half as much jitter again as a certificate has."""
 
 
 def main(budget: str = "300", *tasks: str) -> None:
@@ -183,7 +186,7 @@ def flagged(task: str) -> dict[str, Any]:
         arena = arena_of(subject)
         causal = Causal(arena)
         for k in range(VARIED // len(subjects)):
-            jitter = Jitter(f"varied/{subject.scenario.id}/{k}", 0.003, 2.0, 0.08, 0.15, 0.04, k % 2)
+            jitter = Jitter.within(WIDER, f"varied/{subject.scenario.id}", k)
             world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
             if rollout.solved:

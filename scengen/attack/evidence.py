@@ -151,16 +151,8 @@ class Causal:
 
     def _varied(self, k: int) -> frozenset[Pair]:
         """The contacts of a jittered run; all that are known where it fails, or where there is no oracle."""
-        arena, limits = self._arena, Robust()
-        jitter = Jitter(
-            f"{arena.scenario.id}/attack/{k}",
-            limits.position,
-            limits.turn,
-            limits.mass,
-            limits.friction,
-            limits.noise,
-            k % 2 * limits.latency,
-        )
+        arena = self._arena
+        jitter = Jitter.within(Robust(), f"{arena.scenario.id}/attack", k)
         world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
         try:
             rollout = run(arena.scenario, world, arena.scenario.oracle, arena.horizon, SETTLE, jitter)

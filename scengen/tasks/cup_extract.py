@@ -107,8 +107,6 @@ class CupExtract(Scenario):
 
     def _scene(self, cup: Cup) -> mujoco.MjSpec:
         scene, turn = table(), math.radians(self.handle)
-        # With the cup in the jaw conjugate gradients take 80 iterations in a step, Newton 4: half the time.
-        scene.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         # An edge that lies on the wall by one point rocks, and creeps down at 10 mm/s far from the angle of friction.
         scene.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
         place(scene, cup, "cup", self.foot, turn)

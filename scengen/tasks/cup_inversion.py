@@ -104,7 +104,6 @@ class CupInversion(Scenario):
 
     def _scene(self, cup: Cup) -> mujoco.MjSpec:
         scene = table()
-        scene.option.solver = mujoco.mjtSolver.mjSOL_NEWTON  # a cup in a jaw takes conjugate gradients twice the time
         place(scene, cup, "cup", self.start + cup.height * UP, turn=TURNED_OVER)
         place(scene, self.patch, "patch", self.goal, free=False)
         return scene

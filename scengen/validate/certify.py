@@ -222,15 +222,7 @@ class Trial:
         size = asdict(limits)
         failures: list[str] = []
         for k in range(limits.runs):
-            jitter = Jitter(
-                f"{self.scenario.id}/{k}",
-                limits.position,
-                limits.turn,
-                limits.mass,
-                limits.friction,
-                limits.noise,
-                k % 2 * limits.latency,
-            )
+            jitter = Jitter.within(limits, self.scenario.id, k)
             episode = run(
                 self.scenario,
                 jitter.disturbed(self.world, self.scenario.DISTURBED),

@@ -4,6 +4,7 @@ import copy
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -16,6 +17,7 @@ from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
 from ..sim.world import World
+from .settings import Robust
 
 STILL_FOR = 0.5
 """For so long every coordinate of scene and robot must keep to its place where an episode is called settled [s] ..."""
@@ -64,6 +66,13 @@ class Jitter:
     """Standard deviation of the noise on the six motion channels of an action."""
     latency: int
     """Control periods by which actions arrive late."""
+
+    @classmethod
+    def within(cls, limits: Robust, key: str, run: int) -> Self:
+        """The jitter of one of several runs under the same limits; every second run is late."""
+        late = run % 2 * limits.latency
+        sizes = (limits.position, limits.turn, limits.mass, limits.friction, limits.noise)
+        return cls(f"{key}/{run}", *sizes, late)
 
     def disturbed(self, world: World, hinges: Sequence[str] = ()) -> World:
         """A world like `world`, with its bodies moved, heavier or lighter, and more or less slippery.
