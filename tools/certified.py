@@ -1,50 +1,95 @@
-"""Certify the first draws of every split of some tasks, and write what came of it into conf/certified.yaml.
+"""Certify fresh draws of every split of some tasks, and write what came of it into conf/certified.yaml.
 
-    python tools/certified.py N [split=SPLIT] [TASK ...]
+    python tools/certified.py N [split=SPLIT,...] [draws=M] [replays=K] [TASK ...]
 
-N draws of every split, or of the one that is named, are tried at level quick. Measure with nothing else running: beside
-other work processor time doubles. What is not measured stays as it was.
+Every split, or those that are named, is drawn from until N scenarios are certified at level quick, or twice N draws are
+spent. The oracle solves M other draws, undisturbed (100), and K witnesses of every split are played in robosuite (3).
+Processor time is that of an otherwise idle machine whose cores are all at work on this. What is not measured stays as
+it was.
 """
 
+import fcntl
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from scengen import config
+from scengen.envs.agreement import compare_all
+from scengen.errors import Infeasible
+from scengen.parallel import Limits
 from scengen.runs.generate import Settings, generate
-from scengen.samplers.split import ID
+from scengen.samplers.split import ID, Split
+from scengen.samplers.task import Task
+from scengen.sim import scene_text
+from scengen.sim.world import World
 from scengen.task_files import certified
+from scengen.validate.rollout import run
 
 FILE = Path(__file__).parent.parent / "conf" / "certified.yaml"
-HEAD = """# What certification came to: by task and split the draws tried, those certified among them at level quick,
-# and the processor time of each that was [s], on one core of an idle machine. Written by tools/certified.py.
+HEAD = """# What certification came to, by task and split. Written by tools/certified.py.
+# indices: draws tried; certified among them at level quick; cpu: processor time of each that was [s], with every core
+# of the machine at work; lost: what became of the others; draws: other draws that the oracle was given undisturbed, and
+# solved among them; replays: witnesses played in robosuite, and same: those with the same verdict.
 """
+OTHER_SEED = 1
+"""Of the draws for the oracle alone."""
 
 
-def measured(task: str, split: str, n: int) -> dict[str, float]:
-    """What becomes of the first n draws of a split."""
+def measured(task: Task, split: str, n: int, draws: int, replays: int) -> dict[str, Any]:
+    """What becomes of the draws of a split."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(split=split, n=n, limit=n, pool=f"{folder}/pool")
-        found = config.task(task)
-        made = generate(found, config.levels(found)["quick"], settings, lambda *_: None)
-    each = round(made.cpu / made.certified, 1) if made.certified else 0.0
-    for reason, times in made.reasons.items():
-        print(f"  {task}/{split}: {times} times {reason}", flush=True)
-    return {"indices": made.indices, "certified": made.certified, "cpu": each}
+        settings = Settings(split=split, n=n, limit=2 * n, pool=f"{folder}/pool")
+        made = generate(task, config.levels(task)["quick"], settings, lambda *_: None)
+        each = round(made.cpu / made.certified, 1) if made.certified else 0.0
+        found = {"indices": made.indices, "certified": made.certified, "cpu": each, "lost": dict(made.reasons)}
+        if replays and made.certified:
+            played = compare_all([made.pool], 1, lambda _: None, replays, limits=Limits(300, 4000))
+            found |= {"replays": len(played), "same": sum(one.agrees for one in played)}
+    if draws:
+        solved = [solves(task, split, index) for index in range(draws)]
+        found |= {"draws": sum(one is not None for one in solved), "solved": sum(one is True for one in solved)}
+    return found
+
+
+def solves(task: Task, split: str, index: int) -> bool | None:
+    """Whether the oracle solves a draw without any disturbance; None where nothing feasible is drawn."""
+    try:
+        scenario = task.draw(Split.parse(split), OTHER_SEED, index).scenario
+    except Infeasible:
+        return None
+    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    played = run(scenario, world, scenario.oracle, task.horizon)
+    if not played.solved:
+        print(f"  {task.name}/{split}: draw {index} not solved: {played.reason}", flush=True)
+    return played.solved
 
 
 def main(n: str, *others: str) -> None:
-    """Measure, and write after every task, so that two processes may share the tasks."""
-    only = [other.partition("=")[2] for other in others if other.startswith("split=")]
+    """Measure, and write after every split, so that several processes may share the tasks."""
+    options = dict(other.split("=") for other in others if "=" in other)
+    wanted = options.pop("split", None)
     for name in [other for other in others if "=" not in other] or config.tasks():
-        found = {split: measured(name, split, int(n)) for split in only or (ID, *config.task(name).axes)}
-        print(name, found, flush=True)
+        task = config.task(name)
+        for split in wanted.split(",") if wanted else (ID, *task.axes):
+            found = measured(task, split, int(n), int(options.get("draws", 100)), int(options.get("replays", 3)))
+            print(f"{name}/{split}", found, flush=True)
+            write(name, split, found)
+
+
+def write(task: str, split: str, found: dict[str, Any]) -> None:
+    """Add to the file, or replace."""
+    with FILE.open("r+") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
         every = certified()
-        every[name] = {**every.get(name, {}), **found}
-        lines = yaml.safe_dump({name: every[name] for name in sorted(every)}, default_flow_style=None, sort_keys=False)
-        FILE.write_text(HEAD + lines)
+        every[task] = {**every.get(task, {}), split: found}
+        text = yaml.safe_dump(
+            {name: every[name] for name in sorted(every)}, default_flow_style=None, sort_keys=False, width=1000
+        )
+        file.truncate(0)
+        file.write(HEAD + text)
 
 
 if __name__ == "__main__":

@@ -80,6 +80,9 @@ ASIDE: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
 """Where the suction hand is out of the way [m]."""
 OVER = 0.06
 """Height at which the cup is brought over the square, and put upright [m]."""
+FARTHEST = 0.77
+"""How far from its base, level, the jaw's hand sets the cup down [m]: far out to its side it fails from
+0.774 on, straight ahead from 0.79."""
 SLIP = 0.75
 """Share of the slope of the wall that its friction may be."""
 
@@ -337,6 +340,8 @@ class CupInversion(Scenario):
         right, left = panda.bases(2)
         yield within_reach("the cup", self.start + cup.height * UP, base=right)
         yield within_reach("the square", self.goal + (cup.height + 2 * OVER) * UP, base=left)
+        away = math.hypot(*(self.goal - self.held * LEFT - left)[:2])
+        yield require(away < FARTHEST, "the jaw cannot set the cup down so far out", distance=away, farthest=FARTHEST)
 
     def features(self) -> Mapping[str, float]:
         right, left = panda.bases(2)
