@@ -98,6 +98,7 @@ docs: setup
 	$(BIN)/python tools/api_page.py
 	$(BIN)/python tools/paper_page.py
 	$(BIN)/python tools/cluster_page.py
+	$(BIN)/python tools/certified_page.py
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # README, docs, axis cards and reports as plain HTML in SITE.

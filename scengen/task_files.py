@@ -141,13 +141,14 @@ def category(name: str) -> str:
     return str(_head(name).get("category"))
 
 
-def certified() -> dict[str, dict[str, dict[str, float]]]:
+def certified() -> dict[str, dict[str, dict[str, Any]]]:
     """What certification came to when the tasks were measured: conf/certified.yaml.
 
     Returns:
-        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] for each that was.
+        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] for each that was, and what
+        else the head of the file tells.
     """
-    found: dict[str, dict[str, dict[str, float]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
+    found: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
     return found
 
 

@@ -115,7 +115,7 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     return [about, params, checks]
 
 
-def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
     """All tasks in a few words.
 
     Args:
