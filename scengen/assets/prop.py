@@ -116,7 +116,8 @@ def table() -> mujoco.MjSpec:
 
     The options are robosuite's own (models/assets/base.xml: elliptic cone, impratio 20, air, Newton's method) with a
     time step of 2 ms. With impratio 20 conjugate gradients meet their limit of 100 iterations in some steps of most
-    tasks, and cost a fifth more over the certificates of 35 tasks (MuJoCo 3.5.0: 241 and 200 CPU seconds).
+    tasks, and cost a fifth more over the certificates of 35 tasks (MuJoCo 3.5.0: 241 and 200 CPU seconds). Two families
+    have them nevertheless, and say why.
     """
     scene = mujoco.MjSpec()
     option = scene.option

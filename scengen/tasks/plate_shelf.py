@@ -32,6 +32,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from ..assets.dish import Dish
 from ..assets.plate import Plate
 from ..assets.prop import TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
@@ -91,6 +92,12 @@ class PlateShelf(PlateAndSlot):
     @property
     def shelf(self) -> SlotShelf:
         return replace(super().shelf, ends=CLOSED_BY)
+
+    def _scene(self, plate: Plate | Dish, shelf: SlotShelf) -> mujoco.MjSpec:
+        scene = super()._scene(plate, shelf)
+        # A cup on the lip, which leans, closes under conjugate gradients alone, and shortcuts shall have every chance.
+        scene.option.solver = mujoco.mjtSolver.mjSOL_CG
+        return scene
 
     # --- oracle ---------------------------------------------------------------------------
 
