@@ -196,7 +196,6 @@ def test_another_mujoco_is_really_another_one(made, tmp_path, monkeypatch, capsy
     assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", f"json={report}")) == 0
     told = json.loads(report.read_text())
     assert cell(told["tasks"]["domino_single"]["3.4.0"]) == "0 / 2 / 0"
-    assert told["mujoco"]["3.4.0"]["fingerprint"] != fingerprint()
     assert "as the control" in capsys.readouterr().err
     assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.99]")) == 2
     assert "there is no mujoco 3.4.99 for this Python" in capsys.readouterr().err
