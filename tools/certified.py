@@ -2,8 +2,8 @@
 
     python tools/certified.py N [split=SPLIT,...] [draws=M] [replays=K] [TASK ...]
 
-Every split, or those that are named, is drawn from until N scenarios are certified at level quick, or twice N draws are
-spent. The oracle solves M other draws, undisturbed (100), and K witnesses of every split are played in robosuite (3).
+Every split, or those that are named, is drawn from until N scenarios are certified at level quick, or three times N draws
+are spent. The oracle solves M other draws, undisturbed (100), and K witnesses of every split are played in robosuite (3).
 Processor time is that of an otherwise idle machine whose cores are all at work on this. What is not measured stays as
 it was.
 """
@@ -41,7 +41,7 @@ OTHER_SEED = 1
 def measured(task: Task, split: str, n: int, draws: int, replays: int) -> dict[str, Any]:
     """What becomes of the draws of a split."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(split=split, n=n, limit=2 * n, pool=f"{folder}/pool")
+        settings = Settings(split=split, n=n, limit=3 * n, pool=f"{folder}/pool")
         made = generate(task, config.levels(task)["quick"], settings, lambda *_: None)
         each = round(made.cpu / made.certified, 1) if made.certified else 0.0
         found = {"indices": made.indices, "certified": made.certified, "cpu": each, "lost": dict(made.reasons)}
