@@ -27,7 +27,7 @@ LIGHT, HEAVY = SeesawBalance(weight=Block(mass=0.14)), SeesawBalance(weight=Bloc
 def laid(scenario, along, target_along):
     """The scene with both blocks on a deck that starts level [places along it in m]."""
     scene, yaw = table(), math.radians(scenario.heading)
-    scene.option = scenario.build().option
+    scene.option = SeesawBalance.build(scenario).option
     place(scene, scenario.seesaw, "seesaw", scenario.foot, yaw, free=False)
     place(scene, scenario.weight, "weight", scenario.on_deck(along, 0.0), yaw)
     place(scene, scenario.target, "target", scenario.on_deck(target_along, 0.0), yaw)
