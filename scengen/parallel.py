@@ -223,11 +223,12 @@ class _Worker:
             self.connection, theirs = self._context.Pipe()
             arguments = (theirs, self._function, self._limits, os.getpid())
             self._process = self._context.Process(target=_serve, args=arguments, daemon=True)
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C goes to the whole group
+            # Inherited, as Ctrl-C and SIGTERM may go to the whole group before the worker says what it makes of them.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
             try:
                 self._process.start()
             finally:
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
             theirs.close()
             if self._limits:  # an item does not pay for the start of a process
                 with suppress(EOFError, OSError):
@@ -259,6 +260,7 @@ def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | 
     """What a worker process does: items in, results out, until the parent closes the connection or dies."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)

@@ -151,6 +151,7 @@ def test_rates_add_up_and_have_bounds():
     assert every.value == 1.0 and every.bound == 1.0 and every.refuting == 2
 
 
+@pytest.mark.slow
 def test_the_adversary_finds_that_the_first_tile_can_be_carried(arena):
     """It knows nothing of dominoes: it takes what the witness touches, to where the witness ends."""
     found = Attack(arena, 0, until=lambda hit: hit.refutes)
@@ -183,6 +184,7 @@ def test_fixed_answers_are_the_best_ones_together():
 # --- the command ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_attack_is_stored_and_continues(tmp_path, subject):
     settings, said = Settings(n=1, budget=4, tiers=["random"]), []
     first = attack(TASK, [subject], settings, tmp_path, lambda done, hits: said.append(done))

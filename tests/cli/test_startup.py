@@ -44,6 +44,7 @@ def test_the_list_of_tasks_imports_no_family(given, families):
     assert told == 0 and sum(name.startswith("scengen.tasks.") for name in modules) == families
 
 
+@pytest.mark.slow
 def test_the_first_compilation_is_told_of_once(tmp_path):
     """Twice with a cache of compiled code that is empty at first: what is compiled is told, what is read is not."""
     simulate = "from scengen import cli; cli.run(['--complete', 'x']); cli.run(['--complete', 'x']); "

@@ -131,6 +131,7 @@ def here(tmp_path_factory):
     return Environment(HERE, folder)
 
 
+@pytest.mark.slow
 def test_an_environment_shares_everything_but_mujoco(made, here, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(drift, "environment", lambda version, told: here)
     report = tmp_path / "drift.json"

@@ -216,6 +216,7 @@ def test_what_would_fall_over_gets_no_feet(taken):
     assert not len(found.prop.feet) and found.rest.turn > 1.0
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_bytes(taken):
     ring = trimesh.creation.torus(0.05, 0.012, 32, 16)
     first, second = (taken(ring, error=0.003) for _ in range(2))

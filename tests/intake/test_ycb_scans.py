@@ -101,6 +101,7 @@ def test_what_a_split_draws_needs_a_scan_too(folder):
         with_scans(task(), "unseen_item", str(folder))
 
 
+@pytest.mark.slow
 def test_a_pool_with_scans_stands_alone(folder, tmp_path, capsys):
     pool = str(tmp_path / "pool")
     made = ["generate", "task=pick_place_ycb", ONE, "n=1", "limit=12", f"ycb={folder}", f"pool={pool}"]

@@ -65,6 +65,7 @@ def planted(monkeypatch):
     monkeypatch.setattr(module.behaviour, "follows", lambda *_: True)
 
 
+@pytest.mark.slow
 def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
     search = discover(TASK, QUICK, Settings(budget=400), tmp_path)
     names = {finding.axis.name for finding in search.findings}

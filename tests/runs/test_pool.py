@@ -127,6 +127,7 @@ def test_a_pool_can_be_extended_and_comes_out_as_if_made_at_once(mine, made, tmp
     assert make(mine, n=4).pool.sha256 == make(tmp_path / "four", n=4).pool.sha256
 
 
+@pytest.mark.slow
 def test_killed_and_continued_is_the_same_as_never_killed(made, tmp_path):
     """SIGKILL in the middle of a run with two workers; nothing survives it, not even the workers."""
     folder = tmp_path / "killed"
