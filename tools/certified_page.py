@@ -17,7 +17,7 @@ Written by `make docs` from conf/certified.yaml, where `tools/certified.py` puts
   of its rate.
 * **robosuite**: witnesses with the same verdict in robosuite, of those played there.
 * **CPU s**: processor time of each scenario that was certified, and of those lost on its way, with every core of the
-  machine at work.
+  machine at work. Rows without an oracle are older: one core of an idle machine, and conjugate gradients.
 
 | task | split | certified | oracle | robosuite | CPU s |
 |---|---|---|---|---|---|

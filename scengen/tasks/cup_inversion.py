@@ -81,8 +81,8 @@ ASIDE: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
 OVER = 0.06
 """Height at which the cup is brought over the square, and put upright [m]."""
 FARTHEST = 0.77
-"""How far from its base, level, the jaw's hand sets the cup down [m]: far out to its side it fails from
-0.774 on, straight ahead from 0.79."""
+"""How far from its base, level, the jaw's hand sets the cup down [m]: to its side it fails from 0.774 on, straight
+ahead from 0.79."""
 SLIP = 0.75
 """Share of the slope of the wall that its friction may be."""
 
