@@ -9,6 +9,7 @@ import pytest
 from helpers import anywhere
 from hypothesis import given, settings
 
+from scengen.assets.bar import Bar
 from scengen.assets.box import LEAD, Block, Cube, Domino, Lid, LoadedCube
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.physics import GRAVITY
@@ -30,7 +31,9 @@ def lean(data, about_x, angle):
     data.qpos[3:7] = math.cos(angle / 2), 0, math.sin(angle / 2), 0
 
 
-@pytest.mark.parametrize("box", [Domino(), Block(), Cube(), LoadedCube(), Lid()], ids=lambda box: type(box).__name__)
+@pytest.mark.parametrize(
+    "box", [Domino(), Block(), Cube(), Bar(long=2.0, high=1.5), LoadedCube(), Lid()], ids=lambda box: type(box).__name__
+)
 def test_a_box_weighs_what_it_should_and_stands_on_the_middle_of_its_foot(box):
     model, data = alone(box)
     mujoco.mj_forward(model, data)

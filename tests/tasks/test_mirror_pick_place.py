@@ -17,7 +17,7 @@ from controls import (
 from helpers import REFERENCE, pictures_are_possible
 
 from scengen import config, pool
-from scengen.assets.box import Cube
+from scengen.assets.bar import Bar
 from scengen.certificate import Certificate
 from scengen.envs.gym import PoolEnv
 from scengen.envs.robosuite import env_class
@@ -171,10 +171,29 @@ def test_what_is_learnt_by_heart_in_one_view_serves_every_other():
         assert replayed(TASK, NOMINAL, replace(NOMINAL, view=view)).solved
 
 
-@pytest.mark.parametrize("split", ["far", "small"])
-def test_a_memorised_motion_serves_no_other_place_and_no_small_cube(split):
+@pytest.mark.parametrize("split", ["far", "small", "long", "high"])
+def test_a_memorised_motion_serves_no_other_place_and_nothing_small_long_or_high(split):
     trained, moved = (TASK.draw(name, 0, 1).scenario for name in ("id", split))
     assert not replayed(TASK, trained, moved).solved
+
+
+@pytest.mark.parametrize("shape", [{"long": 2.0}, {"high": 2.75}], ids=str)
+def test_a_motion_that_lifts_a_cube_lifts_no_bar_and_no_post_in_its_place(shape):
+    assert replayed(TASK, NOMINAL, NOMINAL).solved
+    assert not replayed(TASK, NOMINAL, replace(NOMINAL, cube=replace(NOMINAL.cube, **shape))).solved
+
+
+@pytest.mark.parametrize(
+    "bar",
+    [
+        MirrorPickPlace(x=-0.142, y=0.199, yaw=1.6, cube=Bar(edge=0.0595, long=1.92)),
+        MirrorPickPlace(x=-0.17, y=-0.083, yaw=5.1, cube=Bar(edge=0.0579, long=1.91)),
+    ],
+    ids=["left", "right"],
+)
+def test_near_the_robot_the_hand_turns_to_the_side_on_which_joint_7_has_room(bar):
+    """The other way takes joint 7 to its end, or the hand swings aside and comes down on the bar."""
+    assert play(TASK, bar, bar.oracle, load(TASK, bar)).solved
 
 
 # --- goal, constraints, negative controls -------------------------------------------------
@@ -224,8 +243,8 @@ def test_every_refutation_has_its_own_reason():
     each_refuted_for_its_own_reason(
         [
             MirrorPickPlace(y=0.385),
-            MirrorPickPlace(cube=Cube(edge=0.07), view=FLIPPED, y=ASIDE / 2 - 0.001),
-            MirrorPickPlace(cube=Cube(mass=1.0, friction=0.1)),
+            MirrorPickPlace(cube=Bar(edge=0.07), view=FLIPPED, y=ASIDE / 2 - 0.001),
+            MirrorPickPlace(cube=Bar(mass=1.0, friction=0.1)),
             MirrorPickPlace(x=0.35, y=0.3),
         ]
     )
