@@ -273,7 +273,7 @@ MOST_REPEATED = 100
 
 
 def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:
-    return np.minimum(np.maximum(reading, -bound), bound, dtype=np.float32, casting="same_kind")
+    return reading.clip(-bound, bound).astype(np.float32)
 
 
 for _name in config.tasks():

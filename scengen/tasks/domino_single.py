@@ -15,6 +15,7 @@ like touching the slab. The paper's canonical plan is unaffected; the shortcuts 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -167,10 +168,20 @@ class DominoSingle(Scenario):
         return [self.starter, *[self.tile] * (self.count - 1), self.slab]
 
     def spot(self, i: int) -> Vec3:
-        """Foot of tile `i` [m]; `spot(count)` is where the slab stands.
+        """Foot of tile `i` [m]; `spot(count)` is where the slab stands."""
+        return self._spots[i]
+
+    @cached_property
+    def _spots(self) -> list[Vec3]:
+        """The feet of all pieces [m]; goal and failure ask for them in every control period.
 
         (x, y) is the middle of a chain of equal tiles: a stouter starter grows away from the face that is pushed.
         """
         half = self.count * (self.gap + self.tile.thickness) / 2
-        before = sum(piece.thickness + self.gap for piece in self.pieces[:i])
-        return np.array([self.x, self.y, TABLE_TOP]) + (before + self.pieces[i].thickness / 2 - half) * self.u
+        spots, before = [], 0.0
+        for piece in self.pieces:
+            spot = np.array([self.x, self.y, TABLE_TOP]) + (before + piece.thickness / 2 - half) * self.u
+            spot.flags.writeable = False
+            spots.append(spot)
+            before += piece.thickness + self.gap
+        return spots
