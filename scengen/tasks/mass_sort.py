@@ -205,11 +205,13 @@ class MassSort(Scenario):
         yield within_reach("a zone", *(self.zone_at(rank) + high for rank in range(COUNT)))
 
     def features(self) -> Mapping[str, float]:
-        """How near two masses are, the heaviest one [kg], and how many pairs lie the wrong way round."""
+        """How near two masses are, the heaviest one [kg], how many pairs lie the wrong way round; air, and where to."""
         return {
             "least_ratio": min(heavier / lighter for lighter, heavier in pairwise(self.masses)),
             "heaviest": self.heavy,
             "inversions": sum(a > b for a, b in combinations(self.ranks, 2)),
+            "air_over_opening": 1.0 - self.edge / OPENED,
+            "lightest_to_the_left": -1.0 if self.mirrored else 1.0,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -261,7 +261,7 @@ class RampSort(Scenario):
         yield within_reach("a ball or the ramp", self.start(0), self.start(len(self.colours) - 1), *spots)
 
     def features(self) -> Mapping[str, float]:
-        """How far a ball is drawn aside, as a share of a slab; how sure its side is where it is let go; how fast."""
+        """How far a ball is drawn aside, as a share of a slab; how sure its side is where it is let go; how fast; side."""
         aside = min(abs(self._aside(side)) for side in (1, -1))
         return {
             "drift_over_width": self.ramp.drift / (self.ramp.width / 2),
@@ -269,6 +269,7 @@ class RampSort(Scenario):
             "ridge": self.ramp.ridge,
             "speed": math.sqrt(10.0 / 7.0 * GRAVITY * self.ramp.length * self.ramp.fall),
             "balls": float(len(self.colours)),
+            "red_to": float(self.red_side),
         }
 
     # --- geometry ---------------------------------------------------------------------------
