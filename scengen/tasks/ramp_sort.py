@@ -261,7 +261,7 @@ class RampSort(Scenario):
         yield within_reach("a ball or the ramp", self.start(0), self.start(len(self.colours) - 1), *spots)
 
     def features(self) -> Mapping[str, float]:
-        """How far a ball is drawn aside, as a share of a slab; how sure its side is; how fast it is; where red ones go."""
+        """How far a ball is drawn aside, as a share of a slab; how sure its side is; how fast it is; the red side."""
         aside = min(abs(self._aside(side)) for side in (1, -1))
         return {
             "drift_over_width": self.ramp.drift / (self.ramp.width / 2),
