@@ -23,10 +23,10 @@ from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import config
-from scengen.attack.campaign import Settings, Subject, arena_of, drawn, fitted
+from scengen.attack.campaign import Settings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import Causal, Hit
 from scengen.attack.macros import Macro
-from scengen.attack.play import SETTLE, Arena, Attempt
+from scengen.attack.play import SETTLE, Attempt, Player
 from scengen.attack.search import PRIOR, RANDOM, TIERS, Attack
 from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
@@ -85,9 +85,9 @@ def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Seq
     priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
     hits = 0
     for number, subject in enumerate(subjects):
-        arena = arena_of(subject)
-        arena.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
-        result = Attack(arena, 0, number, len(subjects), priors).run(budget // len(subjects), tiers)
+        player = player_of(subject)
+        player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+        result = Attack(player, 0, number, len(subjects), priors).run(budget // len(subjects), tiers)
         hits += sum(mutant.kills(hit, subject.scenario, subject.scene_xml) for hit in result.hits)
     return hits
 
@@ -125,7 +125,7 @@ def guessed(mutant: Mutant) -> dict[str, Any]:
     above = [p for p in priors if p.fresh is not None and p.fresh > BARS.get(len(p.values), 1.0)]
     hits, used = [], 0
     for number, subject in enumerate(subjects := mutant.subjects(SCENARIOS)):
-        result = Attack(arena_of(subject), 0, number, len(subjects), priors).run(2 * len(priors), [PRIOR])
+        result = Attack(player_of(subject), 0, number, len(subjects), priors).run(2 * len(priors), [PRIOR])
         used += sum(rate.rollouts for rate in result.rates)
         hits += [hit for hit in result.hits if len(above) and hit.tier == f"prior_{len(above[-1].values)}"]
     told = _told(hits[0]) if hits else ""
@@ -146,14 +146,14 @@ def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
     """Names of the written cheats that reach the goal because of the weakness."""
     found = set()
     for subject in subjects:
-        arena, known = arena_of(subject), written(mutant.task, subject.scenario)
+        player, known = player_of(subject), written(mutant.task, subject.scenario)
         with mock.patch.object(type(subject.scenario), "shortcuts", lambda self, known=known: known):
             for name in known:
                 for raw in (False, True):
                     attempt = Attempt("shortcut", (Macro("shortcut", name),))
-                    played = arena.play(attempt.macros, raw)
+                    played = player.play(attempt.macros, raw)
                     if played.solved and mutant.kills(
-                        _hit(arena, attempt, played), subject.scenario, subject.scene_xml
+                        _hit(player, attempt, played), subject.scenario, subject.scene_xml
                     ):
                         found.add(name)
     return sorted(found)
@@ -164,13 +164,13 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
     used = 0
     priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
     for number, subject in enumerate(subjects):
-        arena = arena_of(subject)
-        arena.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+        player = player_of(subject)
+        player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
 
         def kills(hit: Hit, subject: Subject = subject) -> bool:
             return mutant.kills(hit, subject.scenario, subject.scene_xml)
 
-        attack = Attack(arena, 0, number, len(subjects), priors, kills)
+        attack = Attack(player, 0, number, len(subjects), priors, kills)
         result = attack.run((budget - used) // (len(subjects) - number), tiers)
         used += sum(rate.rollouts for rate in result.rates)
         if attack.done:
@@ -183,11 +183,11 @@ def flagged(task: str) -> dict[str, Any]:
     runs, taken, lacking = 0, 0, set()
     subjects = drawn(config.task(task), "id", 4, 7)
     for subject in subjects:
-        arena = arena_of(subject)
-        causal = Causal(arena)
+        player = player_of(subject)
+        causal = Causal(player)
         for k in range(VARIED // len(subjects)):
             jitter = Jitter.within(WIDER, f"varied/{subject.scenario.id}", k)
-            world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
+            world = jitter.disturbed(player.world, player.scenario.DISTURBED)
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
             if rollout.solved:
                 runs += 1
@@ -197,9 +197,9 @@ def flagged(task: str) -> dict[str, Any]:
     return {"task": task, "mutant": "", "runs": runs, "flagged": taken, "lacking": sorted(lacking)}
 
 
-def _hit(arena: Arena, attempt: Attempt, played: Any) -> Hit:
+def _hit(player: Player, attempt: Attempt, played: Any) -> Hit:
     """A success as a hit that lacks nothing."""
-    scenario, digest = arena.scenario.id, played.digest
+    scenario, digest = player.scenario.id, played.digest
     return Hit(scenario, attempt.tier, False, str(attempt), played.seconds, digest, (), (), {}, played.actions)
 
 

@@ -21,7 +21,7 @@ from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.rollout import run
 from .evidence import Hit, Rate, rates, unsound
-from .play import Arena
+from .play import Player
 from .priors import Judge, Prior, by_statics, fit, has_statics
 from .search import PRIOR, TIERS, Attack, Result, Untried
 
@@ -133,9 +133,9 @@ class Job:
 
     def __call__(self, number: int) -> Result:
         attacked = self.subjects[number]
-        arena = arena_of(attacked)
-        arena.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
-        attack = Attack(arena, self.seed, number, len(self.subjects), self.priors)
+        player = player_of(attacked)
+        player.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
+        attack = Attack(player, self.seed, number, len(self.subjects), self.priors)
         return attack.run(self.budget, self.tiers)
 
     def lost(self, number: int, reason: str) -> Result:
@@ -250,9 +250,9 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
             yield entry["file"], str(error)
 
 
-def arena_of(subject: Subject) -> Arena:
-    """Where a subject is attacked."""
-    return Arena(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
+def player_of(subject: Subject) -> Player:
+    """What plays attempts on a subject."""
+    return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
 
 
 def fitted(task: Task, settings: Settings) -> list[Prior]:

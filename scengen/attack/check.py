@@ -2,7 +2,7 @@
 
 from ..validate.certify import Finding, Trial
 from .evidence import spelled
-from .play import Arena
+from .play import Player
 from .retries import RETRY
 from .search import RANDOM, SEARCH, Attack
 from .variations import WITNESS
@@ -18,8 +18,8 @@ def attacked(trial: Trial) -> Finding:
         The settings, how many rollouts of each tier reached the goal, and the first way around what the task is about.
     """
     assert trial.witness is not None
-    arena = Arena(trial.scenario, trial.text, trial.embodiment, trial.horizon, trial.witness.actions)
-    result = Attack(arena, seed=0).run(trial.settings.attack, TIERS)
+    player = Player(trial.scenario, trial.text, trial.embodiment, trial.horizon, trial.witness.actions)
+    result = Attack(player, seed=0).run(trial.settings.attack, TIERS)
     numbers = {
         f"{rate.tier}_{spelled(rate.raw)}": {"rollouts": rate.rollouts, "hits": rate.hits} for rate in result.rates
     }

@@ -8,7 +8,7 @@ from itertools import accumulate
 from ..samplers.keyed import spread, unit
 from ..sim.world import Arm
 from .macros import Macro
-from .play import Arena
+from .play import Player
 from .solids import TABLE, Solid, handles, sides
 
 Key = tuple[str | int, ...]
@@ -30,19 +30,19 @@ ALIGNED = 0.8
 """Share of the directions that are those of the thing in question."""
 
 
-def plan(arena: Arena, *key: str | int) -> tuple[Macro, ...]:
+def plan(player: Player, *key: str | int) -> tuple[Macro, ...]:
     """One to five random macros."""
     count = 1 + int(MOST * unit(*key, "count"))
-    return tuple(macro(arena, *key, place) for place in range(count))
+    return tuple(macro(player, *key, place) for place in range(count))
 
 
-def macro(arena: Arena, *key: str | int) -> Macro:
+def macro(player: Player, *key: str | int) -> Macro:
     """A random macro. It looks at the world as it is at the start."""
-    arena.rewind()
+    player.rewind()
     share = unit(*key, "kind")
     ends = list(accumulate(KINDS.values()))
     kind = list(KINDS)[bisect(ends[:-1], share)]
-    return replace(_DRAWS[kind](arena, key), arm=_arm(arena, key).number)
+    return replace(_DRAWS[kind](player, key), arm=_arm(player, key).number)
 
 
 def varied(one: Macro, *key: str | int) -> Macro:
@@ -51,22 +51,22 @@ def varied(one: Macro, *key: str | int) -> Macro:
     return one if one.kind in ("shortcut", "replay", "answer", "follow") else replace(one, numbers=numbers)
 
 
-def _pick(arena: Arena, key: Key) -> Macro:
-    found = handles(arena.solids, _arm(arena, key).suction)
+def _pick(player: Player, key: Key) -> Macro:
+    found = handles(player.solids, _arm(player, key).suction)
     if not found:
-        return _push(arena, key)
+        return _push(player, key)
     solid = found[int(len(found) * unit(*key, "target"))]
-    fits = sides(arena.world, arena.solids, solid) or [0]
+    fits = sides(player.world, player.solids, solid) or [0]
     which = fits[0] if unit(*key, "side") < 0.7 else fits[-1]
     return Macro(
         "pick", solid.name, (unit(*key, "height"), _skew(key), float(which), _within(0.03, 0.25, *key, "lift"))
     )
 
 
-def _push(arena: Arena, key: Key) -> Macro:
-    solid = _target(arena, key, table=False)
+def _push(player: Player, key: Key) -> Macro:
+    solid = _target(player, key, table=False)
     numbers = (
-        _direction(arena, solid, key),
+        _direction(player, solid, key),
         _within(0.05, 0.95, *key, "height"),
         0.0 if unit(*key, "middle") < 0.5 else spread(0.8, *key, "offset"),
         _within(0.03, 0.18, *key, "way"),
@@ -75,38 +75,38 @@ def _push(arena: Arena, key: Key) -> Macro:
     return Macro("push", solid.name, numbers)
 
 
-def _place(arena: Arena, key: Key) -> Macro:
+def _place(player: Player, key: Key) -> Macro:
     drop = 0.0 if unit(*key, "lowered") < 0.7 else _within(0.01, 0.12, *key, "drop")
     numbers = (*_spot(key), drop, _within(0.05, 0.10, *key, "speed"))
-    return Macro("place", _target(arena, key, table=True).name, numbers)
+    return Macro("place", _target(player, key, table=True).name, numbers)
 
 
-def _press(arena: Arena, key: Key) -> Macro:
+def _press(player: Player, key: Key) -> Macro:
     numbers = (*_spot(key), _within(0.1, 0.6, *key, "seconds"), _within(0.05, 0.15, *key, "speed"))
-    return Macro("press", _target(arena, key, table=False).name, numbers)
+    return Macro("press", _target(player, key, table=False).name, numbers)
 
 
-def _turn(arena: Arena, key: Key) -> Macro:
+def _turn(player: Player, key: Key) -> Macro:
     axis, angle = int(3 * unit(*key, "axis")), math.radians(_within(20.0, 90.0, *key, "angle"))
     turn = [0.0, 0.0, 0.0]
     turn[axis] = angle if unit(*key, "sign") < 0.5 else -angle
     return Macro("turn", "", (*turn, _within(0.5, 2.5, *key, "rate")))
 
 
-def _shake(arena: Arena, key: Key) -> Macro:
+def _shake(player: Player, key: Key) -> Macro:
     along = [0.0, 0.0, 0.0]
     along[int(3 * unit(*key, "axis"))] = 1.0
     spin = 0.0 if unit(*key, "spins") < 0.5 else math.copysign(1.0, spread(1.0, *key, "spin"))
     return Macro("shake", "", (*along, spin, _within(0.1, 0.5, *key, "period"), _within(0.5, 2.5, *key, "duration")))
 
 
-def _throw(arena: Arena, key: Key) -> Macro:
+def _throw(player: Player, key: Key) -> Macro:
     yaw, rise = spread(math.pi, *key, "yaw"), _within(0.0, 1.2, *key, "rise")
     way = (math.cos(rise) * math.cos(yaw), math.cos(rise) * math.sin(yaw), math.sin(rise))
     return Macro("throw", "", (*way, _within(0.1, 0.6, *key, "seconds")))
 
 
-def _wait(arena: Arena, key: Key) -> Macro:
+def _wait(player: Player, key: Key) -> Macro:
     return Macro("wait", "", (_within(0.2, 1.5, *key, "seconds"),))
 
 
@@ -122,22 +122,22 @@ _DRAWS = {
 }
 
 
-def _arm(arena: Arena, key: Key) -> Arm:
+def _arm(player: Player, key: Key) -> Arm:
     """Any of the robot's."""
-    arms = arena.world.arms
+    arms = player.world.arms
     return arms[int(len(arms) * unit(*key, "arm"))]
 
 
-def _target(arena: Arena, key: Key, table: bool) -> Solid:
-    found = [solid for solid in arena.solids.values() if table or solid.body != TABLE]
+def _target(player: Player, key: Key, table: bool) -> Solid:
+    found = [solid for solid in player.solids.values() if table or solid.body != TABLE]
     return found[int(len(found) * unit(*key, "target"))]
 
 
-def _direction(arena: Arena, solid: Solid, key: Key) -> float:
+def _direction(player: Player, solid: Solid, key: Key) -> float:
     """Along one of the level axes of a solid, one way or the other, or anywhere [rad]."""
     if unit(*key, "aligned") > ALIGNED:
         return spread(math.pi, *key, "direction")
-    along, _ = solid.level_axes(arena.world)[int(2 * unit(*key, "side"))]
+    along, _ = solid.level_axes(player.world)[int(2 * unit(*key, "side"))]
     return math.atan2(along[1], along[0]) + (math.pi if unit(*key, "sign") < 0.5 else 0.0)
 
 

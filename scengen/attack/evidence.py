@@ -22,7 +22,7 @@ from ..targets import refused
 from ..validate.certify import lower_bound
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
-from .play import SETTLE, Arena, Attempt, Node, Played
+from .play import SETTLE, Attempt, Node, Played, Player
 from .signature import Pair, pairs
 
 VARIED = 40
@@ -136,10 +136,10 @@ class Causal:
     Contacts of the robot with what cannot move are left out: a hand may come at a thing from another side.
     """
 
-    def __init__(self, arena: Arena, varied: int = VARIED):
+    def __init__(self, player: Player, varied: int = VARIED):
         """Runs are made when they are needed, `varied` at most: blocks that fall into a bin touch by chance."""
-        self._arena, self._left = arena, iter(range(varied))
-        self._pairs = arena.trace.signature.pairs
+        self._player, self._left = player, iter(range(varied))
+        self._pairs = player.trace.signature.pairs
 
     def lacking(self, touched: frozenset[Pair]) -> frozenset[Pair]:
         """Which of them are not among the contacts of a hit; every varied run made so far has all of these."""
@@ -151,38 +151,38 @@ class Causal:
 
     def _varied(self, k: int) -> frozenset[Pair]:
         """The contacts of a jittered run; all that are known where it fails, or where there is no oracle."""
-        arena = self._arena
-        jitter = Jitter.within(Robust(), f"{arena.scenario.id}/attack", k)
-        world = jitter.disturbed(arena.world, arena.scenario.DISTURBED)
+        player = self._player
+        jitter = Jitter.within(Robust(), f"{player.scenario.id}/attack", k)
+        world = jitter.disturbed(player.world, player.scenario.DISTURBED)
         try:
-            rollout = run(arena.scenario, world, arena.scenario.oracle, arena.horizon, SETTLE, jitter)
+            rollout = run(player.scenario, world, player.scenario.oracle, player.horizon, SETTLE, jitter)
         except NoOracle:
             return self._pairs
         return pairs(world) if rollout.solved else self._pairs
 
 
-def hit(arena: Arena, attempt: Attempt, raw: bool, played: Played, node: Node | None, causal: Causal) -> Hit | None:
+def hit(player: Player, attempt: Attempt, raw: bool, played: Played, node: Node | None, causal: Causal) -> Hit | None:
     """The evidence for a success, or None if it does not come out the same in a fresh world.
 
     Args:
         node: where the attempt began.
         causal: contacts of the witness that a hit should have.
     """
-    fresh = World.load(arena.scene_xml, arena.embodiment)
-    again = replay(arena.scenario, fresh, played.actions, arena.horizon, SETTLE)
+    fresh = World.load(player.scene_xml, player.embodiment)
+    again = replay(player.scenario, fresh, played.actions, player.horizon, SETTLE)
     if not again.solved or again.digest != played.digest:
         return None
     left = played.signature
     return Hit(
-        arena.scenario.id,
+        player.scenario.id,
         attempt.tier,
         raw,
-        (node or arena.start).after(attempt),
+        (node or player.start).after(attempt),
         played.seconds,
         played.digest,
         tuple(sorted(causal.lacking(left.pairs))),
-        tuple(sorted(arena.trace.signature.moved - left.moved)),
-        values(arena.scenario),
+        tuple(sorted(player.trace.signature.moved - left.moved)),
+        values(player.scenario),
         played.actions,
     )
 

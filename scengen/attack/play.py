@@ -85,8 +85,8 @@ class Played:
         return self.outcome == "success"
 
 
-class Arena:
-    """One scenario that is attacked: its world, its limits, and what each kind of macro needs to know."""
+class Player:
+    """Plays attempts on one scenario: its world, its limits, and what each kind of macro needs to know."""
 
     def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, horizon: float, witness: Actions):
         self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
@@ -166,8 +166,8 @@ class Arena:
 class _Run:
     """One attempt on its way."""
 
-    def __init__(self, arena: Arena, episode: Episode, node: Node, raw: bool):
-        self.arena, self.episode, self.node, self.raw, self.world = arena, episode, node, raw, arena.world
+    def __init__(self, player: Player, episode: Episode, node: Node, raw: bool):
+        self.player, self.episode, self.node, self.raw, self.world = player, episode, node, raw, player.world
         self.rows: list[NDArray[np.float32]] = list(node.actions)
         self.notes: list[str] = []
         self.nodes: list[Node] = []
@@ -179,7 +179,7 @@ class _Run:
             if self.episode.outcome is not None:
                 break
             actions = self._actions()
-            state, left = self.world.state(), self.arena.signature()
+            state, left = self.world.state(), self.player.signature()
             node = Node(state, self.episode.held, actions, left, node.after(macro))
             self.nodes.append(node)
         self._idle()
@@ -190,7 +190,7 @@ class _Run:
 
     def _macro(self, macro: Macro) -> None:
         try:
-            for action in self.arena.plan(macro, self.raw):
+            for action in self.player.plan(macro, self.raw):
                 if self._step(action) is not None:
                     return
         except GaveUp as error:
@@ -203,13 +203,13 @@ class _Run:
 
     def _idle(self) -> None:
         """Nothing, until something is decided or everything has been at rest for a while."""
-        stillness = Stillness(self.arena.scenario, self.world)
+        stillness = Stillness(self.player.scenario, self.world)
         while self.episode.outcome is None and (not stillness.lasts() or self.episode.held):
             self._step(self.world.idle)
 
     def _settled(self) -> Played:
         reached = self.world.time
-        left = self.arena.signature()
+        left = self.player.signature()
         for _ in range(round(SETTLE / Loop.PERIOD)):
             if self._step(self.world.idle) != "success":
                 break
@@ -223,7 +223,7 @@ class _Run:
         seconds: float,
         left: Signature | None = None,
     ) -> Played:
-        left = left or self.arena.signature()
+        left = left or self.player.signature()
         notes, nodes = tuple(self.notes), tuple(self.nodes)
         return Played(outcome, reason, round(seconds, 6), self._actions(), self.world.digest, left, notes, nodes)
 

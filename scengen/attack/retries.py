@@ -13,7 +13,7 @@ import numpy as np
 from ..geometry import UP, Vec3
 from ..sim.world import Arm
 from .macros import Macro
-from .play import Arena, Attempt
+from .play import Attempt, Player
 from .solids import TABLE, Solid, handles, sides
 from .variations import phase
 
@@ -32,11 +32,11 @@ SHIFTS = (0.010, 0.025, -0.010, -0.025)
 """By how much a phase of the witness is displaced [m]."""
 
 
-def retries(arena: Arena) -> Iterator[Attempt]:
+def retries(player: Player) -> Iterator[Attempt]:
     """All families in turn, of every arm, each with what promises most first."""
     makers = (carried, tipped, dropped_again, shaken, placed, bare)
-    families = [_by(arm, make(arena, arm)) for make in makers for arm in arena.world.arms]
-    for round_ in zip_longest(*families, shifted(arena)):
+    families = [_by(arm, make(player, arm)) for make in makers for arm in player.world.arms]
+    for round_ in zip_longest(*families, shifted(player)):
         yield from (attempt for attempt in round_ if attempt)
 
 
@@ -46,11 +46,11 @@ def _by(arm: Arm, attempts: Iterator[Attempt]) -> Iterator[Attempt]:
         yield replace(attempt, macros=tuple(replace(macro, arm=arm.number) for macro in attempt.macros))
 
 
-def carried(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def carried(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body picked and brought against, over and onto every other body."""
-    for one, other in _pairs(arena, arm):
-        for pick in _picks(arena, arm, one):
-            pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(arena, other))
+    for one, other in _pairs(player, arm):
+        for pick in _picks(player, arm, one):
+            pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(player, other))
             yield Attempt(RETRY, (pick, *pushes[:2]))
             yield Attempt(RETRY, (pick, *pushes[2:]))
             for share in SHARES[-1], *SHARES[:2]:
@@ -58,76 +58,76 @@ def carried(arena: Arena, arm: Arm) -> Iterator[Attempt]:
             yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in SHARES[:3])))
 
 
-def bare(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def bare(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Every body pushed from all sides, high and low, then pressed, with the bare hand."""
-    for solid in _targets(arena):
+    for solid in _targets(player):
         for height in (0.8, 0.3):
-            pushes = [Macro("push", solid.name, (angle, height, 0.0, 0.12, 0.2)) for angle in _angles(arena, solid)]
+            pushes = [Macro("push", solid.name, (angle, height, 0.0, 0.12, 0.2)) for angle in _angles(player, solid)]
             yield Attempt(RETRY, tuple(pushes[:2]))
             yield Attempt(RETRY, tuple(pushes[2:]))
         yield Attempt(RETRY, tuple(Macro("press", solid.name, (u, 0.0, 0.5, 0.1)) for u in SHARES[:3]))
 
 
-def placed(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def placed(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body put down at one share of a face after the other."""
-    for one, other in _pairs(arena, arm):
-        for pick in _picks(arena, arm, one)[:1]:
+    for one, other in _pairs(player, arm):
+        for pick in _picks(player, arm, one)[:1]:
             moves: list[Macro] = []
             for share in SHARES:
                 moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
             yield Attempt(RETRY, tuple(moves))
 
 
-def tipped(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def tipped(player: Player, arm: Arm) -> Iterator[Attempt]:
     """What the witness holds, tipped one way and the other."""
-    for k in _holding(arena, arm):
-        for axis in _axes(arena, arm, k):
+    for k in _holding(player, arm):
+        for axis in _axes(player, arm, k):
             for tilt in TILTS[:2]:
                 yield Attempt(RETRY, _seesawing(axis, math.radians(tilt)), k)
                 yield Attempt(RETRY, _seesawing(-axis, math.radians(tilt)), k)
-        for axis in _axes(arena, arm, k):
+        for axis in _axes(player, arm, k):
             steps = [math.radians(tilt) for tilt in reversed(TILTS)]
             yield Attempt(RETRY, tuple(move for tilt in steps for move in _seesawing(axis, tilt)), k)
 
 
-def shaken(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def shaken(player: Player, arm: Arm) -> Iterator[Attempt]:
     """What the witness holds, shaken level and upwards, with the wrist at rest and turning."""
     for spin in (1.0, 0.0):
-        for k in _holding(arena, arm):
-            for along in (*_axes(arena, arm, k), UP):
+        for k in _holding(player, arm):
+            for along in (*_axes(player, arm, k), UP):
                 for period in (0.3, 0.6):
                     shake = Macro("shake", "", (*map(float, along), spin, period, 3.0))
                     yield Attempt(RETRY, (shake, Macro("wait", "", (0.5,))), k)
 
 
-def dropped_again(arena: Arena, arm: Arm) -> Iterator[Attempt]:
+def dropped_again(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Let go where the witness does, but elsewhere along the face beneath; caught as it comes back, let go again."""
-    for k, body in arena.trace.releases(arm.number):
-        for along in _tangents(arena, k, body):
+    for k, body in player.trace.releases(arm.number):
+        for along in _tangents(player, k, body):
             again = (Macro("release", "", (0.15, 0.0)), Macro("catch", body, (2.5,)), _move(along, STEP))
             moves = (_move(along, BEGIN), *again * CATCHES)
             yield Attempt(RETRY, moves, k)
 
 
-def shifted(arena: Arena) -> Iterator[Attempt]:
+def shifted(player: Player) -> Iterator[Attempt]:
     """A phase of the witness displaced, and displaced otherwise, each time from where it begins."""
-    for k in reversed(range(arena.phases)):
+    for k in reversed(range(player.phases)):
         for axis in range(3):
             moves = []
             for step in SHIFTS:
                 displaced = [0.0, 0.0, 0.0]
                 displaced[axis] = step
-                moves.append(phase(arena, k, shift=tuple(displaced)))
+                moves.append(phase(player, k, shift=tuple(displaced)))
             yield Attempt(RETRY, tuple(moves), k)
 
 
 # --- what to try it on ------------------------------------------------------------------------
 
 
-def _pairs(arena: Arena, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
+def _pairs(player: Player, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
     """What may be taken and what it may be brought to, those that matter in the witness first."""
-    taken, targets = handles(arena.solids, arm.suction), _targets(arena)
-    known = arena.trace.handled
+    taken, targets = handles(player.solids, arm.suction), _targets(player)
+    known = player.trace.handled
     ranked = sorted(taken, key=lambda solid: known.index(solid.body) if solid.body in known else len(known))
     found = [(i + k, one, other) for i, one in enumerate(ranked) for k, other in enumerate(targets)]
     for _, one, other in sorted(found, key=lambda ranked: ranked[0]):
@@ -135,47 +135,47 @@ def _pairs(arena: Arena, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
             yield one, other
 
 
-def _targets(arena: Arena) -> list[Solid]:
+def _targets(player: Player) -> list[Solid]:
     """Whole bodies, those nearest to the goal first, then parts of them; not the table."""
-    near = arena.trace.concerned
-    found = [solid for solid in arena.solids.values() if solid.body != TABLE]
+    near = player.trace.concerned
+    found = [solid for solid in player.solids.values() if solid.body != TABLE]
     order = {solid.name: near.index(solid.body) if solid.body in near else len(near) for solid in found}
     return sorted(found, key=lambda solid: (solid.name != solid.body, order[solid.name]))
 
 
-def _picks(arena: Arena, arm: Arm, solid: Solid) -> list[Macro]:
-    arena.rewind()
-    fits = [0] if arm.suction else sides(arena.world, arena.solids, solid)[:1]
+def _picks(player: Player, arm: Arm, solid: Solid) -> list[Macro]:
+    player.rewind()
+    fits = [0] if arm.suction else sides(player.world, player.solids, solid)[:1]
     return [Macro("pick", solid.name, (0.6, 0.0, float(which), 0.2)) for which in fits]
 
 
-def _angles(arena: Arena, solid: Solid) -> list[float]:
+def _angles(player: Player, solid: Solid) -> list[float]:
     """Directions along the level axes of a solid [rad], the shorter one first, both ways."""
-    arena.rewind()
-    angles = [math.atan2(along[1], along[0]) for along, _ in solid.level_axes(arena.world)]
+    player.rewind()
+    angles = [math.atan2(along[1], along[0]) for along, _ in solid.level_axes(player.world)]
     return [angle + turn for angle in angles for turn in (0.0, math.pi)]
 
 
-def _holding(arena: Arena, arm: Arm) -> list[int]:
+def _holding(player: Player, arm: Arm) -> list[int]:
     """Stages of the witness at which something has been in the hand for a whole phase, the middle one first."""
-    holds = [stage.holds[arm.number] for stage in arena.trace.stages[: arena.phases]]
+    holds = [stage.holds[arm.number] for stage in player.trace.stages[: player.phases]]
     found = [k for k in range(1, len(holds)) if holds[k] and holds[k - 1]]
     found = found or [k for k in range(1, len(holds)) if holds[k]]
     return sorted(found, key=lambda k: abs(k - found[len(found) // 2]))[:3]
 
 
-def _axes(arena: Arena, arm: Arm, k: int) -> Sequence[Vec3]:
+def _axes(player: Player, arm: Arm, k: int) -> Sequence[Vec3]:
     """The level axes of what is held at a stage, the longer one last."""
-    arena.rewind(k)
-    body = arena.trace.stages[k].holds[arm.number]
+    player.rewind(k)
+    body = player.trace.stages[k].holds[arm.number]
     assert body is not None
-    return [along for along, _ in arena.solids[body].level_axes(arena.world)]
+    return [along for along, _ in player.solids[body].level_axes(player.world)]
 
 
-def _tangents(arena: Arena, k: int, body: str) -> list[Vec3]:
+def _tangents(player: Player, k: int, body: str) -> list[Vec3]:
     """Uphill along the face that a body touches at a stage; level directions where that is level."""
-    arena.rewind(k)
-    world = arena.world
+    player.rewind(k)
+    world = player.world
     data, index = world.data, world.body(body)
     normals = [UP]
     for contact in data.contact[: data.ncon]:

@@ -10,7 +10,7 @@ from ..samplers.keyed import unit
 from . import draws
 from .evidence import Causal, Hit, Rate, hit, rates
 from .macros import Macro
-from .play import Arena, Attempt, Node, Played
+from .play import Attempt, Node, Played, Player
 from .priors import Prior, guesses
 from .retries import RETRY, retries
 from .signature import Signature
@@ -96,7 +96,7 @@ class Attack:
 
     def __init__(
         self,
-        arena: Arena,
+        player: Player,
         seed: int,
         number: int = 0,
         of: int = 1,
@@ -104,16 +104,16 @@ class Attack:
         until: Callable[[Hit], bool] = lambda hit: False,
     ):
         """`number` of `of`: which part of the tiers that are lists this scenario takes. `until`: stop at such a hit."""
-        self.arena, self.seed, self.number, self.of, self.priors, self.until = arena, seed, number, of, priors, until
-        self.causal = Causal(arena)
+        self.player, self.seed, self.number, self.of, self.priors, self.until = player, seed, number, of, priors, until
+        self.causal = Causal(player)
         self.archive, self.fatal = Archive(), Counter[tuple[int | None, str, str]]()
         self.counts: list[Rate] = []
         self.hits: list[Hit] = []
         self.untried: list[Untried] = []
         self.cpu, self.done = 0.0, False
-        for k, stage in enumerate(arena.trace.stages[: arena.phases]):
+        for k, stage in enumerate(player.trace.stages[: player.phases]):
             for raw in (False, True):
-                self.archive.add(Cell(arena.stage(k), raw, stage.signature))
+                self.archive.add(Cell(player.stage(k), raw, stage.signature))
 
     def run(self, budget: int, tiers: Sequence[str] = TIERS) -> Result:
         """Spend `budget` rollouts on some tiers."""
@@ -124,7 +124,7 @@ class Attack:
             owed -= self._tier(tier, 2 * round(owed / 2))
         if round(owed) > 0 and not self.done and {RANDOM, SEARCH} & {*tiers}:
             self._tier(SEARCH if SEARCH in tiers else RANDOM, 2 * round(owed / 2))
-        return Result(self.arena.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
+        return Result(self.player.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
 
     def _tier(self, tier: str, rollouts: int) -> int:
         """Play attempts of one tier; returns how many rollouts that took."""
@@ -139,7 +139,7 @@ class Attack:
                 break
             if self.fatal[_first(attempt)] >= FATAL:
                 continue
-            node = None if attempt.stage is None else self.arena.stage(attempt.stage)
+            node = None if attempt.stage is None else self.player.stage(attempt.stage)
             for raw in (False, True):
                 if spent < rollouts and not self.done:
                     self._try(attempt, raw, node)
@@ -147,23 +147,23 @@ class Attack:
         return spent
 
     def _attempts(self, tier: str) -> Iterator[Attempt]:
-        arena = self.arena
+        player = self.player
         if tier == RANDOM:
             count = 0
             while True:
-                yield Attempt(RANDOM, draws.plan(arena, self.seed, arena.scenario.id, RANDOM, count))
+                yield Attempt(RANDOM, draws.plan(player, self.seed, player.scenario.id, RANDOM, count))
                 count += 1
         if tier == PRIOR:
             yield from guesses(self.priors)
             return
         lists = {SHORTCUT: shortcuts, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
-        whole = list(lists[tier](arena))
+        whole = list(lists[tier](player))
         for k in range(self.of):  # its own part first, then those of the others
             yield from islice(whole, (self.number + k) % self.of, None, self.of)
 
     def _step(self, count: int) -> None:
         """One rollout of the search: from a success a variation of it, else from what is rare something random."""
-        key = (self.seed, self.arena.scenario.id, SEARCH, count)
+        key = (self.seed, self.player.scenario.id, SEARCH, count)
         raw = bool(count % 2)
         if parent := self.archive.parent(raw, unit(*key, "parent")):
             _, node, macros = parent
@@ -174,14 +174,14 @@ class Attack:
             self._try(Attempt(SEARCH, changed), raw, node)
             return
         cell = self.archive.rarest(raw, unit(*key, "state"))
-        moves = tuple(draws.macro(self.arena, *key, place) for place in range(1 + int(2 * unit(*key, "count"))))
+        moves = tuple(draws.macro(self.player, *key, place) for place in range(1 + int(2 * unit(*key, "count"))))
         self._try(Attempt(SEARCH, moves), raw, cell.node if cell else None)
 
     def _try(self, attempt: Attempt, raw: bool, node: Node | None) -> Played:
         start = time.process_time()
-        played = self.arena.play(attempt.macros, raw, node)
+        played = self.player.play(attempt.macros, raw, node)
         self.cpu += time.process_time() - start
-        found = hit(self.arena, attempt, raw, played, node, self.causal) if played.solved else None
+        found = hit(self.player, attempt, raw, played, node, self.causal) if played.solved else None
         refuting = int(found is not None and found.refutes)
         self.counts.append(Rate(attempt.tier, raw, 1, int(found is not None), refuting))
         if found:
@@ -193,14 +193,14 @@ class Attack:
         if played.outcome == "failure" and not played.nodes:
             self.fatal[_first(attempt)] += 1
         for one in played.nodes:
-            if one.seconds < self.arena.horizon - LEFT:
+            if one.seconds < self.player.horizon - LEFT:
                 self.archive.add(Cell(one, raw, one.signature))
         return played
 
 
-def shortcuts(arena: Arena) -> Iterator[Attempt]:
+def shortcuts(player: Player) -> Iterator[Attempt]:
     """The declared shortcuts, alone and in sequence, each from where the former ended."""
-    names = list(arena.scenario.shortcuts())
+    names = list(player.scenario.shortcuts())
     for name in names:
         yield Attempt(SHORTCUT, (Macro("shortcut", name),))
     for first in names:

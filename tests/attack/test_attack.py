@@ -9,10 +9,10 @@ import pytest
 
 from scengen import config
 from scengen.attack import draws
-from scengen.attack.campaign import Settings, arena_of, attack, drawn
+from scengen.attack.campaign import Settings, attack, drawn, player_of
 from scengen.attack.evidence import Causal, Hit, Rate, hit, rates
 from scengen.attack.macros import Macro
-from scengen.attack.play import Arena, Attempt
+from scengen.attack.play import Attempt, Player
 from scengen.attack.priors import fit
 from scengen.attack.search import RANDOM, RETRY, Attack
 from scengen.attack.solids import handles, sides
@@ -46,13 +46,13 @@ def subject():
 
 
 @pytest.fixture(scope="module")
-def arena(subject) -> Arena:
-    return arena_of(subject)
+def player(subject) -> Player:
+    return player_of(subject)
 
 
 @pytest.fixture(scope="module")
-def causal(arena):
-    return Causal(arena)
+def causal(player):
+    return Causal(player)
 
 
 PICK, AGAINST = Macro("pick", "tile_0", (0.6, 0.0, 1.0, 0.2)), Macro("push", "slab", (np.pi / 2, 0.8, 0.0, 0.08, 0.15))
@@ -61,87 +61,87 @@ PICK, AGAINST = Macro("pick", "tile_0", (0.6, 0.0, 1.0, 0.2)), Macro("push", "sl
 # --- playing ------------------------------------------------------------------------------------
 
 
-def test_a_hand_takes_what_leaves_room_for_its_fingers(arena):
-    arena.rewind()
-    best = handles(arena.solids, suction=False)[0]
-    assert best.name == "tile_0" and sides(arena.world, arena.solids, best) == [1, 0]
+def test_a_hand_takes_what_leaves_room_for_its_fingers(player):
+    player.rewind()
+    best = handles(player.solids, suction=False)[0]
+    assert best.name == "tile_0" and sides(player.world, player.solids, best) == [1, 0]
 
 
 @pytest.mark.parametrize("raw", [False, True])
-def test_a_fork_continues_bit_for_bit(arena, raw):
-    whole = arena.play((PICK, AGAINST), raw)
-    node = arena.play((PICK,), raw).nodes[0]
-    forked = arena.play((AGAINST,), raw, node)
+def test_a_fork_continues_bit_for_bit(player, raw):
+    whole = player.play((PICK, AGAINST), raw)
+    node = player.play((PICK,), raw).nodes[0]
+    forked = player.play((AGAINST,), raw, node)
     assert forked.digest == whole.digest and np.array_equal(forked.actions, whole.actions)
     assert forked.signature == whole.signature
 
 
-def test_a_macro_that_gives_up_does_not_end_the_plan(arena):
-    played = arena.play(
+def test_a_macro_that_gives_up_does_not_end_the_plan(player):
+    played = player.play(
         (Macro("press", "slab", (0.0, 0.0, 0.2, 0.1)), Macro("go", "", (3.0, 0, 1, 0, 0, 0, 1)), PICK), True
     )
     assert played.outcome == "failure" or played.notes
 
 
-def test_draws_depend_on_their_key_alone(arena):
-    first = [draws.plan(arena, 0, "a", k) for k in range(20)]
-    arena.play((PICK,), False)
-    assert [draws.plan(arena, 0, "a", k) for k in range(20)] == first
+def test_draws_depend_on_their_key_alone(player):
+    first = [draws.plan(player, 0, "a", k) for k in range(20)]
+    player.play((PICK,), False)
+    assert [draws.plan(player, 0, "a", k) for k in range(20)] == first
     assert len({macro.kind for plan in first for macro in plan}) >= 5
-    assert draws.plan(arena, 1, "a", 0) != first[0]
+    assert draws.plan(player, 1, "a", 0) != first[0]
 
 
 # --- witnesses ----------------------------------------------------------------------------------
 
 
-def test_phases_cover_the_witness_and_can_be_followed(arena):
-    phases = arena.trace.phases
-    assert phases[0][0] == 0 and phases[-1][1] == len(arena.trace.actions)
+def test_phases_cover_the_witness_and_can_be_followed(player):
+    phases = player.trace.phases
+    assert phases[0][0] == 0 and phases[-1][1] == len(player.trace.actions)
     assert all(one[1] == other[0] for one, other in pairwise(phases))
-    assert arena.trace.handled == ("tile_0",) and arena.trace.concerned[0] == "slab"
+    assert player.trace.handled == ("tile_0",) and player.trace.concerned[0] == "slab"
     for raw in (False, True):
-        assert arena.play(rest(arena, 0), raw).solved
+        assert player.play(rest(player, 0), raw).solved
 
 
-def test_recorded_actions_come_through_the_filter(arena):
-    arena.foreign = {"own": arena.trace.actions}
-    asked = list(arena.plan(Macro("replay", "own"), raw=False))
+def test_recorded_actions_come_through_the_filter(player):
+    player.foreign = {"own": player.trace.actions}
+    asked = list(player.plan(Macro("replay", "own"), raw=False))
     filtered = np.array([f(a) for f in [Filter()] for a in asked])
-    assert np.allclose(filtered, arena.trace.actions, atol=1e-5)
-    assert arena.play((Macro("replay", "own"),), raw=True).solved
-    arena.foreign = {}
+    assert np.allclose(filtered, player.trace.actions, atol=1e-5)
+    assert player.play((Macro("replay", "own"),), raw=True).solved
+    player.foreign = {}
 
 
-def test_perturbed_witnesses_begin_where_a_phase_does(arena):
-    attempts = list(perturbed(arena))
-    assert {attempt.stage for attempt in attempts} == {None, *range(arena.phases)}
+def test_perturbed_witnesses_begin_where_a_phase_does(player):
+    attempts = list(perturbed(player))
+    assert {attempt.stage for attempt in attempts} == {None, *range(player.phases)}
     assert len(set(attempts)) == len(attempts)
 
 
 # --- evidence -----------------------------------------------------------------------------------
 
 
-def test_carrying_lacks_the_chain(arena, subject, causal, tmp_path):
-    played = arena.play((PICK, AGAINST), raw=False)
-    found = hit(arena, Attempt("random", (PICK, AGAINST)), False, played, None, causal)
+def test_carrying_lacks_the_chain(player, subject, causal, tmp_path):
+    played = player.play((PICK, AGAINST), raw=False)
+    found = hit(player, Attempt("random", (PICK, AGAINST)), False, played, None, causal)
     assert found and found.refutes and ("tile_0", "tile_1") in found.lacks and "tile_1" in found.unmoved
     found.store(tmp_path)
     stored = Hit.load(tmp_path / f"{found.name}.npz")
     assert stored == found
-    again = replay(subject.scenario, arena.world, stored.actions, subject.horizon)
+    again = replay(subject.scenario, player.world, stored.actions, subject.horizon)
     assert again.solved and again.digest == found.digest
 
 
-def test_the_witness_itself_refutes_nothing(arena, causal):
-    steps = rest(arena, 0)
-    found = hit(arena, Attempt("witness", steps), False, arena.play(steps, False), None, causal)
+def test_the_witness_itself_refutes_nothing(player, causal):
+    steps = rest(player, 0)
+    found = hit(player, Attempt("witness", steps), False, player.play(steps, False), None, causal)
     assert found and not found.refutes
 
 
-def test_what_does_not_replay_is_no_hit(arena):
-    played = arena.play((PICK, AGAINST), raw=False)
+def test_what_does_not_replay_is_no_hit(player):
+    played = player.play((PICK, AGAINST), raw=False)
     forged = replace(played, digest="0" * 16)
-    assert hit(arena, Attempt("random", (PICK,)), False, forged, None, frozenset()) is None
+    assert hit(player, Attempt("random", (PICK,)), False, forged, None, frozenset()) is None
 
 
 def test_rates_add_up_and_have_bounds():
@@ -152,9 +152,9 @@ def test_rates_add_up_and_have_bounds():
 
 
 @pytest.mark.slow
-def test_the_adversary_finds_that_the_first_tile_can_be_carried(arena):
+def test_the_adversary_finds_that_the_first_tile_can_be_carried(player):
     """It knows nothing of dominoes: it takes what the witness touches, to where the witness ends."""
-    found = Attack(arena, 0, until=lambda hit: hit.refutes)
+    found = Attack(player, 0, until=lambda hit: hit.refutes)
     result = found.run(60, (RETRY,))
     assert any(one.refutes for one in result.hits)
     assert sum(rate.rollouts for rate in result.rates) <= 60

@@ -15,7 +15,7 @@ from pools import QUICKLY, rewritten
 from scengen import cli, config, conformance
 from scengen.attack.evidence import Causal
 from scengen.attack.macros import Macro
-from scengen.attack.play import Arena, Attempt
+from scengen.attack.play import Attempt, Player
 from scengen.attack.retries import retries
 from scengen.attack.variations import rest
 from scengen.control.teleop import Filter
@@ -184,35 +184,35 @@ def test_recordings_hold_the_actions_of_both_arms(folder, rows, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def arena(rows):
+def player(rows):
     row, task = rows[0], config.task("push_pair", SEARCH)
-    return Arena(task.scenario(row.params), row.scene_xml, PAIR, row.horizon, row.witness)
+    return Player(task.scenario(row.params), row.scene_xml, PAIR, row.horizon, row.witness)
 
 
 @pytest.mark.parametrize(("number", "mine", "other"), [(0, "right", "left"), (1, "left", "right")])
-def test_the_adversary_drives_either_arm(arena, number, mine, other):
-    played = arena.play((Macro("push", mine, (0.0, 0.5, 0.0, 0.06, 0.2), number),), raw=False)
+def test_the_adversary_drives_either_arm(player, number, mine, other):
+    played = player.play((Macro("push", mine, (0.0, 0.5, 0.0, 0.06, 0.2), number),), raw=False)
     assert played.actions.shape[1] == 14
     assert (mine, f"robot{number}") in played.signature.pairs
     assert played.signature.moved == {mine}
     assert [pair for pair in played.signature.pairs if other in pair] == [(other, "table")]
 
 
-def test_the_witness_is_taken_apart_for_both_arms_and_can_be_followed(arena):
-    trace = arena.trace
+def test_the_witness_is_taken_apart_for_both_arms_and_can_be_followed(player):
+    trace = player.trace
     assert trace.hands.shape[1:] == (2, 3) and {*trace.handled} == {"right", "left"}
-    assert arena.play(rest(arena, 0), raw=False).solved
-    arena.foreign = {"own": trace.actions}
-    asked, both = list(arena.plan(Macro("replay", "own"), raw=False)), Filter(2)
+    assert player.play(rest(player, 0), raw=False).solved
+    player.foreign = {"own": trace.actions}
+    asked, both = list(player.plan(Macro("replay", "own"), raw=False)), Filter(2)
     assert np.allclose([both(action) for action in asked], trace.actions, atol=1e-5)
 
 
-def test_which_arm_touched_what_belongs_to_what_a_witness_needs(arena):
-    assert {("right", "robot0"), ("left", "robot1")} <= Causal(arena, varied=3).lacking(frozenset())
+def test_which_arm_touched_what_belongs_to_what_a_witness_needs(player):
+    assert {("right", "robot0"), ("left", "robot1")} <= Causal(player, varied=3).lacking(frozenset())
 
 
-def test_retries_are_made_by_both_arms(arena):
-    attempts = [attempt for attempt, _ in zip(retries(arena), range(40), strict=False)]
+def test_retries_are_made_by_both_arms(player):
+    attempts = [attempt for attempt, _ in zip(retries(player), range(40), strict=False)]
     assert {macro.arm for attempt in attempts for macro in attempt.macros} == {0, 1}
     assert all(isinstance(attempt, Attempt) for attempt in attempts)
 
