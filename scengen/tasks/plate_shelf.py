@@ -27,6 +27,7 @@ Decisions, where the paper (App. B, T05 and T06) says no more than "cutlery plat
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -36,6 +37,7 @@ from ..assets.dish import Dish
 from ..assets.plate import Plate
 from ..assets.prop import TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
+from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
@@ -247,13 +249,14 @@ class PlateShelf(PlateAndSlot):
         yield from self.slide_to_the_edge(left, left)
 
     def _insert_flat(self, world: World) -> Plan:
-        """Hand the plate over, and lower it on the slot without turning it on edge."""
+        """Hand the plate over, lower it on the slot without turning it on edge as far as it goes, and let go of it."""
         giver, taker = world.arms
         yield from together(world, self.present(giver), self.wait_beside(taker))
         yield from self.hand_over(world)
         yield from alone(giver, self.leave(giver))
         here = self.foot + (self.shelf.top + 0.01) * UP - self.middle(world)
-        yield from alone(taker, go_to(taker, taker.hand + here, pace=Pace(0.15, 0.01)))
+        with suppress(GaveUp):
+            yield from alone(taker, go_to(taker, taker.hand + here, pace=Pace(0.15, 0.01)))
         yield from alone(taker, jaw.release(taker))
         yield from alone(taker, go_to(taker, taker.hand + STAND_OFF * LEFT))
 
