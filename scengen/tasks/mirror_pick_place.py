@@ -46,7 +46,7 @@ from ..robots.jaw import OPENED, PALM_ABOVE, TIP, pinch
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import pick
-from ..skills.motion import FINE, OPEN, facing_down, go_to, hand_yaw, steer
+from ..skills.motion import FINE, OPEN, facing_down, go_to, steer
 
 LIFTED = 0.04
 """How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
@@ -123,8 +123,8 @@ class MirrorPickPlace(Scenario):
         at = foot + max(GRIP * high, LOWEST, high + UNDER_THE_PALM - PALM_ABOVE) * UP
         faces = world.rot("cube")[:, :2].T
         if long > wide:
-            turn = math.atan2(-faces[0, 0], faces[0, 1]) - hand_yaw(arm)
-            yield from go_to(arm, at + ABOVE * UP, facing_down(hand_yaw(arm) + turn % math.pi), FINE, OPEN)
+            turned = facing_down(math.radians(self.yaw) + math.pi / 2)
+            yield from go_to(arm, at + ABOVE * UP, turned, FINE, OPEN)
         across = max(faces, key=lambda normal: abs(float(normal @ arm.hand_rot[:, 0])))
         yield from pick(arm, at, closing=across, above=ABOVE)
 
