@@ -49,7 +49,10 @@ class Chain:
     """Tiles, without the slab."""
     gap: float
     """Free space between neighbouring faces of an intact chain [m]."""
+    starter: Domino
+    """The first tile."""
     tile: Domino
+    """All others."""
     slab: Domino
     defect: Defect | None = None
 
@@ -73,11 +76,13 @@ class Chain:
 
     @property
     def feet(self) -> dict[int, Vec3]:
-        """Where the tiles that are there stand, by their index, and as `feet[count]` the slab [m]."""
-        thick = self.tile.thickness
-        faces = np.cumsum([-self.count * (self.gap + thick) / 2, *(self.gaps + thick)])
-        feet = {i: np.array([face + thick / 2, 0.0, 0.0]) for i, face in enumerate(faces[:-1])}
-        feet[self.count] = np.array([faces[-1] + self.slab.thickness / 2, 0.0, 0.0])
+        """Where the tiles that are there stand, by their index, and as `feet[count]` the slab [m].
+
+        The origin is the middle of a chain of equal tiles: a stouter starter grows away from the face that is pushed.
+        """
+        thick = np.array([self.starter.thickness, *[self.tile.thickness] * (self.count - 1), self.slab.thickness])
+        faces = np.cumsum([-self.count * (self.gap + self.tile.thickness) / 2, *(self.gaps + thick[:-1])])
+        feet = {i: np.array([middle, 0.0, 0.0]) for i, middle in enumerate(faces + thick / 2)}
         if self.defect and self.defect.kind == GAP:
             side = 1 if self.defect.side else -1
             feet[self.defect.broken(self.count)][1] = side * self.defect.offset * self.tile.width
@@ -114,7 +119,9 @@ class Lanes:
     def piece(self, name: str) -> Domino:
         """The tile or slab of that name."""
         chain = self.chains[int(name.split("_")[1])]
-        return chain.tile if name.startswith("tile") else chain.slab
+        if not name.startswith("tile"):
+            return chain.slab
+        return chain.starter if name.endswith("_0") else chain.tile
 
     @property
     def room(self) -> float:

@@ -59,12 +59,12 @@ CARRIED = 0.01
 TOLERANCE = 1e-10
 """Solver tolerance: at MuJoCo's 1e-8 of the scene's inertia two dozen tiles of 20 g never stop rocking."""
 TOPPLED = math.radians(30.0)
-"""Lean at which a first tile falls on by itself, even if it carries its neighbour along [rad]."""
+"""Lean at which a slender first tile falls on by itself, even if it carries its neighbour along [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DominoSelect(Scenario):
-    """Five parallel chains with a slab each: one intact, four with a defect."""
+    """Five parallel chains with a slab each: one intact, four with a defect; first tiles may differ from the others."""
 
     count: int = param(4, "tiles", 3, 8)
     gap_ratio: float = param(1.25, "tile widths", 0.2, 2.5)
@@ -80,6 +80,7 @@ class DominoSelect(Scenario):
     second: Defect = Defect(kind=DRIFT)
     third: Defect = Defect(kind=DECOY)
     fourth: Defect = Defect(kind=GAP, place=0.6, side=0)
+    starter: Domino = Domino(height=0.05, width=0.025, thickness=0.008, mass=0.02, rgba=(0.95, 0.70, 0.25, 1.0))
     tile: Domino = Domino(height=0.05, width=0.025, thickness=0.008, mass=0.02)
     slab: Domino = Domino(height=0.11, width=0.04, thickness=0.012, mass=0.03, rgba=(0.78, 0.10, 0.10, 1.0))
     decoy: Domino = Domino(height=0.11, width=0.04, thickness=0.012, mass=0.03, rgba=(0.15, 0.30, 0.62, 1.0))
@@ -116,8 +117,10 @@ class DominoSelect(Scenario):
 
     def topple(self, world: World, tile: str) -> Plan:
         """Push a tile over along its chain with the closed finger tips, then step back."""
-        behind = self.feet[tile] + 0.8 * self.tile.height * UP - (self.tile.thickness / 2 + FINGER + 0.02) * self.u
-        yield from poke(world.arm, behind, 0.08 * self.u, lambda: world.tilt(tile) > TOPPLED, above=0.08)
+        piece = self.lanes.piece(tile)
+        behind = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER + 0.02) * self.u
+        lean = max(TOPPLED, 1.3 * piece.tipping_angle)
+        yield from poke(world.arm, behind, 0.08 * self.u, lambda: world.tilt(tile) > lean, above=0.08)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -145,7 +148,7 @@ class DominoSelect(Scenario):
     def _carry(self, world: World) -> Plan:
         """Take the intact chain's first tile, which may be touched, and knock its slab over with the tile's foot."""
         tile, slab = self.feet[f"tile_{self.intact}_0"], self.feet[f"slab_{self.intact}"]
-        yield from pick(world.arm, tile + 0.7 * self.tile.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
+        yield from pick(world.arm, tile + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
         yield from go_to(world.arm, slab + (self.slab.height + TIP + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
@@ -165,7 +168,8 @@ class DominoSelect(Scenario):
 
     def constraints(self) -> Iterator[Refutation | None]:
         gap, height, spaces = self.gap, self.tile.height, self.count * self.gap
-        yield require(gap < height, "a falling tile cannot reach its neighbour", gap=gap, height=height)
+        least = min(height, self.starter.height)
+        yield require(gap < least, "a falling tile cannot reach its neighbour", gap=gap, height=least)
         beyond, broken = 2 * gap + self.tile.thickness, self.lanes.defects(GAP, MISSING)
         yield require(beyond > height or not broken, "a falling tile reaches across the gap", gap=beyond, height=height)
         widest = max((drift.stretch * height for drift in self.lanes.defects(DRIFT)), default=0.0)
@@ -176,15 +180,19 @@ class DominoSelect(Scenario):
         starts = [self.feet[f"tile_{k}_0"] for k in range(LANES)]
         fallen = [foot + self.slab.height * self.u for name, foot in self.feet.items() if not name.startswith("tile")]
         yield on_table("a chain", starts + fallen)
-        yield within_reach("a first tile", *(start + height * UP for start in starts))
+        yield within_reach("a first tile", *(start + self.starter.height * UP for start in starts))
 
     def features(self) -> Mapping[str, float]:
-        """The lean of a tile that strikes the next one, the room between chains, how narrowly chains fail; 0: none."""
+        """How far tiles lean when they strike, the room between chains, how narrowly chains fail (0: none do so), and
+        the first push [rad].
+        """
         return {
             "gap_over_height": self.gap / self.tile.height,
+            "gap_over_starter_height": self.gap / self.starter.height,
             "lane_over_slab_width": self.lane / self.slab.width,
             "least_drift_over_height": min((drift.stretch for drift in self.lanes.defects(DRIFT)), default=0.0),
             "least_offset_over_width": min((gap.offset for gap in self.lanes.defects(GAP)), default=0.0),
+            "starter_tipping_angle": self.starter.tipping_angle,
         }
 
     # --- geometry -------------------------------------------------------------------------
@@ -214,7 +222,7 @@ class DominoSelect(Scenario):
     def lanes(self) -> Lanes:
         """The five chains in their own axes."""
         ends = [(self.decoy if defect and defect.kind == DECOY else self.slab, defect) for defect in self.defects]
-        return Lanes(tuple(Chain(self.count, self.gap, self.tile, *end) for end in ends), self.lane)
+        return Lanes(tuple(Chain(self.count, self.gap, self.starter, self.tile, *end) for end in ends), self.lane)
 
     @cached_property
     def feet(self) -> dict[str, Vec3]:

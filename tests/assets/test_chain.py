@@ -14,8 +14,8 @@ TILE = Domino(height=0.05, width=0.025, thickness=0.008)
 SLAB = Domino(height=0.11, width=0.04, thickness=0.012)
 
 
-def chain(defect=None, count=4, gap=0.031):
-    return Chain(count, gap, TILE, SLAB, defect)
+def chain(defect=None, count=4, gap=0.031, starter=TILE):
+    return Chain(count, gap, starter, TILE, SLAB, defect)
 
 
 @given(count=st.integers(3, 8), gap=st.floats(0.01, 0.05))
@@ -24,6 +24,14 @@ def test_an_intact_chain_has_equal_gaps_and_the_origin_in_its_middle(count, gap)
     rear = feet - [*[TILE.thickness / 2] * count, SLAB.thickness / 2]
     assert rear[1:] - rear[:-1] == pytest.approx(TILE.thickness + gap)
     assert rear[0] == pytest.approx(-rear[-1]), "measured from the first face that is pushed to the face of the slab"
+
+
+def test_a_stout_starter_is_pushed_where_a_slender_one_is_and_the_gaps_stay():
+    stout = Domino(height=0.03, width=0.025, thickness=0.02)
+    slender, feet = chain().feet, chain(starter=stout).feet
+    assert feet[0][0] - stout.thickness / 2 == pytest.approx(slender[0][0] - TILE.thickness / 2)
+    for i in range(1, 5):
+        assert feet[i][0] - slender[i][0] == pytest.approx(stout.thickness - TILE.thickness)
 
 
 @given(place=st.floats(0.0, 1.0), count=st.integers(3, 8), side=st.sampled_from([0, 1]), offset=st.floats(1.02, 2.5))
