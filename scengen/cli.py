@@ -46,6 +46,8 @@ VERBS = (
     "bench",
 )
 
+CONTINUING = ("generate", "evaluate", "attack", "axis", "discover")
+"""Commands that keep what is finished when they are interrupted, and go on from there."""
 COMPLETING = ("--completion", "--complete")
 """What shells ask for."""
 GRACE = 1.5
@@ -112,7 +114,8 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     except ScengenError as error:
         return _told(str(error), _kept(error) if isinstance(error, ForeignCode) else "")
     except KeyboardInterrupt:
-        _line("scengen: interrupted; what is finished is kept, the same command continues")
+        kept = "what is finished is kept, the same command continues"
+        _line(f"scengen: interrupted; {kept if argv[0] in CONTINUING else 'the same command begins anew'}")
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()

@@ -43,9 +43,9 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(f"{where} passes every check of certify={certify_settings.name}; there is nothing to shrink")
     say(f"{where} fails {failed.name}: {failed.reason}")
     scales = {name: scale(task, name) for name in task.known}
-    with ProgressBar(err, f"shrink {where}", 0) as progress_bar:
+    with ProgressBar(err, f"shrink {where}", None) as progress_bar:
         found = shrink(
-            values(scenario), centre(task.training), scales, _fails(task, certify_settings, failed, progress_bar.of)
+            values(scenario), centre(task.training), scales, _fails(task, certify_settings, failed, progress_bar.show)
         )
     out.print(shrunk_table(found, {name: p.unit for name, p in task.known.items()}))
     nearest = with_values(scenario, found.values)
@@ -66,7 +66,7 @@ def _proposed(task: Task, settings: Settings) -> Scenario:
 
 
 def _fails(
-    task: Task, certify_settings: CertifySettings, failed: Check, progress: Callable[[int, int], None]
+    task: Task, certify_settings: CertifySettings, failed: Check, progress: Callable[[int, str], None]
 ) -> Callable[[Mapping[str, Value]], bool]:
     """Whether a scenario fails the same check, and no cheaper one before it."""
     start, judged = task.family(), 0
@@ -74,7 +74,7 @@ def _fails(
     def fails(candidate: Mapping[str, Value]) -> bool:
         nonlocal judged
         judged += 1
-        progress(judged, judged + 1)
+        progress(judged, "scenarios judged")
         scenario = with_values(start, candidate)
         certificate = certify(
             scenario, task.horizon, certify_settings, task.embodiment, failed.name, attacked

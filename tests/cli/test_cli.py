@@ -6,6 +6,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import mujoco
@@ -135,6 +136,18 @@ def test_fewer_than_asked_for_is_status_1_and_keeps_what_there_is(capsys, tmp_pa
     rejects = list(opened.rejects())
     assert [r.certificate.verdict for r in rejects] == ["unknown", "unknown"]
     assert all("the oracle failed" in r.certificate.reason and len(r.witness) == 0 for r in rejects)
+
+
+@pytest.mark.parametrize("verb", list(cli.VERBS))
+def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatch, verb):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(import_module(f"scengen.commands.{verb}"), "command", interrupted)
+    status, text = said(capsys, verb)
+    head = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text().split("# Example")[0]
+    continues = "to continue" in head
+    assert status == 130 and ("is kept" in text) == continues and ("begins anew" in text) != continues
 
 
 def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
