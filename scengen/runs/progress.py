@@ -13,7 +13,10 @@ EVERY = 15.0
 
 
 class ProgressBar:
-    """Shows how far some work has come, how fast it goes, when it will end, and on how many nodes."""
+    """Shows how far some work has come, how fast it goes, when it will end, and on how many nodes.
+
+    The total is None where nobody knows when it will end.
+    """
 
     def __init__(self, console: PlainConsole, title: str, total: int | None, workers: Workers = 1):
         title = printable(title)
@@ -41,8 +44,8 @@ class ProgressBar:
         if self.console.is_terminal:
             self._progress.stop()
 
-    def of(self, done: int, total: int | None, note: str = "") -> None:
-        """Say that `done` of a total are done that was not known before; None where nobody can know it."""
+    def of(self, done: int, total: int, note: str = "") -> None:
+        """Say that `done` of a total are done that was not known before."""
         self.total = total
         self._progress.update(self._task, total=total)
         self.show(done, note)
@@ -59,7 +62,7 @@ class ProgressBar:
         due = now - self._last > EVERY or (done == self.total and self._said != done)
         if due and not self.console.is_terminal:
             self._last, self._said = now, done
-            left = (self.total - done) / rate if rate and self.total is not None else 0.0
+            left = (self.total - done) / rate if rate and self.total else 0.0
             end = time.strftime(", ends %a %H:%M", time.localtime(time.time() + left)) if left else ""
-            share = "" if self.total is None else f" of {self.total}"
-            self.console.print(f"{self.title}: {done}{share} {told}".rstrip() + end)
+            of = "" if self.total is None else f" of {self.total}"
+            self.console.print(f"{self.title}: {done}{of} {told}".rstrip() + end)
