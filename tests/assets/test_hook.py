@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import anywhere
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from scengen.assets.box import Cube
@@ -125,7 +125,7 @@ def contacts_of_peg(hook, radius, x, y):
     scene.worldbody.add_frame().attach_body(hook.spec().body("body"), "hook/", "")
     peg = scene.worldbody.add_body(pos=[x, y, hook.height / 2])
     peg.add_freejoint()
-    peg.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, hook.height, 0])
+    peg.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, hook.height, 0], mass=1.0)
     model = scene.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -133,10 +133,12 @@ def contacts_of_peg(hook, radius, x, y):
 
 
 @given(hook=anywhere(JHook))
+@example(hook=JHook(radius=0.02, width=0.04))
 @settings(max_examples=40, deadline=None)
 def test_a_bend_lets_in_the_nominal_circle_and_nothing_wider(hook):
     at = hook.length / 2, hook.side * hook.radius
-    assert contacts_of_peg(hook, hook.engaging / 2 - 2e-5, *at) == 0
+    if hook.engaging > 4e-5:  # a bend at the ends of its bounds is closed: no circle is smaller than that
+        assert contacts_of_peg(hook, hook.engaging / 2 - 2e-5, *at) == 0
     assert contacts_of_peg(hook, hook.engaging / 2 + 2e-5, *at) > 0
 
 
