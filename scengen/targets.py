@@ -4,6 +4,8 @@ import errno
 import os
 import stat
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import BadConfig, cut
@@ -64,14 +66,8 @@ def try_file(path: Path | str | None) -> None:
             raise BadConfig(f"{cut(str(path))} is no plain file; name another one")
         if path.exists():
             open(path, "r+b").close()
-        made = _folders(path.parent)
-        try:
-            _trial(path.parent)
-            if not path.exists():
-                open(path, "xb").close()
-                path.unlink()
-        finally:
-            _remove(made)
+        with _trial(path.parent) as folder:
+            open(folder / path.name, "xb").close()
     except OSError as error:
         raise refused(path, error) from None
 
@@ -88,11 +84,8 @@ def try_folder(path: Path | str | None) -> None:
     try:
         if os.path.lexists(path) and not path.is_dir():
             raise BadConfig(f"{cut(str(path))} is a file; name a folder")
-        made = _folders(path)
-        try:
-            _trial(path)
-        finally:
-            _remove(made)
+        with _trial(path):
+            pass
     except OSError as error:
         raise refused(path, error) from None
 
@@ -120,30 +113,18 @@ def write(path: Path, content: str | bytes) -> None:
         raise refused(path, error) from None
 
 
-def _folders(path: Path) -> list[Path]:
-    """Make a folder with its parents; those that were not there, outermost first."""
-    missing = []
-    while not path.exists():
-        missing.append(path)
-        path = path.parent
-    made: list[Path] = []
-    try:
-        for folder in reversed(missing):
-            folder.mkdir()
-            made.append(folder)
-    except OSError:
-        _remove(made)
-        raise
-    return made
+@contextmanager
+def _trial(folder: Path) -> Iterator[Path]:
+    """A folder with a block written in it, of the same path below a new one where the first part that exists is.
 
-
-def _trial(folder: Path) -> None:
-    """Write a block, since an empty file fits on a disk that is full."""
-    with tempfile.TemporaryFile(dir=folder) as file:
-        file.write(b"\0" * 4096)
-        file.flush()
-
-
-def _remove(made: list[Path]) -> None:
-    for folder in reversed(made):
-        folder.rmdir()
+    Nothing is made, and nothing removed, that another process could be using.
+    """
+    there = folder
+    while not os.path.lexists(there):
+        there = there.parent
+    with tempfile.TemporaryDirectory(prefix=".trial-", dir=there) as new:
+        like = Path(new, folder.relative_to(there))
+        like.mkdir(parents=True, exist_ok=True)
+        (like / "block").write_bytes(b"\0" * 4096)  # an empty file fits on a disk that is full
+        (like / "block").unlink()
+        yield like

@@ -5,28 +5,35 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from scengen import config
+from scengen.samplers.split import ID
 
 POOLS = 2
 """How many are made at a time, each by a process of its own: a pool of one scenario keeps one core busy."""
 
 
-def certified(task: str, split: str, n: str) -> bool:
-    """Make one pool, and print what came of it once it is done."""
+def shortfall(task: str, split: str, n: int) -> str:
+    """Make one pool, and print what came of it once it is done.
+
+    Returns:
+        Which pool fell short, and the last thing that was said of it; empty where none did.
+    """
     asked = (f"task={task}", f"split={split}", f"n={n}", "certify=full", f"pool=generated/certify/{task}-{split}")
     command = [sys.executable, "-m", "scengen", "generate", *asked]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     print(done.stdout, end="", flush=True)
-    return done.returncode == 0
+    return f"{task}/{split}: {(done.stdout.splitlines() or [''])[-1]}" if done.returncode else ""
 
 
-def main(n: str, *splits: str) -> None:
+def main(n: str = "20", *splits: str) -> None:
     """Go through all tasks and say at the end which pools fell short."""
-    every = [(task, split) for task in config.tasks() for split in ("id", *config.task(task).axes)]
+    every = [(task, split) for task in config.tasks() for split in (ID, *config.task(task).axes)]
+    unknown = set(splits) - {split for _, split in every}
+    if not n.isdecimal() or unknown:
+        sys.exit(f"{', '.join(sorted(unknown)) or n} is not known: certify_all.py N [SPLIT ...], splits of any task")
     asked = [(task, split) for task, split in every if not splits or split in splits]
     with ThreadPoolExecutor(POOLS) as threads:
-        held = list(threads.map(lambda one: certified(*one, n), asked))
-    failed = [f"{task}/{split}" for (task, split), holds in zip(asked, held, strict=True) if not holds]
-    sys.exit(f"fewer than {n} certified: {', '.join(failed)}" if failed else 0)
+        short = [line for line in threads.map(lambda one: shortfall(*one, int(n)), asked) if line]
+    sys.exit("\n".join([f"fewer than {n} certified:", *short]) if short else 0)
 
 
 if __name__ == "__main__":

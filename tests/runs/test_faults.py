@@ -9,7 +9,9 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,6 +24,7 @@ from scengen.log import Log
 from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.runs.journal import Journal, Record
+from scengen.targets import try_folder
 
 RECORD = Record(0, "refuted", "rest", "it falls", 1, {}, None, 0.1)
 
@@ -165,6 +168,20 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, capsys
         status, err = said(capsys, *command(pool))
         assert status == 2 and err.startswith("scengen: ") and err.count("\n") == 1 and "unforeseen" not in err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_runs_that_begin_in_the_same_new_folder_do_not_disturb_each_other(tmp_path):
+    def begin(pool):
+        together.wait()
+        try_folder(pool)
+        pool.mkdir(parents=True, exist_ok=True)
+
+    for k in range(20):
+        together = threading.Barrier(2)
+        with ThreadPoolExecutor(2) as threads:
+            list(threads.map(begin, [tmp_path / f"{k}" / "a", tmp_path / f"{k}" / "b"]))
+        assert sorted(path.name for path in (tmp_path / f"{k}").iterdir()) == ["a", "b"]
+    assert len(list(tmp_path.iterdir())) == 20
 
 
 def test_a_refused_run_leaves_no_folder(finished, tmp_path, capsys):
