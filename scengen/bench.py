@@ -25,9 +25,9 @@ from .robots import panda
 from .runs.generate import Settings, generate
 from .samplers.split import ID
 from .samplers.task import Task
-from .sim import scene_text
 from .sim.world import JAW, World
 from .validate.certify import Trial
+from .validate.rebuilt import rebuild, world_of
 from .validate.rollout import Rollout, run
 from .validate.settings import QUICK
 
@@ -115,7 +115,7 @@ def rollout_to_raw(repeats: int) -> float:
     """Time of an oracle rollout over that of the bare mj_step calls through the same states."""
     task = config.task("domino_single")
     scenario = task.draw("id", 0, 0).scenario
-    world = World.load(scene_text.emit(scenario.build())[0])
+    world = world_of(scenario)
 
     def rollout() -> Rollout:
         return run(scenario, world, scenario.oracle, task.horizon)
@@ -126,7 +126,7 @@ def rollout_to_raw(repeats: int) -> float:
 
 def two_arms(repeats: int) -> dict[str, float]:
     """A control period of two arms over the bare mj_step calls, and over a control period of one arm."""
-    text = scene_text.emit(config.task("domino_single").draw("id", 0, 0).scenario.build())[0]
+    text = rebuild(config.task("domino_single").draw("id", 0, 0).scenario)
     one, two = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2))
     single = _waving()
     double = np.hstack([single, single])
@@ -282,7 +282,7 @@ def scenario_to_first_step(repeats: int) -> float:
     times = []
     for scenario in scenarios:
         start = time.perf_counter()
-        world = World.load(scene_text.emit(scenario.build())[0])
+        world = world_of(scenario)
         mujoco.mj_step(world.model, world.data)
         times.append(1000 * (time.perf_counter() - start))
     return statistics.median(times[2:])

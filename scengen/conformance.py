@@ -25,8 +25,8 @@ from .samplers.split import ID
 from .samplers.task import Task
 from .scenario import Scenario
 from .sim import scene_text
-from .sim.world import World
 from .validate.certify import NOT_TRIED, certify
+from .validate.rebuilt import rebuild, world_of
 from .validate.rollout import run
 from .validate.settings import QUICK
 
@@ -194,7 +194,7 @@ def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> 
                 _ask(good, f"{where}: the {kind} {name!r} has no name in snake_case, such as push_the_slab")
         both = sorted(scenario.features().keys() & values(scenario).keys())
         _ask(not both, f"{where}: {', '.join(both)} name both parameters and features; a table of both needs two names")
-        whole = scene_text.emit(scenario.build())[0]
+        whole = rebuild(scenario)
         for name, scene in ablations.items():
             _ask(scene_text.emit(scene)[0] != whole, f"{where}: the ablation {name!r} takes nothing away")
 
@@ -214,7 +214,7 @@ def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) 
 
 def _judged_alike(task: Task, scenario: Scenario, other: frames.Moved) -> None:
     """What a family says of every moment of a solution does not depend on where the scene stands."""
-    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    world = world_of(scenario, task.embodiment)
     solution = run(scenario, world, scenario.oracle, task.horizon)
     _ask(solution.solved, f"{task.name}/id/0: the oracle fails: {solution.reason}")
     differs = frames.differing(scenario, other, solution.actions, task.embodiment)

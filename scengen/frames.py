@@ -18,8 +18,8 @@ from .geometry import Mat3, Vec3, about_z, quat, yaw_of
 from .params import Parameter, parameters, with_values
 from .samplers.keyed import unit
 from .scenario import Scenario
-from .sim import scene_text
 from .sim.world import World
+from .validate.rebuilt import world_of
 
 EXACT = 1e-9
 """How far a geom may be from where a rigid motion takes it [m, and entries of matrices]: rounding."""
@@ -73,7 +73,7 @@ def differing(scenario: Scenario, other: Moved, actions: Actions, embodiment: st
     Returns:
         The first verdict that is another there, in words; empty if there is none.
     """
-    played, here, there = (_load(s, embodiment) for s in (scenario, scenario, other.scenario))
+    played, here, there = (world_of(s, embodiment) for s in (scenario, scenario, other.scenario))
     _move_robot(there, other.motion)
     episode = Episode(scenario, played)
     for period, action in enumerate(actions):
@@ -142,10 +142,6 @@ def _motion(before: Scenario, after: Scenario) -> Motion | None:
 
 def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=0.0, atol=EXACT)
-
-
-def _load(scenario: Scenario, embodiment: str) -> World:
-    return World.load(scene_text.emit(scenario.build())[0], embodiment)
 
 
 def _move_robot(world: World, motion: Motion) -> None:

@@ -20,8 +20,8 @@ from scengen.pictures.render import Picture, camera
 from scengen.samplers.axis import spell
 from scengen.samplers.dists import Fixed
 from scengen.samplers.task import ID, Task
-from scengen.sim import scene_text
 from scengen.validate.certify import Certified, certify
+from scengen.validate.rebuilt import rebuild
 
 FOLDER = Path("docs/tasks")
 AXES = Path("docs/axes.md")
@@ -53,7 +53,7 @@ def overview() -> Picture:
     """The start of the same training scenario of every task, side by side."""
     scenes = []
     for task in map(config.task, config.tasks()):
-        scene_xml = scene_text.emit(task.draw(ID, 0, SCENARIO).scenario.build())[0]
+        scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
         with camera(scene_xml, task.embodiment, *SMALL) as view:
             scenes.append(view.take())
     empty = np.full_like(scenes[0], 255)

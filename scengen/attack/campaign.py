@@ -16,9 +16,9 @@ from ..pool import Pool, PoolRow, sha256
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..schema import why_no_plain_file
-from ..sim import scene_text
 from ..sim.world import World
 from ..validate.identity import source_sha256
+from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from .evidence import Hit, Rate, rates, unsound
 from .play import Player
@@ -190,7 +190,7 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
             scenario = task.draw(split, seed, index).scenario
         except Infeasible:
             continue
-        text, _ = scene_text.emit(scenario.build())
+        text = rebuild(scenario)
         rollout = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
         if rollout.solved:
             name = Name(task.name, split, index, scenario.id)
@@ -271,7 +271,7 @@ def fitted(task: Task, settings: Settings) -> list[Prior]:
 
 def _by_rollouts(task: Task) -> Judge:
     def judge(scenario: Scenario) -> Callable[[float], bool]:
-        world, answer = World.load(scene_text.emit(scenario.build())[0], task.embodiment), scenario.answer()
+        world, answer = world_of(scenario, task.embodiment), scenario.answer()
         assert answer is not None, "asked for once for the family"
 
         def right(value: float) -> bool:

@@ -16,10 +16,10 @@ from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
 from ..samplers.task import Task
 from ..schema import memory_bounded, read_json
-from ..sim import scene_text
 from ..sim.world import World
 from ..targets import refused
 from ..validate.certify import lower_bound
+from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
 from .play import SETTLE, Attempt, Node, Played, Player
@@ -125,7 +125,7 @@ def unsound(hit: Hit, task: Task) -> str:
     scenario = task.scenario(hit.params)
     if scenario.id != hit.scenario:
         return OTHER_SCENARIO
-    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    world = world_of(scenario, task.embodiment)
     again = replay(scenario, world, hit.actions, task.horizon, SETTLE)
     return "" if again.solved else f"its actions do not reach the goal: {again.reason}"
 

@@ -13,10 +13,10 @@ from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
 from ..runs.progress import ProgressBar
-from ..sim import scene_text
 from ..targets import try_file
 from ..task_files import search_path
 from ..validate.playable import check_row
+from ..validate.rebuilt import rebuild
 from . import OK, Arguments, chosen, err, holder, say, write
 
 STRIP = 100_000_000
@@ -93,4 +93,4 @@ def _hit(settings: Settings, arguments: Arguments) -> Take:
     if scenario.id != hit.scenario:
         raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")
     say(str(hit))
-    return Take(scenario, scene_text.emit(scenario.build())[0], task.embodiment, hit.actions)
+    return Take(scenario, rebuild(scenario), task.embodiment, hit.actions)

@@ -29,10 +29,9 @@ from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
 from ..scenario import Scenario
-from ..sim import scene_text
-from ..sim.world import World
 from ..statistics import Difference, Rate, paired, rate
 from ..validate.identity import source_sha256
+from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
 from .memory import Memory, remember
 
@@ -285,29 +284,25 @@ def _faithful(scenario: Scenario, horizon: float, embodiment: str) -> bool:
 
 @cache
 def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> Memory | None:
-    world = _world(scenario, embodiment)
+    world = world_of(scenario, embodiment)
     rollout = run(scenario, world, scenario.oracle, horizon, until_settled=True)
     return remember(scenario, world, rollout.actions) if rollout.solved else None
 
 
 def _follows(memory: Memory, scenario: Scenario, horizon: float, embodiment: str) -> bool:
-    world = _world(scenario, embodiment)
+    world = world_of(scenario, embodiment)
     return run(scenario, world, memory.follow, horizon, until_settled=True, raw=True).solved
-
-
-def _world(scenario: Scenario, embodiment: str) -> World:
-    return World.load(scene_text.emit(scenario.build())[0], embodiment)
 
 
 def solves(task: Task, scenario: Scenario) -> bool:
     """Whether the oracle solves a scenario."""
-    world = _world(scenario, task.embodiment)
+    world = world_of(scenario, task.embodiment)
     return run(scenario, world, scenario.oracle, task.horizon, until_settled=True).solved
 
 
 def replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
     """Whether recorded actions solve a scenario."""
-    world = _world(scenario, task.embodiment)
+    world = world_of(scenario, task.embodiment)
     return replay(scenario, world, actions, task.horizon, until_settled=True).solved
 
 

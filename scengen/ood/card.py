@@ -24,9 +24,9 @@ from ..samplers.split import ID
 from ..samplers.support import Support
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim import scene_text
 from ..statistics import Rate
 from ..targets import write
+from ..validate.rebuilt import rebuild
 from ..validate.settings import CertifySettings
 from . import behaviour, boundary, features
 
@@ -224,7 +224,7 @@ def _page(task: Task, card: Card, pool: Pool | None, seed: int, path: Path) -> s
 def _pair(task: Task, seed: int, row: PoolRow) -> tuple[str, str]:
     """The training twin and the scenario from the same side, as data addresses for HTML."""
     here, where = thumbnail(row.scene_xml, row.embodiment)
-    twin = scene_text.emit(task.draw(ID, seed, row.index).scenario.build())[0]
+    twin = rebuild(task.draw(ID, seed, row.index).scenario)
     return thumbnail(twin, task.embodiment, where)[0], here
 
 

@@ -13,9 +13,9 @@ from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..sim import scene_text
 from ..targets import write
 from ..validate.playable import check_row
+from ..validate.rebuilt import rebuild
 from . import film, render
 from .report import LARGEST_PAGE, template, thumbnail
 
@@ -92,7 +92,7 @@ def _twin(pool: Pool, task: Task, row: PoolRow) -> str:
             f"{row.id}: its training twin comes out as {trained.id}, but the pool names {row.id_twin}; the family has "
             "changed since, see scengen verify"
         )
-    return scene_text.emit(trained.build())[0]
+    return rebuild(trained)
 
 
 def _strip(task: Task, row: PoolRow) -> str:

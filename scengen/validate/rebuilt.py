@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 from ..errors import BadConfig
 from ..scenario import Scenario
 from ..sim import scene_text
+from ..sim.world import JAW, World
 
 SAME, ZERO = 1e-9, 1e-12
 """Largest difference of two numbers, relative and absolute, on machines that round otherwise: an inertia has 1e-6."""
@@ -18,6 +19,11 @@ OTHER = "the scene is not the one that the family builds from the parameters"
 def rebuild(scenario: Scenario) -> str:
     """The text of a scenario's scene."""
     return scene_text.emit(scenario.build())[0]
+
+
+def world_of(scenario: Scenario, embodiment: str = JAW) -> World:
+    """A scenario's scene with its robot, at its start."""
+    return World.load(rebuild(scenario), embodiment)
 
 
 def difference(text: str, rebuilt: str, exact: bool) -> str:

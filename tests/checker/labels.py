@@ -66,12 +66,12 @@ def _param(name: str, by: float) -> Change:
 
     def change(draft: Draft) -> None:
         from scengen import config
-        from scengen.sim import scene_text
+        from scengen.validate.rebuilt import rebuild
 
         row = draft.row
         row["params"][name] *= by
         scenario = config.task(row["task"]).scenario(row["params"])
-        row["scene_xml"] = scene_text.emit(scenario.build())[0]
+        row["scene_xml"] = rebuild(scenario)
         draft.check("feasible")["numbers"] = dict(scenario.features())
         draft.played()
 

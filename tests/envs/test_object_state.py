@@ -14,18 +14,14 @@ from scengen.envs.object_state import ObjectState, bodies_of
 from scengen.params import values, with_values
 from scengen.pool import Pool
 from scengen.samplers.split import ID
-from scengen.sim import scene_text
 from scengen.sim.world import World, hands
+from scengen.validate.rebuilt import rebuild, world_of
 
 HIDING = [name for name in config.tasks() if any(p.hidden for p in config.task(name).known.values())]
 
 
 def state_of(task):
     return ObjectState(bodies_of(task), len(hands(task.embodiment)))
-
-
-def world_of(scenario, embodiment="panda_jaw"):
-    return World.load(scene_text.emit(scenario.build())[0], embodiment)
 
 
 def entries(state, read, name):
@@ -122,7 +118,7 @@ def test_bodies_of_a_pool_with_other_distributions_are_there_too():
     task = config.task("domino_single")
     many = with_values(task.draw(ID, 0, 0).scenario, {"count": 8})
     assert "tile_7" not in bodies_of(task)
-    assert bodies_of(task, [scene_text.emit(many.build())[0]])["tile_7"]
+    assert bodies_of(task, [rebuild(many)])["tile_7"]
 
 
 def test_what_cannot_move_has_a_pose_and_no_velocity():

@@ -29,6 +29,7 @@ from scengen.runs.generate import row_of
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import Certified
+from scengen.validate.rebuilt import rebuild
 from scengen.versions import versions
 
 # isort: split
@@ -51,7 +52,7 @@ def drawn(task):
     """A row as in a pool, of a scenario that nobody has certified."""
     found = config.task(task)
     draw = found.draw("id", 0, 0)
-    text = scene_text.emit(draw.scenario.build())[0]
+    text = rebuild(draw.scenario)
     return row_of(found, draw, Certified(Certificate("quick", ()), text, NO_WITNESS, ""))
 
 

@@ -11,9 +11,8 @@ from scengen.ood import behaviour, features
 from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Baseline, measure, verdict
 from scengen.ood.memory import remember
 from scengen.samplers.split import ID
-from scengen.sim import scene_text
-from scengen.sim.world import World
 from scengen.statistics import paired, rate
+from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import run
 
 TASK = config.task("domino_single")
@@ -51,7 +50,7 @@ def test_the_verdict_names_the_strongest_memory_that_breaks():
 def solved(split, index):
     """A scenario of a split, its world, and the oracle's actions."""
     scenario = TASK.draw(split, 0, index).scenario
-    world = World.load(scene_text.emit(scenario.build())[0], TASK.embodiment)
+    world = world_of(scenario, TASK.embodiment)
     return scenario, world, run(scenario, world, scenario.oracle, TASK.horizon).actions
 
 
@@ -66,7 +65,7 @@ def test_an_object_centric_memory_follows_its_body():
 def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
     task = config.task("tool_retrieve")
     scenario = task.draw(ID, 0, 0).scenario
-    world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
+    world = world_of(scenario, task.embodiment)
     memory = remember(scenario, world, run(scenario, world, scenario.oracle, task.horizon).actions)
     assert [part.body for part in memory.paths[0].parts] == ["hook", "cube"]
     assert run(scenario, world, memory.follow, task.horizon, raw=True).solved, "its own scenario again"

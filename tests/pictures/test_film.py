@@ -19,6 +19,7 @@ from scengen.scenario import Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import certify
+from scengen.validate.rebuilt import world_of
 
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)))
 drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
@@ -50,7 +51,7 @@ def on_screen(world, camera, points, aspect):
 def test_the_default_view_holds_everything_that_stands_on_the_table(task):
     """All corners in the scene of nominal values, and the hands; it is as near as that and `CLOSEST` allow."""
     loaded = config.task(task)
-    world = World.load(scene_text.emit(loaded.family().build())[0], loaded.embodiment)
+    world = world_of(loaded.family(), loaded.embodiment)
     model, data = world.model, world.data
     others = {world.body("world"), world.body("table"), *world.own}
     points = [arm.hand for arm in world.arms]

@@ -7,12 +7,12 @@ import pytest
 
 from scengen.errors import NoEvent, UnknownName, Unstable
 from scengen.geometry import between
-from scengen.sim import scene_text
 from scengen.sim.world import IDLE, ROBOT, World
 from scengen.skills.motion import ALIGNED, FINE, facing_down, go_to
 from scengen.tasks.domino_single import DominoSingle
+from scengen.validate.rebuilt import rebuild
 
-SCENE = scene_text.emit(DominoSingle().build())[0]
+SCENE = rebuild(DominoSingle())
 WAVE = [np.array([np.sin(0.1 * k), np.cos(0.2 * k), -0.6, 0.2, -0.1, 0.3, (-1.0) ** k]) for k in range(150)]
 
 

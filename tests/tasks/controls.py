@@ -19,6 +19,7 @@ from scengen.scenario import Plan, Planner, Refutation, Scenario, Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import certify
+from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import Rollout, replay, run, try_shortcut
 from scengen.validate.settings import CertifySettings, Robust
 
@@ -51,7 +52,7 @@ def solution(task: Task, scenario: Scenario) -> Rollout:
 
 @cache
 def _solution(horizon: float, embodiment: str, scenario: Scenario) -> Rollout:
-    world = World.load(scene_text.emit(scenario.build())[0], embodiment)
+    world = world_of(scenario, embodiment)
     rollout = run(scenario, world, scenario.oracle, horizon)
     assert rollout.solved, rollout.reason
     return rollout

@@ -24,8 +24,8 @@ from scengen.assets.box import Domino
 from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Defect
 from scengen.attack.priors import fit
 from scengen.params import with_values
-from scengen.sim import scene_text
 from scengen.tasks.domino_select import LANES, SLAB_MOVES, DominoSelect
+from scengen.validate.rebuilt import rebuild
 from scengen.validate.rollout import AT_REST, STILL
 
 TASK = config.task("domino_select")
@@ -43,7 +43,7 @@ def strike(scenario, k, spin, rest=STILL):
 
     Returns how far the red slab that went farthest has gone [m].
     """
-    model = mujoco.MjModel.from_xml_string(scene_text.emit(scenario.build())[0])
+    model = mujoco.MjModel.from_xml_string(rebuild(scenario))
     data = mujoco.MjData(model)
     data.qvel[model.joint(f"tile_{k}_0_free").dofadr[0] + 4] = spin
     pair, still, met = {f"tile_{k}_0/box", f"tile_{k}_1/box"}, 0, False

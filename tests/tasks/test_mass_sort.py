@@ -20,10 +20,10 @@ from controls import (
 from scengen import config
 from scengen.attack.priors import fit
 from scengen.params import parameters
-from scengen.sim import scene_text
-from scengen.sim.world import IDLE, World
+from scengen.sim.world import IDLE
 from scengen.skills import jaw
 from scengen.tasks.mass_sort import APART, ORDERS, MassSort, Spot
+from scengen.validate.rebuilt import world_of
 
 TASK = config.task("mass_sort")
 SCENE = MassSort()
@@ -92,7 +92,7 @@ def test_the_oracle_reads_no_mass():
 def test_scenes_that_differ_in_order_and_masses_are_the_same_to_the_eye():
     """Of everything in the compiled model only what weighs may differ: no size, colour, place, name or order."""
     other = replace(SCENE, order=1, light=0.08, middle=0.3, heavy=0.4)
-    worlds = [World.load(scene_text.emit(s.build())[0], TASK.embodiment) for s in (SCENE, other)]
+    worlds = [world_of(s, TASK.embodiment) for s in (SCENE, other)]
     a, b = (world.model for world in worlds)
     arrays = {name: (getattr(a, name), getattr(b, name)) for name in dir(a)}
     arrays = {name: both for name, both in arrays.items() if isinstance(both[0], np.ndarray)}

@@ -28,10 +28,10 @@ from scengen.export.recording import record
 from scengen.orientation import FACED
 from scengen.pool import Pool
 from scengen.runs.generate import row_of
-from scengen.sim import scene_text
 from scengen.sim.world import IDLE
 from scengen.tasks.mirror_pick_place import ASIDE, LIFTED, VIEWS, MirrorPickPlace
 from scengen.validate.certify import Certified
+from scengen.validate.rebuilt import rebuild
 
 # isort: split
 from robosuite import macros
@@ -47,7 +47,7 @@ POSES = ["robot0_eef_pos", "cube_pos", "cube_quat", "seen_cube_pos"]
 def row_with(view):
     """A row as in a pool, of one scene in every view; nobody has certified it."""
     draw = TASK.draw("id", 0, 0)
-    text = scene_text.emit(draw.scenario.build())[0]
+    text = rebuild(draw.scenario)
     witness = np.tile(IDLE, (100, 1)).astype(np.float32)
     row = row_of(TASK, draw, Certified(Certificate("quick", ()), text, witness, ""))
     return replace(row, params={**row.params, "view": view}, id=f"{view:012d}", horizon=2.0)

@@ -15,9 +15,9 @@ from scengen.assets.prop import place, table
 from scengen.assets.seesaw import Seesaw
 from scengen.attack.priors import fit
 from scengen.params import parameters, with_values
-from scengen.sim import scene_text
 from scengen.sim.world import IDLE, World
 from scengen.tasks.seesaw_balance import BEAM, LEVEL, STAYS, SeesawBalance
+from scengen.validate.rebuilt import rebuild
 
 TASK = config.task("seesaw_balance")
 SPLITS = ["id", *TASK.axes]
@@ -123,7 +123,7 @@ def test_scenes_that_differ_in_masses_only_are_the_same_to_the_eye():
         target=replace(one.target, mass=0.4),
         weight=replace(one.weight, mass=0.6),
     )
-    worlds = [World.load(scene_text.emit(s.build())[0], TASK.embodiment, visual=True) for s in (one, other)]
+    worlds = [World.load(rebuild(s), TASK.embodiment, visual=True) for s in (one, other)]
     a, b = (world.model for world in worlds)
     assert a.names == b.names and not (a.cam_mode.any() or a.light_mode.any()), "no camera follows a centre of mass"
     arrays = {name: (getattr(a, name), getattr(b, name)) for name in dir(a)}

@@ -9,11 +9,11 @@ import pytest
 from scengen import config
 from scengen.certificate import CHECKS
 from scengen.geometry import UP
-from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, World
 from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
 from scengen.validate.certify import certify, lower_bound
+from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import AT_REST, Jitter, replay, run
 from scengen.validate.settings import CertifySettings, Robust
 
@@ -202,7 +202,7 @@ def test_a_scene_that_only_works_undisturbed_is_not_certified():
 
 
 def test_jitter_moves_what_it_should_by_what_its_key_says():
-    world = World.load(scene_text.emit(DominoSingle().build())[0])
+    world = world_of(DominoSingle())
     jitter = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0)
     moved, again = jitter.disturbed(world), jitter.disturbed(world)
     other = Jitter("l", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world)
@@ -220,7 +220,7 @@ def test_jitter_moves_what_it_should_by_what_its_key_says():
 def test_jitter_turns_a_hinge_that_is_named_about_its_axle():
     """The bob of a pendulum stays at its distance from the axle, and the joint reads where it hangs."""
     scenario = config.task("pendulum_grasp").draw("id", 0, 0).scenario
-    world = World.load(scene_text.emit(scenario.build())[0])
+    world = world_of(scenario)
     turned = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world, scenario.DISTURBED)
     (before, _), (angle, rate) = world.hinge(HINGE), turned.hinge(HINGE)
     assert 0 < abs(angle - before) <= math.radians(1.0) and rate == 0
@@ -247,12 +247,12 @@ def test_a_success_that_does_not_last_is_none():
         def success(self, world):
             return 1.0 < world.time < 1.2
 
-    episode = run(Fleeting(), World.load(scene_text.emit(DominoSingle().build())[0]), DominoSingle().oracle, HORIZON)
+    episode = run(Fleeting(), world_of(DominoSingle()), DominoSingle().oracle, HORIZON)
     assert episode.outcome == "timeout" and "did not last" in episode.reason
 
 
 def test_a_touch_of_the_slab_between_two_looks_is_remembered():
     scenario = DominoSingle()
-    world = World.load(scene_text.emit(scenario.build())[0])
+    world = world_of(scenario)
     episode = run(scenario, world, scenario.shortcuts()["push_the_slab"].plan, HORIZON)
     assert episode.outcome == "failure" and world.touched(ROBOT, "slab")

@@ -22,6 +22,7 @@ from scengen.sim.world import SUCTION, World
 from scengen.skills.motion import facing_down, go_to, hold
 from scengen.skills.suction import suck
 from scengen.validate.certify import Trial
+from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import AT_REST, replay, run
 from scengen.validate.settings import QUICK
 
@@ -63,10 +64,6 @@ class Surprise(Scenario):
         return not world.memory["happened"]
 
 
-def load(scenario: Scenario, embodiment: str = "panda_jaw") -> World:
-    return World.load(scene_text.emit(scenario.build())[0], embodiment)
-
-
 def closing(world: World, scenario: Scenario, periods: int) -> Episode:
     """Command a closed gripper."""
     episode, action = Episode(scenario, world), np.array([0, 0, 0, 0, 0, 0, 1.0], np.float32)
@@ -82,7 +79,7 @@ def span(world: World) -> float:
 
 @pytest.fixture
 def world() -> World:
-    return load(Surprise())
+    return world_of(Surprise())
 
 
 # --- memory -------------------------------------------------------------------------------
@@ -144,7 +141,7 @@ def test_a_saved_state_continues_bit_by_bit_memory_jam_and_patch_included(world,
     saved = world.state()
     closing(world, scenario, 130 - periods)
     end, place = world.state(), world.pos("patch")
-    other = load(scenario)
+    other = world_of(scenario)
     for one in (world, other):
         one.restore(saved)
         closing(one, scenario, 130 - periods)
@@ -155,7 +152,7 @@ def test_a_saved_state_continues_bit_by_bit_memory_jam_and_patch_included(world,
 def test_recorded_actions_bring_the_same_events(world):
     scenario = Surprise()
     plan = run(scenario, world, lambda w: hold(w.arm, 1.2, 1.0), 4.0, until_settled=True)
-    again = replay(scenario, load(scenario), plan.actions, 4.0, until_settled=True)
+    again = replay(scenario, world_of(scenario), plan.actions, 4.0, until_settled=True)
     assert plan.reason == again.reason == AT_REST
     np.testing.assert_array_equal(again.actions[: len(plan.actions)], plan.actions)
     assert plan.actions[60:110, 6].tolist() == [1.0] * 50, "what is recorded is what was commanded"
@@ -210,7 +207,7 @@ def test_somebody_elses_controller_is_overruled_too(world):
 
 def test_a_jammed_suction_cup_lets_go():
     scenario = Surprise(when=5.0)
-    world = load(scenario, SUCTION)
+    world = world_of(scenario, SUCTION)
     top = world.pos("cube") + Cube().edge * UP
     for plan in (go_to(world.arm, top + 0.03 * UP, facing_down()), suck(world.arm, top, facing_down())):
         for action in plan:
@@ -229,7 +226,9 @@ def test_a_jammed_suction_cup_lets_go():
 
 def test_no_episode_is_at_rest_before_the_last_event():
     ends = {
-        when: run(Surprise(when=when), load(Surprise(when=when)), lambda w: hold(w.arm, 0.1), 8.0, until_settled=True)
+        when: run(
+            Surprise(when=when), world_of(Surprise(when=when)), lambda w: hold(w.arm, 0.1), 8.0, until_settled=True
+        )
         for when in (0.1, 3.0)
     }
     assert ends[0.1].reason == ends[3.0].reason == AT_REST
@@ -272,7 +271,7 @@ class Secretive(Surprise):
 def test_of_a_family_that_does_not_say_the_whole_time_is_watched():
     scenario = Secretive(knock=50.0)
     assert "cube drifts" in rest(scenario).reason
-    assert run(scenario, load(scenario), lambda w: hold(w.arm, 0.1), 4.0, until_settled=True).seconds == 4.0
+    assert run(scenario, world_of(scenario), lambda w: hold(w.arm, 0.1), 4.0, until_settled=True).seconds == 4.0
 
 
 # --- forces and servos --------------------------------------------------------------------
@@ -294,7 +293,7 @@ def test_a_force_is_an_impulse_of_one_period(world):
 @pytest.mark.parametrize("goal", [-0.6, 0.9])
 def test_a_servo_goes_where_it_is_driven_and_sags_by_the_torque_that_it_holds(goal):
     """A spring of stiffness k under a load: k (goal - angle) = m g l cos(angle), about y, which turns down."""
-    world = load(Surprise())
+    world = world_of(Surprise())
     with world.events():
         world.drive("lid/hinge", goal)
     for _ in range(150):
