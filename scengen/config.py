@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -193,6 +194,20 @@ def task(name: str, search: Sequence[str] = ()) -> Task:
     """
     if name not in (known := tasks(search_path(search))):  # a name from a pool must not leave the folders of task files
         raise UnknownName("task", name, known)
+    return _loaded(name, search) if search else _installed(name, packages())
+
+
+@cache
+def _installed(name: str, others: tuple[str, ...]) -> Task:
+    """A task as its file stands; read once, as the code of its family is.
+
+    Args:
+        others: folders of other packages that offer tasks.
+    """
+    return _loaded(name, ())
+
+
+def _loaded(name: str, search: Sequence[str]) -> Task:
     plain, choices = _composed("one_task", [f"task={name}", *search])
     return load(choices["task"], plain["task"])
 

@@ -166,16 +166,18 @@ class Ramp(Prop):
         until the ball rolls; the valley presses with v^2 / (bend - radius) in addition. The far incline is taken as
         endless. Without friction, and where the ball rolls all along, that gives the height of the start.
         """
-        s, speed, spin, g = start, 0.0, 0.0, GRAVITY
+        foot, bend, within = self.foot, self.bend, self.bend - radius
+        s, speed, spin = start, 0.0, 0.0
         while s < 0.0 or speed > 0.0:
-            tilt = self.tilt(s)
-            inside = abs(s) < self.foot
-            press = g * math.cos(tilt) + (speed**2 / (self.bend - radius) if inside else 0.0)
-            rolling = (g * math.sin(tilt) - (speed - spin) / STEP) / 3.5
+            tilt = max(-foot, min(foot, s)) / bend
+            inside = abs(s) < foot
+            pull = GRAVITY * math.sin(tilt)
+            press = GRAVITY * math.cos(tilt) + (speed**2 / within if inside else 0.0)
+            rolling = (pull - (speed - spin) / STEP) / 3.5
             rub = max(-self.friction * press, min(self.friction * press, rolling))
-            speed += STEP * (rub - g * math.sin(tilt))
+            speed += STEP * (rub - pull)
             spin -= STEP * 2.5 * rub
-            s += STEP * speed * (self.bend / (self.bend - radius) if inside else 1.0)
+            s += STEP * speed * (bend / within if inside else 1.0)
         return self.height(s) - SEAMS[self.rolls] * self.slope / self.bend * self.height(start)
 
     def release(self, radius: float) -> float:

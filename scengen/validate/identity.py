@@ -7,7 +7,7 @@ import importlib.util
 import inspect
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -109,19 +109,22 @@ def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:
     return files, installed
 
 
-def _imports(name: str, path: Path) -> Iterator[str]:
+@cache
+def _imports(name: str, path: Path) -> tuple[str, ...]:
     """Names that a file imports, wherever in it; of `from a import b` both `a` and `a.b`, which may be a module."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    found: list[str] = []
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             told = "." * node.level + (node.module or "")
             base = importlib.util.resolve_name(told, package) if node.level else told
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    return tuple(found)
 
 
+@cache
 def _file(name: str) -> Path | None:
     """The Python file of a module; None if there is none, as for names that are no modules."""
     try:
@@ -143,6 +146,7 @@ def _dependencies() -> frozenset[str]:
     return frozenset(re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in importlib.metadata.requires("scengen") or [])
 
 
+@cache
 def _essence(path: Path, family: str) -> str:
     """The code of a file without comments and docstrings, and without `oracle` and `features` of the class `family`.
 

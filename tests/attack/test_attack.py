@@ -199,6 +199,7 @@ def test_the_command_says_what_is_missing(tmp_path, capsys):
     assert "random" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_fails_where_a_hit_refutes(tmp_path):
     """The declared shortcut that carries the tile is no failure here."""
     report = tmp_path / "report.json"

@@ -142,6 +142,7 @@ def test_an_environment_shares_everything_but_mujoco(made, here, monkeypatch, ca
     assert told["mujoco"] == {HERE: {"fingerprint": fingerprint()}} and len(told["scenarios"]) == 1
 
 
+@pytest.mark.slow
 def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(made, here, monkeypatch, capsys):
     monkeypatch.setattr(drift, "environment", lambda version, told: replace(here, mujoco=version))
     assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", "level=replay")) == 2

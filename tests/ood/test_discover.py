@@ -82,6 +82,7 @@ def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
     assert sum(search.stages.values()) <= 400
 
 
+@pytest.mark.slow
 def test_what_is_written_can_stand_in_a_task_file(planted, tmp_path):
     search = discover(TASK, QUICK, Settings(budget=300), tmp_path)
     written = yaml.safe_load(as_yaml(TASK, search))

@@ -65,13 +65,15 @@ def test_everything_below_a_family_is_in_its_hash():
 def test_oracle_and_features_of_the_family_alone_do_not_count(tmp_path):
     from scengen.validate.identity import _essence
 
-    path = tmp_path / "family.py"
-    path.write_text("class A:\n    def oracle(self): return 1\n    def success(self): return 2\n")
-    one, whole = _essence(path, "A"), _essence(path, "")
-    path.write_text("class A:\n    def oracle(self): return 3\n    def success(self): return 2\n")
-    assert _essence(path, "A") == one and _essence(path, "") != whole
-    path.write_text("class A:\n    def oracle(self): return 1\n    def success(self): return 4\n")
-    assert _essence(path, "A") != one
+    def written(name, oracle, success):
+        path = tmp_path / name
+        path.write_text(f"class A:\n    def oracle(self): return {oracle}\n    def success(self): return {success}\n")
+        return path
+
+    family = written("family.py", 1, 2)
+    other_oracle, other_success = written("oracle.py", 3, 2), written("success.py", 1, 4)
+    assert _essence(other_oracle, "A") == _essence(family, "A") != _essence(other_success, "A")
+    assert _essence(other_oracle, "") != _essence(family, "")
 
 
 def test_the_hash_of_code_is_the_same_in_every_python(tmp_path):
