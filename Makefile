@@ -70,11 +70,13 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# Every split of every task at level full: long. N scenarios each; SPLITS=id takes the training splits alone.
+# Every split of every task at level full: long. N scenarios each; SPLITS=id takes the training splits alone, and
+# TASKS=packing some tasks.
 N ?= 20
 SPLITS ?=
+TASKS ?=
 certify: setup
-	$(BIN)/python tools/certify_all.py $(N) $(SPLITS)
+	$(BIN)/python tools/certify_all.py $(N) $(TASKS) $(SPLITS)
 
 # The card of every axis of every task, and docs/axes.md: hours. AXES: settings of scengen axis, and tasks to do alone.
 AXES ?= n=50
@@ -82,7 +84,6 @@ axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)
 
 # The adversary on every task, and docs/attacks.md: some 40 minutes. BUDGET rollouts each; TASKS=packing takes some.
-TASKS ?=
 BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)

@@ -1,4 +1,7 @@
-"""Certify N scenarios of every split of every task with certify=full. `python tools/certify_all.py 20 [split ...]`"""
+"""Certify N scenarios of every split of every task with certify=full.
+
+python tools/certify_all.py [N] [TASK ...] [SPLIT ...]
+"""
 
 import subprocess
 import sys
@@ -24,13 +27,13 @@ def shortfall(task: str, split: str, n: int) -> str:
     return f"{task}/{split}: {(done.stdout.splitlines() or [''])[-1]}" if done.returncode else ""
 
 
-def main(n: str = "20", *splits: str) -> None:
-    """Go through all tasks and say at the end which pools fell short."""
+def main(n: str = "20", *names: str) -> None:
+    """Go through all tasks, or those that are named, and say at the end which pools fell short."""
     every = [(task, split) for task in config.tasks() for split in (ID, *config.task(task).axes)]
-    unknown = set(splits) - {split for _, split in every}
-    if not n.isdecimal() or unknown:
-        sys.exit(f"{', '.join(sorted(unknown)) or n} is not known: certify_all.py N [SPLIT ...], splits of any task")
-    asked = [(task, split) for task, split in every if not splits or split in splits]
+    tasks, splits = ({pair[k] for pair in every}.intersection(names) for k in (0, 1))
+    if unknown := [*([] if n.isdecimal() else [n]), *sorted(set(names) - tasks - splits)]:
+        sys.exit(f"{', '.join(unknown)}: not known; say certify_all.py N [TASK ...] [SPLIT ...]")
+    asked = [(task, split) for task, split in every if task in (tasks or {task}) and split in (splits or {split})]
     with ThreadPoolExecutor(POOLS) as threads:
         short = [line for line in threads.map(lambda one: shortfall(*one, int(n)), asked) if line]
     sys.exit("\n".join([f"fewer than {n} certified:", *short]) if short else 0)
