@@ -27,7 +27,7 @@ demo: setup
 
 test: setup
 	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # The wheel with all its extras, tried away from this folder in an environment of its own, as pip makes it: needs a C
 # compiler for the keyboard driver that robosuite asks for.
