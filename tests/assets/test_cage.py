@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import anywhere
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from manifold3d import Manifold
 
 from scengen.assets.ball import Ball
@@ -60,7 +60,23 @@ def bore(cage, radius):
     return cylinder.rotate(turn).translate((cage.hole_centre + cage.wall / 2 * cage.normal).tolist())
 
 
+MEETING = HoledCage(
+    length=0.08,
+    width=0.0625,
+    height=0.0625,
+    wall=0.0032713438704522826,
+    face=END,
+    hole=0.015625,
+    offset=0.0,
+    sill=0.0078125,
+    trap=0.015625,
+    trap_sill=0.006754993846739619,
+)
+"""Its two sills meet but for rounding."""
+
+
 @given(cage=anywhere(HoledCage).map(fitted))
+@example(cage=fitted(MEETING))
 @settings(max_examples=30, deadline=None)
 def test_no_collision_geometry_lies_in_the_cavity_or_in_the_hole(cage):
     assert cage.margin > -1e-9
@@ -70,9 +86,9 @@ def test_no_collision_geometry_lies_in_the_cavity_or_in_the_hole(cage):
     cavity += Manifold.cube((size - 2 * shrink).tolist(), True).translate(centre.tolist())
     for centre, size in cage._sills():
         cavity -= Manifold.cube((size + 2 * shrink).tolist(), True).translate(centre.tolist())
-    touched = union(cage)
-    assert (touched ^ cavity).volume() < 1e-15
-    assert (touched ^ bore(cage, cage.hole - shrink)).volume() < 1e-15
+    free = cavity, bore(cage, cage.hole - shrink)
+    for piece in pieces(cage):  # each alone: a union of many that only just meet is not exact
+        assert max((piece ^ space).volume() for space in free) < 1e-15
 
 
 @given(cage=anywhere(HoledCage).map(fitted))
