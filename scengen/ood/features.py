@@ -1,12 +1,12 @@
 """Sampled proofs: what interval arithmetic cannot say, draws say with a bound."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from scipy.special import betaincinv
 
 from ..errors import BadConfig, Infeasible
 from ..params import values
-from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario
 
@@ -119,8 +119,8 @@ def unseen(draws: int) -> float:
 def _twins(task: Task, split: str, draws: int, seed: int) -> list[tuple[Scenario, Scenario]]:
     found = []
     for index in range(draws):
-        try:
-            found.append((task.draw(ID, seed, index).scenario, task.draw(split, seed, index).scenario))
-        except Infeasible:
-            continue  # an infeasible index is no scenario; it is counted where scenarios are generated
+        with suppress(Infeasible):  # an infeasible index is no scenario; it is counted where scenarios are generated
+            *_, last = task.proposals(split, seed, index)
+            if last.refutation is None:
+                found.append((last.trained or last.scenario, last.scenario))
     return found
