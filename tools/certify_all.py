@@ -7,8 +7,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-from scengen import config
-from scengen.samplers.split import ID
+from scengen import task_files
 
 POOLS = 2
 """How many are made at a time, each by a process of its own: a pool of one scenario keeps one core busy."""
@@ -29,7 +28,7 @@ def shortfall(task: str, split: str, n: int) -> str:
 
 def main(n: str = "20", *names: str) -> None:
     """Go through all tasks, or those that are named, and say at the end which pools fell short."""
-    every = [(task, split) for task in config.tasks() for split in (ID, *config.task(task).axes)]
+    every = [(task, split) for task in task_files.tasks() for split in task_files.splits(task)]
     tasks, splits = ({pair[k] for pair in every}.intersection(names) for k in (0, 1))
     if unknown := [*([] if n.isdecimal() else [n]), *sorted(set(names) - tasks - splits)]:
         sys.exit(f"{', '.join(unknown)}: not known; say certify_all.py N [TASK ...] [SPLIT ...]")

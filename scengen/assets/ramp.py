@@ -169,7 +169,7 @@ class Ramp(Prop):
         foot, bend, within = self.foot, self.bend, self.bend - radius
         s, speed, spin = start, 0.0, 0.0
         while s < 0.0 or speed > 0.0:
-            tilt = max(-foot, min(foot, s)) / bend
+            tilt = max(-foot, min(foot, s)) / bend  # `self.tilt(s)`, which would work out the foot thousands of times
             inside = abs(s) < foot
             pull = GRAVITY * math.sin(tilt)
             press = GRAVITY * math.cos(tilt) + (speed**2 / within if inside else 0.0)
