@@ -168,13 +168,12 @@ def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:
 
 
 def _twins_differ_in_the_axis_alone(task: Task, split: str, scenarios: int, seed: int) -> None:
-    """Scenario i of an axis is scenario i of training but for what the axis names."""
+    """Scenario i of an axis is scenario i of training but for what the axis names, all of it."""
     if split == ID:
         return
-    strays = features.sampled(task, split, 50, seed).strays
-    _ask(
-        not strays, f"{task.name}/{split}: {', '.join(strays)} differ between twins, though the axis does not name them"
-    )
+    seen, where = features.sampled(task, split, 12, seed), f"{task.name}/{split}"
+    _ask(not seen.strays, f"{where}: {', '.join(seen.strays)} differ between twins, though the axis does not name them")
+    _ask(not seen.stuck, f"{where}: the axis names {', '.join(seen.stuck)}, and twins are equal there")
 
 
 def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> None:

@@ -47,6 +47,14 @@ def test_what_does_not_vary_is_caught():
     assert "nothing varies" in broken(conformance._draws_are_keyed, still)
 
 
+def test_an_axis_whose_value_twins_share_is_caught():
+    task = config.task("push_block", SEARCH)
+    same = replace(task.axes["far"], replace={"distance": Fixed(0.12)})
+    here = replace(task, training={**task.training, "distance": Fixed(0.12)}, axes={"far": same})
+    told = broken(conformance._twins_differ_in_the_axis_alone, here, "far")
+    assert "the axis names distance, and twins are equal there" in told
+
+
 def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {"the_oracle_itself": Shortcut(self.oracle)})
     told = broken(conformance._scenarios_are_certified, config.task("push_block", SEARCH))
