@@ -20,6 +20,12 @@ def run(folder, policy, **changes):
     return evaluate(Settings(policy=policy, **said), lambda *_: None).episodes
 
 
+@pytest.fixture
+def brief(monkeypatch):
+    """Episodes are lost after a second: for tests of what is done with them."""
+    monkeypatch.setattr(DominoSingle, "failure", lambda self, world: "too late" if world.time > 1.0 else None)
+
+
 def test_the_oracle_succeeds_and_idleness_fails(tmp_path):
     assert [e["success"] for e in run(tmp_path / "oracle", "oracle")] == [True] * 3
     assert [e["success"] for e in run(tmp_path / "idle", "idle")] == [False] * 3
@@ -54,6 +60,7 @@ def test_replay_never_plays_a_scenarios_own_witness(tmp_path):
     assert outcomes.count(False) >= 1  # its own witness succeeds in every one of them
 
 
+@pytest.mark.usefixtures("brief")
 def test_a_run_cut_short_goes_on_where_it_was(tmp_path):
     whole = run(tmp_path / "whole", "idle")
     run(tmp_path / "cut", "idle", seeds=2)
@@ -108,6 +115,7 @@ def test_sides_without_twins_are_compared_unpaired():
     assert line.difference.twins == 0 and line.difference.value == 0.0
 
 
+@pytest.mark.usefixtures("brief")
 def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine.py").write_text(
         "class Up:\n"
@@ -145,6 +153,7 @@ def test_bad_input_is_told_in_one_line(argv, says, tmp_path, capsys):
     assert status == 2 and says in told and told.count("\n") == 1
 
 
+@pytest.mark.usefixtures("brief")
 def test_results_of_other_settings_are_not_mixed(tmp_path, capsys):
     run(tmp_path / "out", "idle", seeds=1)
     argv = ("evaluate", f"pool={REFERENCE}", "policy=random", "seeds=1", f"to={tmp_path / 'out'}")
@@ -160,7 +169,7 @@ MINE = (
 
 
 @pytest.fixture
-def mine(tmp_path, monkeypatch):
+def mine(tmp_path, monkeypatch, brief):
     """A policy of one's own in the working directory, and a function that evaluates it."""
     monkeypatch.chdir(tmp_path)
     name = f"mine_{tmp_path.name}".replace("-", "_")
