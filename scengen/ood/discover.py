@@ -28,7 +28,7 @@ from ..log import Log
 from ..parallel import Limits, Workers, each
 from ..params import with_values
 from ..samplers.axis import Axis, Proof
-from ..samplers.dists import Dist, Fixed, Integer, Uniform
+from ..samplers.dists import Dist, Fixed, Integer, Mixture, Uniform
 from ..samplers.keyed import unit
 from ..samplers.task import Task
 from ..scenario import Scenario
@@ -467,15 +467,19 @@ def _confirmed(outcomes: list[dict[str, Any]]) -> int:
 
 
 def _dist(region: Region, low: float, high: float) -> Dist:
-    """The distribution over a range of places."""
-    ends = sorted((region.value(low), region.value(high)))
-    if region.parameter.integer:
-        return Fixed(ends[0]) if ends[0] == ends[1] else Integer(int(ends[0]), int(ends[1]))
-    period = region.parameter.period
-    if period and abs(ends[1] - ends[0]) > period / 2:
-        return Fixed(region.value((low + high) / 2))  # the range runs through the seam of the circle
-    ends = [float(f"{v:.4g}") for v in ends]
-    return Fixed(ends[0]) if ends[0] == ends[1] else Uniform(*ends)
+    """The distribution over a range of places; on a circle it may run through the seam of the parameter's bounds."""
+    begin, end = region.value(low), region.value(high)
+    known = region.parameter
+    if known.integer:
+        return Fixed(begin) if begin == end else Integer(*sorted((int(begin), int(end))))
+    begin, end = (float(f"{v:.4g}") for v in (begin, end))
+    if known.period and begin > end:
+        return Mixture((_range(begin, known.high), _range(known.low, end)))
+    return _range(*sorted((begin, end)))
+
+
+def _range(low: float, high: float) -> Fixed | Uniform:
+    return Fixed(low) if low == high else Uniform(low, high)
 
 
 def _same(region: Region, replaced: Any) -> bool:
@@ -516,5 +520,7 @@ def _entry(finding: Finding) -> dict[str, Any]:
 def _plain(dist: Dist) -> list[Any]:
     if isinstance(dist, Fixed):
         return ["fixed", dist.value]
+    if isinstance(dist, Mixture):
+        return ["mixture", *map(_plain, dist.parts)]
     ends = dist.support[0].low, dist.support[-1].high
     return ["integer" if isinstance(dist, Integer) else "uniform", *ends]

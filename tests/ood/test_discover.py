@@ -9,7 +9,8 @@ from scengen import cli, config
 from scengen.ood import discover as module
 from scengen.ood.discover import BREAKS, HOLDS, INFEASIBLE, Settings, _hypercube, _Trials, as_yaml, discover
 from scengen.ood.regions import located, regions
-from scengen.samplers.dists import Fixed
+from scengen.samplers.axis import Axis
+from scengen.samplers.dists import Fixed, parse
 from scengen.samplers.support import distance
 from scengen.samplers.task import load
 from scengen.validate.settings import QUICK
@@ -28,6 +29,24 @@ def test_every_place_of_every_region_is_within_bounds_and_outside_training(name)
             known.check(known.name, value)
             assert distance(task.training[known.name].support, Fixed(value).support, known.period) > 0
             assert located(region, value)
+
+
+@pytest.mark.parametrize("name", ["domino_single", "packing"])
+def test_every_range_of_places_of_every_region_can_be_an_axis(name):
+    task = config.task(name)
+    for region in regions(task):
+        for low, high in ((0.0, 0.0), (0.0, 1.0), (0.1, 0.6), (0.4, 0.9)):
+            dist = module._dist(region, low, high)
+            task.prove(Axis("found", "", "", {region.parameter.name: dist}))
+            assert parse("axis", module._plain(dist)) == dist
+
+
+def test_a_range_through_the_seam_of_a_circle_has_both_its_sides():
+    turn = next(r for r in regions(config.task("packing")) if r.name == "spot_1_turn_from_minus_50")
+    there = module._dist(turn, 0.15, 0.9)
+    assert there.parts[0].high == 180.0 and there.parts[1].low == -180.0
+    middle = turn.value(0.6)
+    assert any(part.low <= middle <= part.high for part in there.parts)
 
 
 def test_regions_lie_between_training_values_and_beyond_them():
