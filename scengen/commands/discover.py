@@ -45,4 +45,5 @@ def _table(task: str, search: Search) -> Table:
 def _row(finding: Finding) -> tuple[str, ...]:
     values = ", ".join(f"{name} {spell(dist)}" for name, dist in finding.axis.replace.items())
     seen, confirmed = f"{finding.seen} of {finding.tried}", f"{finding.confirmed} of {finding.fresh}"
+    confirmed += f", {finding.against} against" if finding.against else ""
     return finding.axis.name, values, seen, confirmed, f"{finding.p:.2g}", ", ".join(finding.known)

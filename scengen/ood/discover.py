@@ -4,7 +4,8 @@ First a hypercube over all regions outside training, one or two parameters at a 
 Then a forest learns from it, and points are tried where it is least sure: at the edges of what was found. What two
 parameters do together is tried with one of them alone, and what broke a memory is tried again, and around it, until
 it is known where it ends. What is left is confirmed on fresh twins, each beside its control, and only that counts: a
-search among hundreds of points finds something by luck.
+search among hundreds of points finds something by luck. The test is that of paired twins (McNemar's, exact): where a
+memory also fails half of its controls, half of the twins tell nothing.
 
 One trial is a memory played in one scenario, and its oracle where the memory fails.
 """
@@ -47,8 +48,8 @@ TWINS = 8
 """Training scenarios whose memories are played while searching."""
 FRESH, DRAWS = 20, 5
 """Twins in which a finding is confirmed, each in a scenario of its own, and draws until that is feasible."""
-MISSES = 5
-"""A box that fails so many of them is given up, and counts as if it failed all that are left."""
+LOOK, FUTILE = 5, 0.25
+"""Twins between looks, and the share of breaks among those tried up to which a box is given up."""
 SHARES = (0.35, 0.55, 0.7)
 """Which share of the budget is spent when the hypercube ends, the forest ends, the narrowing ends."""
 LEAST = math.ceil(FRESH / (1 - SHARES[-1]))
@@ -65,8 +66,6 @@ POOL = 4000
 """Points among which the forest chooses."""
 LEVEL = 0.05
 """Family-wise error rate of the confirmation, by Holm's correction (Holm 1979)."""
-CHANCE = 0.5
-"""What a finding is tested against: that it breaks the memory in no more than this share of its twins."""
 LIMITS = Limits(300.0, 4000)
 """Of one trial: some rollouts take some seconds."""
 
@@ -97,10 +96,12 @@ class Finding:
     """Trials of the search within the box that were feasible."""
     confirmed: int
     """Fresh twins in which the memory failed and the oracle did not, and which it solved within training."""
+    against: int
+    """Fresh twins that it solved, but not within training."""
     fresh: int
     """Fresh twins tried."""
     p: float
-    """Of the confirmation: exact binomial test against `CHANCE`, after Holm's correction."""
+    """Of the confirmation: McNemar's exact test of `confirmed` and `against`, one-sided, after Holm's correction."""
     known: tuple[str, ...]
     """Axes of the task file that move one of the same parameters into the same region."""
 
@@ -184,7 +185,7 @@ class _Asked:
         self.settings, self.progress = settings, progress
         source = source_sha256(task.family)
         named = {"task": task.name, "training": {n: str(d) for n, d in task.training.items()}, "source": source}
-        chosen = {"budget": settings.budget, "method": settings.method, "seed": settings.seed}
+        chosen = {"budget": settings.budget, "method": settings.method, "seed": settings.seed, "test": "paired"}
         self.log = Log(folder / "trials.jsonl", named | chosen)
         self.spent = 0
 
@@ -202,14 +203,14 @@ class _Asked:
         self._run(partial(_try, self.trials), items)
 
     def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
-        """Try a box in fresh twins, some at a time, until all are tried or too many of them fail."""
+        """Try a box in fresh twins, some at a time, until all are tried or too few of them break."""
         begin, outcomes = self.spent, list[dict[str, Any]]()
-        for first in range(0, FRESH, MISSES):
-            some = range(first, first + MISSES)
+        for first in range(0, FRESH, LOOK):
+            some = range(first, first + LOOK)
             items = [_Item(begin + k, "confirm", box.ranges, TWINS + number * FRESH + k) for k in some]
             self._run(partial(_confirm, self.trials), items)
             outcomes = self._numbered(begin)
-            if len(outcomes) - _confirmed(outcomes) >= MISSES:
+            if _confirmed(outcomes) <= FUTILE * len(outcomes):
                 break
         return outcomes
 
@@ -261,7 +262,7 @@ def _confirm(trials: "_Trials", item: _Item) -> dict[str, Any]:
         outcome = trials.outcome(trained, memory, point)
         if outcome != INFEASIBLE:
             break
-    if outcome == BREAKS:
+    if outcome in (BREAKS, HOLDS):
         names = [trials.known[int(i)].parameter.name for i, *_ in box]
         control = behaviour.moved_within(task, names, seed, number, trained)
     worked = control is not None and behaviour.follows(task, memory, control)
@@ -451,15 +452,17 @@ def _finding(
 ) -> Finding:
     moved = {known[i].parameter.name: _dist(known[i], low, high) for i, low, high in box.ranges}
     name = "_and_".join(known[i].name for i, *_ in box.ranges)
-    confirmed = _confirmed(outcomes)
+    confirmed, against = _confirmed(outcomes), sum(r["outcome"] == HOLDS and not r["control"] for r in outcomes)
     why = f"An object-centric memory fails in {confirmed} of {len(outcomes)} fresh twins that the oracle solves."
     single = len(box.ranges) == 1 and known[box.ranges[0][0]].beyond and not known[box.ranges[0][0]].parameter.integer
     axis = Axis(name, why, "scengen discover", moved, 5 if single else 0)
     inside = [r["outcome"] for r in records if box.holds(r["point"]) and r["outcome"] != INFEASIBLE]
     same = [a.name for a in task.axes.values() if any(_same(known[i], a.replace) for i, *_ in box.ranges)]
-    test = binomtest(confirmed, FRESH, CHANCE, "greater").pvalue
-    seen, fresh = inside.count(BREAKS), len(outcomes)
-    return Finding(axis, task.prove(axis), seen, len(inside), confirmed, fresh, float(test), tuple(same))
+    p = float(binomtest(confirmed, confirmed + against, 0.5, "greater").pvalue) if confirmed else 1.0
+    return Finding(
+        *(axis, task.prove(axis), inside.count(BREAKS), len(inside)),
+        *(confirmed, against, len(outcomes), p, tuple(same)),
+    )
 
 
 def _confirmed(outcomes: list[dict[str, Any]]) -> int:

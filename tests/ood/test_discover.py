@@ -102,6 +102,23 @@ def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_memory_that_is_often_weak_is_judged_by_the_twins_in_which_it_is_not(planted, tmp_path, monkeypatch):
+    fails = iter(range(10_000))
+    monkeypatch.setattr(module.behaviour, "follows", lambda *_: next(fails) % 2 == 0)  # in every other control
+    search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
+    found = next(f for f in search.findings if f.axis.name == "starter_height_low")
+    assert (found.against, found.fresh) == (0, 20) and 8 <= found.confirmed <= 12 and found.p < 0.05
+
+
+def test_a_memory_that_fails_everywhere_alike_breaks_at_nothing(planted, tmp_path, monkeypatch):
+    tried, fails = iter(range(10_000)), iter(range(10_000))
+    monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS if next(tried) % 3 == 0 else BREAKS)
+    monkeypatch.setattr(module.behaviour, "follows", lambda *_: next(fails) % 3 == 0)
+    search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
+    assert search.findings == []
+
+
+@pytest.mark.slow
 def test_what_is_written_can_stand_in_a_task_file(planted, tmp_path):
     search = discover(TASK, QUICK, Settings(budget=300), tmp_path)
     written = yaml.safe_load(as_yaml(TASK, search))
