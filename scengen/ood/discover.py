@@ -1,11 +1,13 @@
 """A search for axes: where outside training an object-centric memory fails and the oracle does not.
 
-First a hypercube over all regions outside training, one or two parameters at a time, each point in a twin of its own.
-Then a forest learns from it, and points are tried where it is least sure: at the edges of what was found. What two
-parameters do together is tried with one of them alone, and what broke a memory is tried again, and around it, until
-it is known where it ends. What is left is confirmed on fresh twins, each beside its control, and only that counts: a
-search among hundreds of points finds something by luck. The test is that of paired twins (McNemar's, exact): where a
-memory also fails half of its controls, half of the twins tell nothing.
+First every region outside training is tried far out, one parameter at a time, then a hypercube spreads over all
+regions, one or two parameters at a time, each point in a twin of its own. A constraint costs no trial: regions end
+where no twin is feasible any more, and a point goes to a twin in which it is. Then a forest learns from it, and
+points are tried where it is least sure: at the edges of what was found. What two parameters do together is tried
+with one of them alone, and what broke a memory is tried again, and around it, until it is known where it ends. What
+is left is confirmed on fresh twins, each beside its control, and only that counts: a search among hundreds of points
+finds something by luck. The test is that of paired twins (McNemar's, exact): where a memory also fails half of its
+controls, half of the twins tell nothing.
 
 One trial is a memory played in one scenario, and its oracle where the memory fails.
 """
@@ -14,7 +16,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +48,14 @@ BREAKS, HOLDS, UNSOLVED, UNSOUND, INFEASIBLE = "breaks", "holds", "unsolved", "u
 scene fails a check that comes before the oracle; a constraint does not hold."""
 TWINS = 8
 """Training scenarios whose memories are played while searching."""
-FRESH, DRAWS = 20, 5
+FRESH, DRAWS = 20, 20
 """Twins in which a finding is confirmed, each in a scenario of its own, and draws until that is feasible."""
+STAND_INS = 5
+"""Training scenarios that are tried in a twin's place until a memory solves its own scenario again."""
+STEPS = 16
+"""Steps in which it is found where in a region some twin is feasible."""
+OUTER = 0.25
+"""Share of a region that is far out."""
 LOOK, FUTILE = 5, 0.25
 """Twins between looks, and the share of breaks among those tried up to which a box is given up."""
 SHARES = (0.35, 0.55, 0.7)
@@ -71,6 +79,8 @@ LIMITS = Limits(300.0, 4000)
 
 Point = tuple[tuple[int, float], ...]
 """Places in regions: pairs of a region's number and a place from 0 to 1, in the order of the regions."""
+Reaches = dict[int, tuple[float, float]]
+"""By a region's number, from which place to which something in it is feasible."""
 
 
 @dataclass(frozen=True)
@@ -143,12 +153,14 @@ def discover(
     with asked.log:
         ends = [round(share * settings.budget) for share in SHARES]
         random = np.random.default_rng(settings.seed)
-        asked.ask("hypercube", _hypercube(ends[0], len(known), random))
+        reaches = asked.reaches()
+        asked.ask("far", _far(known, reaches, random)[: ends[0]])
+        asked.ask("hypercube", _hypercube(ends[0] - asked.spent, reaches, random))
         if settings.method == FOREST:
             while asked.spent < ends[1]:
-                asked.ask("forest", _uncertain(asked.records, len(known), random)[: ends[1] - asked.spent])
+                asked.ask("forest", _uncertain(asked.records, reaches, random)[: ends[1] - asked.spent])
         else:
-            asked.ask("hypercube", _hypercube(ends[1] - asked.spent, len(known), random))
+            asked.ask("hypercube", _hypercube(ends[1] - asked.spent, reaches, random))
         asked.ask("shrink", _alone(asked.records)[: max(0, ends[2] - asked.spent)])
         while asked.spent < ends[2] and (around := _around(asked.records)):
             asked.ask("narrow", around[: ends[2] - asked.spent])
@@ -194,13 +206,32 @@ class _Asked:
         """The trials of the search itself, without those that confirm."""
         return [r for r in self._numbered(0) if r["stage"] != "confirm"]
 
+    @cached_property
+    def trained(self) -> list[Scenario]:
+        """The twins. Workers are copies of this process, which remembers now how they are solved."""
+        return [self.trials.twin(number)[0] for number in range(TWINS)]
+
+    def reaches(self) -> Reaches:
+        """From which place to which some twin is feasible, in every region that has such places."""
+        found: Reaches = {}
+        for i in range(len(self.trials.known)):
+            steps = [k for k in range(STEPS) if self._feasible(((i, (k + 0.5) / STEPS),), range(TWINS)) is not None]
+            if steps:
+                found[i] = steps[0] / STEPS, (steps[-1] + 1) / STEPS
+        return found
+
     def ask(self, stage: str, points: Sequence[tuple[Point, int | None]]) -> None:
-        """Try points, each in the twin that is named, or in the next one."""
-        items = [
-            _Item(self.spent + k, stage, point, (self.spent + k) % TWINS if twin is None else twin)
-            for k, (point, twin) in enumerate(points)
-        ]
+        """Try points, each in the twin that is named, or in the next one in which it is feasible."""
+        items = list[_Item]()
+        for number, (point, twin) in enumerate(points, self.spent):
+            turns = [twin] if twin is not None else [(number + k) % TWINS for k in range(TWINS)]
+            feasible = self._feasible(point, turns)
+            items.append(_Item(number, stage, point, turns[0] if feasible is None else feasible))
         self._run(partial(_try, self.trials), items)
+
+    def _feasible(self, point: Point, twins: Iterable[int]) -> int | None:
+        """The first of some twins in which a point is feasible."""
+        return next((k for k in twins if self.trials.feasible(self.trained[k], point)), None)
 
     def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
         """Try a box in fresh twins, some at a time, until all are tried or too few of them break."""
@@ -259,8 +290,8 @@ def _confirm(trials: "_Trials", item: _Item) -> dict[str, Any]:
     outcome, control, task, seed = INFEASIBLE, None, trials.task, trials.seed
     for attempt in range(DRAWS):
         point = [(i, low + unit("discover", seed, number, attempt, int(i)) * (high - low)) for i, low, high in box]
-        outcome = trials.outcome(trained, memory, point)
-        if outcome != INFEASIBLE:
+        if trials.feasible(trained, point):
+            outcome = trials.outcome(trained, memory, point)
             break
     if outcome in (BREAKS, HOLDS):
         names = [trials.known[int(i)].parameter.name for i, *_ in box]
@@ -280,17 +311,26 @@ class _Trials:
 
     def twin(self, number: int) -> tuple[Scenario, behaviour.Memory]:
         """Training scenario `number`, or another one if its memory does not solve it again."""
-        for index in range(number, number + 1000 * DRAWS, 1000):
+        for index in range(number, number + 1000 * STAND_INS, 1000):
             trained, memory = behaviour.recall(self.task, self.seed, index)
             if memory is not None and behaviour.faithful(self.task, trained):
                 return trained, memory
-        raise BadConfig(f"{self.task.name}: no memory of {DRAWS} training scenarios solves its own scenario again")
+        raise BadConfig(f"{self.task.name}: no memory of {STAND_INS} training scenarios solves its own scenario again")
+
+    def feasible(self, trained: Scenario, point: Iterable[Sequence[float]]) -> bool:
+        """Whether a point contradicts no constraint in a scenario."""
+        try:
+            return self._moved(trained, point).infeasible() is None
+        except (ScengenError, ValueError):
+            return False
+
+    def _moved(self, trained: Scenario, point: Iterable[Sequence[float]]) -> Scenario:
+        return with_values(trained, spelled({self.known[int(i)]: place for i, place in point}))
 
     def outcome(self, trained: Scenario, memory: behaviour.Memory, point: Iterable[Sequence[float]]) -> str:
         """What comes of a memory in its own scenario with some parameters put outside training."""
-        moved = spelled({self.known[int(i)]: place for i, place in point})
         try:
-            scenario = with_values(trained, moved)
+            scenario = self._moved(trained, point)
             if scenario.infeasible():
                 return INFEASIBLE
             certified = certify(scenario, self.task.horizon, self.checks, self.task.embodiment, last="unsolved")
@@ -306,7 +346,20 @@ class _Trials:
 # --- where to look ------------------------------------------------------------------------------
 
 
-def _hypercube(n: int, count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
+def _far(known: Sequence[Region], reaches: Reaches, random: np.random.Generator) -> list[tuple[Point, None]]:
+    """A point far out in each region: near its feasible end, or in its middle where training lies behind its end."""
+    points = list[tuple[Point, None]]()
+    for i in map(int, random.permutation(list(reaches))):
+        begin = 1 - OUTER if known[i].beyond else (1 - OUTER) / 2
+        points.append((((i, _placed(reaches[i], begin + OUTER * random.random())),), None))
+    return points
+
+
+def _placed(reach: tuple[float, float], share: float) -> float:
+    return round(float(reach[0] + share * (reach[1] - reach[0])), 6)
+
+
+def _hypercube(n: int, reaches: Reaches, random: np.random.Generator) -> list[tuple[Point, None]]:
     """Points with one or two regions: every region as often as any other, its places spread evenly (Latin hypercube).
 
     Two of three points move one parameter only.
@@ -316,13 +369,13 @@ def _hypercube(n: int, count: int, random: np.random.Generator) -> list[tuple[Po
     for k in range(n):
         wanted = 1 if k % 3 else 2
         while len(deck) < 2:
-            deck += [int(i) for i in random.permutation(count)]
+            deck += [int(i) for i in random.permutation(list(reaches))]
         first = deck.pop(0)
         chosen = [first] if wanted == 1 else sorted({first, deck.pop(0)})
         turns.append(chosen)
         uses.update(chosen)
     places = {i: list((random.permutation(m) + random.random(m)) / m) for i, m in sorted(uses.items())}
-    return [(tuple((i, round(float(places[i].pop()), 6)) for i in chosen), None) for chosen in turns]
+    return [(tuple((i, _placed(reaches[i], places[i].pop())) for i in chosen), None) for chosen in turns]
 
 
 def _forest() -> type[Any]:
@@ -340,11 +393,14 @@ def _forest() -> type[Any]:
     return RandomForestClassifier
 
 
-def _uncertain(records: list[dict[str, Any]], count: int, random: np.random.Generator) -> list[tuple[Point, None]]:
+def _uncertain(
+    records: list[dict[str, Any]], reaches: Reaches, random: np.random.Generator
+) -> list[tuple[Point, None]]:
     """The points of which a forest knows least whether they break the memory, all in different regions."""
+    count = max(reaches) + 1
     table = np.stack([_row(r["point"], count) for r in records])
     breaks = np.array([r["outcome"] == BREAKS for r in records])
-    points = [point for point, _ in _hypercube(POOL, count, random)]
+    points = [point for point, _ in _hypercube(POOL, reaches, random)]
     if breaks.all() or not breaks.any():
         return [(point, None) for point in points[:BATCH]]
     forest = _forest()(200, min_samples_leaf=2, random_state=int(random.integers(2**31)))

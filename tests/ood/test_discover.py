@@ -1,7 +1,9 @@
 """The search for axes: regions outside training, what it finds of a planted truth, and what it writes."""
 
+import json
 import sys
 
+import numpy as np
 import pytest
 import yaml
 
@@ -58,13 +60,21 @@ def test_regions_lie_between_training_values_and_beyond_them():
 
 
 def test_a_hypercube_uses_every_region_alike_and_spreads_its_places():
-    import numpy as np
-
-    points = [point for point, _ in _hypercube(30 * len(KNOWN), len(KNOWN), np.random.default_rng(0))]
+    reaches = {k: (0.0, 1.0) for k in range(len(KNOWN))}
+    points = [point for point, _ in _hypercube(30 * len(KNOWN), reaches, np.random.default_rng(0))]
     uses = [sum(i == k for point in points for i, _ in point) for k in range(len(KNOWN))]
     assert max(uses) - min(uses) <= 2 and {len(point) for point in points} == {1, 2}
     places = sorted(place for point in points for i, place in point if i == 0)
     assert all(abs(place - (k + 0.5) / len(places)) <= 0.5 / len(places) + 1e-6 for k, place in enumerate(places))
+
+
+def test_a_point_far_out_is_in_the_outer_quarter_of_what_is_feasible_or_in_the_middle_between_training_values():
+    reaches = {k: (0.0, 0.5) for k in range(len(KNOWN))}
+    points = dict(point[0] for point, _ in module._far(KNOWN, reaches, np.random.default_rng(0)))
+    assert points.keys() == reaches.keys()
+    for k, place in points.items():
+        low, high = (0.375, 0.5) if KNOWN[k].beyond else (0.1875, 0.3125)
+        assert low <= place <= high
 
 
 @pytest.fixture
@@ -80,6 +90,7 @@ def planted(monkeypatch):
 
     monkeypatch.setattr(_Trials, "twin", lambda self, number: (TASK.family(), None))
     monkeypatch.setattr(_Trials, "outcome", outcome)
+    monkeypatch.setattr(_Trials, "feasible", lambda *args: outcome(args[0], args[1], None, args[2]) != INFEASIBLE)
     monkeypatch.setattr(module.behaviour, "moved_within", lambda *_: TASK.family())
     monkeypatch.setattr(module.behaviour, "follows", lambda *_: True)
 
@@ -108,6 +119,28 @@ def test_a_memory_that_is_often_weak_is_judged_by_the_twins_in_which_it_is_not(p
     search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
     found = next(f for f in search.findings if f.axis.name == "starter_height_low")
     assert (found.against, found.fresh) == (0, 20) and 8 <= found.confirmed <= 12 and found.p < 0.05
+
+
+def test_what_no_twin_allows_costs_no_trial(planted, tmp_path):
+    search = discover(TASK, QUICK, Settings(budget=200, method="hypercube"), tmp_path)
+    low = next(k for k, region in enumerate(KNOWN) if region.name == "starter_height_low")
+    places = [
+        place
+        for line in (tmp_path / "trials.jsonl").read_text().splitlines()[1:]
+        for k, place, *_ in json.loads(line)["point"]
+        if k == low and json.loads(line)["stage"] in ("far", "hypercube")
+    ]
+    assert places and max(places) <= 0.8125, "the region ends at the step in which the last twin is feasible"
+    assert search.spent.get(INFEASIBLE, 0) <= 3
+
+
+def test_a_point_goes_to_a_twin_in_which_it_is_feasible(planted, tmp_path, monkeypatch):
+    twins = [TASK.family(count=number + 3) for number in range(module.TWINS)]
+    monkeypatch.setattr(_Trials, "twin", lambda self, number: (twins[number % len(twins)], None))
+    monkeypatch.setattr(_Trials, "feasible", lambda self, trained, point: trained is twins[5])
+    discover(TASK, QUICK, Settings(budget=100, method="hypercube"), tmp_path)
+    lines = (tmp_path / "trials.jsonl").read_text().splitlines()[1:]
+    assert {json.loads(line)["twin"] for line in lines if json.loads(line)["stage"] == "hypercube"} == {5}
 
 
 def test_a_memory_that_fails_everywhere_alike_breaks_at_nothing(planted, tmp_path, monkeypatch):
