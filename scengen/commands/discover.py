@@ -35,7 +35,7 @@ def command(arguments: Arguments) -> int:
 
 def _table(task: str, search: Search) -> Table:
     table = Table(title=f"{task}: {len(search.findings)} axes confirmed", title_justify="left")
-    for title in ("axis", "values", "seen", "confirmed", "p (Holm)", "in the task file"):
+    for title in ("axis", "values", "seen", "fails outside", "solved within", "p (Holm)", "in the task file"):
         table.add_column(title)
     for finding in (*search.findings, *search.rejected):
         table.add_row(*_row(finding), style=None if finding in search.findings else "dim")
@@ -44,6 +44,6 @@ def _table(task: str, search: Search) -> Table:
 
 def _row(finding: Finding) -> tuple[str, ...]:
     values = ", ".join(f"{name} {spell(dist)}" for name, dist in finding.axis.replace.items())
-    seen, confirmed = f"{finding.seen} of {finding.tried}", f"{finding.confirmed} of {finding.fresh}"
-    confirmed += f", {finding.against} against" if finding.against else ""
-    return finding.axis.name, values, seen, confirmed, f"{finding.p:.2g}", ", ".join(finding.known)
+    seen, fails = f"{finding.seen} of {finding.tried}", f"{finding.confirmed} of {finding.fresh}"
+    within = f"{finding.within} of {finding.controls}"
+    return finding.axis.name, values, seen, fails, within, f"{finding.p:.2g}", ", ".join(finding.known)

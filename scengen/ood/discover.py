@@ -5,9 +5,10 @@ regions, one or two parameters at a time, each point in a twin of its own. A con
 where no twin is feasible any more, and a point goes to a twin in which it is. Then a forest learns from it, and
 points are tried where it is least sure: at the edges of what was found. What two parameters do together is tried
 with one of them alone, and what broke a memory is tried again, and around it, until it is known where it ends. What
-is left is confirmed on fresh twins, each beside its control, and only that counts: a search among hundreds of points
-finds something by luck. The test is that of paired twins (McNemar's, exact): where a memory also fails half of its
-controls, half of the twins tell nothing.
+is left is confirmed on fresh twins, each beside its controls, and only that counts: a search among hundreds of points
+finds something by luck. The test is exact and goes by twins: of all scenarios in which a twin's memory was played,
+controls and the one outside training, each is as likely as the others to be among those that it solved, if nothing is
+special outside (with one control McNemar's test). A memory that fails half of its controls can still tell something.
 
 One trial is a memory played in one scenario, and its oracle where the memory fails.
 """
@@ -23,7 +24,6 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 from scipy.stats.qmc import Halton
 
 from ..errors import BadConfig, ScengenError
@@ -56,8 +56,16 @@ STEPS = 16
 """Steps in which it is found where in a region some twin is feasible."""
 OUTER = 0.25
 """Share of a region that is far out."""
-LOOK, FUTILE = 5, 0.25
-"""Twins between looks, and the share of breaks among those tried up to which a box is given up."""
+CONTROLS = 3
+"""Moves within training that each fresh twin's memory is tried on."""
+LOOK, FUTILE = 5, 0.5
+"""Twins between looks, and the p value above which a box is given up at one."""
+LEVEL = 0.05
+"""Family-wise error rate of the confirmation, by Holm's correction (Holm 1979)."""
+LOOKS = FRESH // LOOK
+"""p values may be believed at any look: they are multiplied by the number of looks (Bonferroni)."""
+SURE = LEVEL / 20 / LOOKS
+"""The p value below which no more is asked of a box: that of one among twenty."""
 SHARES = (0.35, 0.55, 0.7)
 """Which share of the budget is spent when the hypercube ends, the forest ends, the narrowing ends."""
 LEAST = math.ceil(FRESH / (1 - SHARES[-1]))
@@ -72,8 +80,6 @@ EVIDENCE = 3
 """So many more breaks than twice the other outcomes must a box hold to be confirmed."""
 POOL = 4000
 """Points among which the forest chooses."""
-LEVEL = 0.05
-"""Family-wise error rate of the confirmation, by Holm's correction (Holm 1979)."""
 LIMITS = Limits(300.0, 4000)
 """Of one trial: some rollouts take some seconds."""
 
@@ -105,13 +111,15 @@ class Finding:
     tried: int
     """Trials of the search within the box that were feasible."""
     confirmed: int
-    """Fresh twins in which the memory failed and the oracle did not, and which it solved within training."""
-    against: int
-    """Fresh twins that it solved, but not within training."""
+    """Fresh twins in which the memory failed and the oracle did not."""
     fresh: int
     """Fresh twins tried."""
+    within: int
+    """Of their controls, those that the memory solved."""
+    controls: int
+    """Controls tried."""
     p: float
-    """Of the confirmation: McNemar's exact test of `confirmed` and `against`, one-sided, after Holm's correction."""
+    """Of the confirmation, one-sided, corrected for its looks, and by Holm for the number of boxes."""
     known: tuple[str, ...]
     """Axes of the task file that move one of the same parameters into the same region."""
 
@@ -197,7 +205,7 @@ class _Asked:
         self.settings, self.progress = settings, progress
         source = source_sha256(task.family)
         named = {"task": task.name, "training": {n: str(d) for n, d in task.training.items()}, "source": source}
-        chosen = {"budget": settings.budget, "method": settings.method, "seed": settings.seed, "test": "paired"}
+        chosen = {"budget": settings.budget, "method": settings.method, "seed": settings.seed, "controls": CONTROLS}
         self.log = Log(folder / "trials.jsonl", named | chosen)
         self.spent = 0
 
@@ -234,14 +242,14 @@ class _Asked:
         return next((k for k in twins if self.trials.feasible(self.trained[k], point)), None)
 
     def confirm(self, number: int, box: "_Box") -> list[dict[str, Any]]:
-        """Try a box in fresh twins, some at a time, until all are tried or too few of them break."""
+        """Try a box in fresh twins, some at a time, until all are tried, or they tell enough or too little."""
         begin, outcomes = self.spent, list[dict[str, Any]]()
         for first in range(0, FRESH, LOOK):
             some = range(first, first + LOOK)
             items = [_Item(begin + k, "confirm", box.ranges, TWINS + number * FRESH + k) for k in some]
             self._run(partial(_confirm, self.trials), items)
             outcomes = self._numbered(begin)
-            if _confirmed(outcomes) <= FUTILE * len(outcomes):
+            if not SURE <= _p(outcomes) <= FUTILE:
                 break
         return outcomes
 
@@ -284,10 +292,14 @@ def _try(trials: "_Trials", item: _Item) -> dict[str, Any]:
 
 
 def _confirm(trials: "_Trials", item: _Item) -> dict[str, Any]:
-    """A box in one fresh twin, at a random place; the control is a move of the same parameters within training."""
+    """A box in one fresh twin, at a random place; controls are moves of the same parameters within training.
+
+    A parameter that training does not vary has one control, the scenario that is remembered.
+    """
     box, number = item.point, item.twin - TWINS
     trained, memory = trials.twin(item.twin)
-    outcome, control, task, seed = INFEASIBLE, None, trials.task, trials.seed
+    outcome, task, seed = INFEASIBLE, trials.task, trials.seed
+    solved = list[bool]()
     for attempt in range(DRAWS):
         point = [(i, low + unit("discover", seed, number, attempt, int(i)) * (high - low)) for i, low, high in box]
         if trials.feasible(trained, point):
@@ -295,9 +307,10 @@ def _confirm(trials: "_Trials", item: _Item) -> dict[str, Any]:
             break
     if outcome in (BREAKS, HOLDS):
         names = [trials.known[int(i)].parameter.name for i, *_ in box]
-        control = behaviour.moved_within(task, names, seed, number, trained)
-    worked = control is not None and behaviour.follows(task, memory, control)
-    return item.record(outcome, control=worked)
+        moves = [behaviour.moved_within(task, names, seed, number + 1000 * k, trained) for k in range(CONTROLS)]
+        controls = dict.fromkeys(move for move in moves if move is not None)
+        solved = [behaviour.follows(task, memory, control) for control in controls]
+    return item.record(outcome, controls=solved)
 
 
 @dataclass(frozen=True)
@@ -508,21 +521,33 @@ def _finding(
 ) -> Finding:
     moved = {known[i].parameter.name: _dist(known[i], low, high) for i, low, high in box.ranges}
     name = "_and_".join(known[i].name for i, *_ in box.ranges)
-    confirmed, against = _confirmed(outcomes), sum(r["outcome"] == HOLDS and not r["control"] for r in outcomes)
-    why = f"An object-centric memory fails in {confirmed} of {len(outcomes)} fresh twins that the oracle solves."
+    confirmed = sum(r["outcome"] == BREAKS for r in outcomes)
+    played = [solved for r in outcomes for solved in r.get("controls", ())]
+    why = f"An object-centric memory fails in {confirmed} of {len(outcomes)} fresh twins that the oracle solves"
+    why += f" and, moved within training, in {played.count(False)} of {len(played)}."
     single = len(box.ranges) == 1 and known[box.ranges[0][0]].beyond and not known[box.ranges[0][0]].parameter.integer
     axis = Axis(name, why, "scengen discover", moved, 5 if single else 0)
     inside = [r["outcome"] for r in records if box.holds(r["point"]) and r["outcome"] != INFEASIBLE]
     same = [a.name for a in task.axes.values() if any(_same(known[i], a.replace) for i, *_ in box.ranges)]
-    p = float(binomtest(confirmed, confirmed + against, 0.5, "greater").pvalue) if confirmed else 1.0
     return Finding(
         *(axis, task.prove(axis), inside.count(BREAKS), len(inside)),
-        *(confirmed, against, len(outcomes), p, tuple(same)),
+        *(confirmed, len(outcomes), sum(played), len(played), min(1.0, LOOKS * _p(outcomes)), tuple(same)),
     )
 
 
-def _confirmed(outcomes: list[dict[str, Any]]) -> int:
-    return sum(r["outcome"] == BREAKS and r["control"] for r in outcomes)
+def _p(outcomes: list[dict[str, Any]]) -> float:
+    """How likely as few fresh twins or fewer would be solved if a memory did as well there as in its controls.
+
+    Exact, and conditional on how much each twin's memory solves: where that is `k` of `m` controls and the one scenario
+    outside training, the latter is among them with probability `k / (m + 1)`.
+    """
+    chances, held = np.ones(1), 0  # of 0, 1, 2 ... twins solved
+    for record in outcomes:
+        if record["outcome"] in (BREAKS, HOLDS) and record["controls"]:
+            holds = record["outcome"] == HOLDS
+            share = (sum(record["controls"]) + holds) / (len(record["controls"]) + 1)
+            chances, held = np.convolve(chances, (1 - share, share)), held + holds
+    return float(chances[: held + 1].sum())
 
 
 def _dist(region: Region, low: float, high: float) -> Dist:

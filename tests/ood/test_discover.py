@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from scipy import stats
 
 from scengen import cli, config
 from scengen.ood import discover as module
@@ -118,7 +119,7 @@ def test_a_memory_that_is_often_weak_is_judged_by_the_twins_in_which_it_is_not(p
     monkeypatch.setattr(module.behaviour, "follows", lambda *_: next(fails) % 2 == 0)  # in every other control
     search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
     found = next(f for f in search.findings if f.axis.name == "starter_height_low")
-    assert (found.against, found.fresh) == (0, 20) and 8 <= found.confirmed <= 12 and found.p < 0.05
+    assert (found.confirmed, found.fresh, found.controls) == (20, 20, 20) and 8 <= found.within <= 12 and found.p < 0.05
 
 
 def test_what_no_twin_allows_costs_no_trial(planted, tmp_path):
@@ -141,6 +142,36 @@ def test_a_point_goes_to_a_twin_in_which_it_is_feasible(planted, tmp_path, monke
     discover(TASK, QUICK, Settings(budget=100, method="hypercube"), tmp_path)
     lines = (tmp_path / "trials.jsonl").read_text().splitlines()[1:]
     assert {json.loads(line)["twin"] for line in lines if json.loads(line)["stage"] == "hypercube"} == {5}
+
+
+def _played(*twins):
+    return [{"outcome": HOLDS if holds else BREAKS, "controls": controls} for holds, controls in twins]
+
+
+@pytest.mark.parametrize(("confirmed", "against"), [(0, 0), (3, 0), (8, 1), (5, 5), (1, 4)])
+def test_with_one_control_the_confirmation_is_mcnemars_test(confirmed, against):
+    twins = [(False, [True])] * confirmed + [(True, [False])] * against + [(True, [True])] * 3 + [(False, [False])] * 4
+    expected = stats.binomtest(against, confirmed + against, 0.5, "less").pvalue if confirmed + against else 1.0
+    assert module._p(_played(*twins)) == pytest.approx(expected)
+
+
+def test_a_memory_that_solves_one_of_three_controls_tells_a_quarter_each_time():
+    assert module._p(_played(*[(False, [True, False, False])] * 6)) == pytest.approx(0.75**6)
+    assert module._p(_played(*[(False, [False] * 3)] * 6)) == 1.0, "it solves nothing anywhere"
+    assert (
+        module._p([{"outcome": INFEASIBLE, "controls": []}, {"outcome": BREAKS, "reason": "", "controls": []}]) == 1.0
+    )
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+def test_what_breaks_nothing_is_confirmed_as_rarely_as_promised(correlated):
+    random, found = np.random.default_rng(0), 0
+    for _ in range(1000):
+        ease = random.choice([0.1, 0.9], 20) if correlated else np.full(20, 0.4)
+        solved = random.random((20, 4)) < ease[:, None]
+        twins = _played(*[(bool(one), list(map(bool, rest))) for one, *rest in solved])
+        found += any(module.LOOKS * module._p(twins[:n]) < 0.05 for n in (5, 10, 15, 20))
+    assert found <= 0.06 * 1000, "whenever one looks"
 
 
 def test_a_memory_that_fails_everywhere_alike_breaks_at_nothing(planted, tmp_path, monkeypatch):
