@@ -160,7 +160,7 @@ def test_the_help_of_a_chosen_task_tells_its_splits_alone():
         ("scengen generate task=dom", ["task=domino_select", "task=domino_single"]),
         ("scengen generate task=domino_single,pac", ["task=domino_single,packing"]),
         ("scengen generate task=packing split=t", ["split=tight", "split=turned_bin", "split=thin_heavy"]),
-        ("scengen generate task=packing split=tight+l", ["split=tight+large_turns"]),
+        ("scengen generate task=packing split=tight+l", ["split=tight+large_turns", "split=tight+large_pieces"]),
         ("scengen axis task=packing axis=i", []),
         ("scengen generate wor", ["workers="]),
         ("scengen generate task=packing certify=", ["certify=full", "certify=quick"]),
