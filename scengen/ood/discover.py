@@ -152,7 +152,8 @@ def discover(
         progress: told what is being done, how far it is, and how much there is.
 
     Raises:
-        BadConfig: the method is none of `METHODS`, scikit-learn is missing, or no training scenario can be solved.
+        BadConfig: the method is none of `METHODS`, scikit-learn is missing, no training scenario can be solved, or
+            nothing outside training is feasible.
     """
     if settings.method == FOREST:
         _forest()  # before any work, to say at once that it is missing
@@ -162,6 +163,8 @@ def discover(
         ends = [round(share * settings.budget) for share in SHARES]
         random = np.random.default_rng(settings.seed)
         reaches = asked.reaches()
+        if not reaches:
+            raise BadConfig(f"{task.name}: no value outside training is feasible; widen the bounds of its parameters")
         asked.ask("far", _far(known, reaches, random)[: ends[0]])
         asked.ask("hypercube", _hypercube(ends[0] - asked.spent, reaches, random))
         if settings.method == FOREST:

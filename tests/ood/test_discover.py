@@ -9,6 +9,7 @@ import yaml
 from scipy import stats
 
 from scengen import cli, config
+from scengen.errors import BadConfig
 from scengen.ood import discover as module
 from scengen.ood.discover import BREAKS, HOLDS, INFEASIBLE, Settings, _hypercube, _Trials, as_yaml, discover
 from scengen.ood.regions import located, regions
@@ -218,6 +219,12 @@ def test_a_search_that_finds_nothing_says_so(planted, tmp_path, monkeypatch):
     monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS)
     search = discover(TASK, QUICK, Settings(budget=40), tmp_path)
     assert search.findings == [] and yaml.safe_load(as_yaml(TASK, search)) == {"axes": {}}
+
+
+def test_a_task_with_nothing_feasible_outside_training_is_told(planted, tmp_path, monkeypatch):
+    monkeypatch.setattr(_Trials, "feasible", lambda *_: False)
+    with pytest.raises(BadConfig, match="no value outside training is feasible"):
+        discover(TASK, QUICK, Settings(budget=100), tmp_path)
 
 
 def test_real_trials_tell_a_memory_that_holds_from_one_that_breaks(tmp_path):
