@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..certificate import CHECKS, Check, as_json
+from ..certificate import CHECKS, Check, as_json, from_json
 from ..control.loop import Loop
 from ..control.teleop import ALPHA, LARGEST_CHANGE, MOTION
 from ..errors import Infeasible, ScengenError
@@ -17,7 +17,7 @@ from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
 from .certify import ACTIONS, NO_ATTACK, NOT_TRIED, lower_bound, no_ablations
-from .rebuilt import rebuild
+from .rebuilt import SAME, ZERO, rebuild
 from .rollout import AT_REST
 from .settings import CertifySettings
 
@@ -208,10 +208,23 @@ def _other_settings(checks: Sequence[Check], claims: Claims) -> Iterator[str]:
             yield f"check {check.name} was made with other settings than the manifest says"
 
 
-def _alike(numbers: Mapping[str, Any], others: Mapping[str, float]) -> bool:
-    """Whether two mappings hold the same numbers but for how a machine rounds."""
-    close = (math.isclose(numbers[name], others[name], rel_tol=1e-9, abs_tol=1e-12) for name in others)
-    return numbers.keys() == others.keys() and all(close)
+def alike(made: Mapping[str, Any], stored: Any) -> bool:
+    """Whether the numbers of a check that was made again are the stored ones but for the last digits.
+
+    These may differ where the simulation has the same bits: numpy's linear algebra rounds as the processor's
+    instruction set has it, and no fingerprint tells.
+    """
+    return _same(from_json(as_json(made)), stored)
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[name], other[name]) for name in one)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=SAME, abs_tol=ZERO)
+    return type(one) is type(other) and one == other
 
 
 def _played(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: float) -> bool:
@@ -221,9 +234,17 @@ def _played(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: fl
 
 
 def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
-    """Numbers with which a check cannot have passed."""
+    """Numbers with which a check cannot have passed, and features that are not those of the family."""
+    features = scenario.features()
+    if not alike(features, stored := checks["feasible"].numbers):
+        other = sorted(
+            name for name in features.keys() | stored.keys() if not _same(features.get(name), stored.get(name))
+        )
+        yield (
+            f"check feasible has other features than the family gives: {_short(', '.join(other))}; "
+            "where the family has changed since, certify the pool again"
+        )
     rules = {
-        "feasible": lambda n: _alike(n, scenario.features()),
         "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
         "rest": lambda n: _rested(n, claims.settings),
         "unsolved": lambda n: n == {},

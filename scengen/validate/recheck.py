@@ -1,20 +1,17 @@
 """What verification simulates: the witness again, the checks that need no oracle, or the whole certificate."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from ..certificate import Check, as_json, from_json
+from ..certificate import Check, as_json
 from ..errors import NoOracle
 from ..pool import PoolRow, uncounted
 from ..scenario import Scenario
 from .certify import Adversary, Trial, certify
-from .claims import Claims
+from .claims import Claims, alike
 from .identity import fingerprint
-from .rebuilt import SAME, ZERO
 from .rollout import Rollout, replay
 from .settings import CertifySettings
 
@@ -92,7 +89,7 @@ def fails_again(
             told = "is passed" if check.passed else f"fails: {check.reason}" if check.reason else "is not made"
             yield f"check {check.name} of this reject {told} when it is made again"
             return
-        if not _alike(from_json(as_json(check.numbers)), stored.numbers):
+        if not alike(check.numbers, stored.numbers):
             yield f"check {check.name} of this reject has other numbers when it is made again"
             return
 
@@ -157,23 +154,8 @@ def _against(found: Check, stored: Check, exact: bool) -> Iterator[str]:
     """Where a check that was made again does not say what is stored."""
     if not found.passed and not found.waived:
         yield f"check {found.name} fails: {found.reason}"
-    elif exact and not _alike(from_json(as_json(found.numbers)), stored.numbers):
+    elif exact and not alike(found.numbers, stored.numbers):
         yield f"check {found.name} has other numbers when it is made again: {as_json(found.numbers)[:160]}"
-
-
-def _alike(one: Any, other: Any) -> bool:
-    """Whether two values of a check are the same but for the last digits.
-
-    These may differ where the simulation has the same bits: numpy's linear algebra rounds as the processor's
-    instruction set has it, and no fingerprint tells.
-    """
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_alike(one[name], other[name]) for name in one)
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_alike, one, other))
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=SAME, abs_tol=ZERO)
-    return type(one) is type(other) and one == other
 
 
 def _check(row: PoolRow, name: str) -> Check:

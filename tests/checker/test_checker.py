@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 from checkers import CONTROLS, EASY
-from make_base import POOLS
+from make_base import BASE, KEPT, POOLS, expired
 from make_corpus import cases
 
 from scengen import config
+from scengen.pool import Pool
+from scengen.validate.claims import alike
 from scengen.validate.spot import excluded_share
 
 RUN = Path(__file__).parent / "run_corpus.py"
@@ -35,6 +37,17 @@ def test_the_corpus_is_large_and_covers_every_task():
     assert tasks == set(config.tasks())
     for expect in ("accept", "reject"):
         assert {POOLS[case.base][0] for case in corpus if case.expect == expect} == {f"task={task}" for task in tasks}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_the_pools_in_the_repository_are_those_of_the_families_as_they_are(name):
+    pool = Pool.open(BASE / name)
+    task = config.task(pool.manifest["config"]["task"]["name"])
+    remedy = "make checker-base"
+    assert not expired(BASE / name), remedy
+    for row in pool.rows():
+        scenario = task.scenario(row.params)
+        assert (scenario.id, alike(scenario.features(), row.certificate.checks[0].numbers)) == (row.id, True), remedy
 
 
 @pytest.mark.slow
