@@ -234,17 +234,9 @@ def _played(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: fl
 
 
 def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
-    """Numbers with which a check cannot have passed, and features that are not those of the family."""
-    features = scenario.features()
-    if not alike(features, stored := checks["feasible"].numbers):
-        other = sorted(
-            name for name in features.keys() | stored.keys() if not _same(features.get(name), stored.get(name))
-        )
-        yield (
-            f"check feasible has other features than the family gives: {_short(', '.join(other))}; "
-            "where the family has changed since, certify the pool again"
-        )
+    """Numbers with which a check cannot have passed."""
     rules = {
+        "feasible": lambda n: alike(scenario.features(), n),
         "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
         "rest": lambda n: _rested(n, claims.settings),
         "unsolved": lambda n: n == {},
@@ -263,7 +255,10 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
         except (TypeError, KeyError, AttributeError, ValueError):
             fine = False
         if not fine:
-            yield f"check {name} cannot have passed with its numbers, or they are not those of this family"
+            yield (
+                f"check {name} cannot have passed with its numbers, or they are not those of this family; "
+                "where it has changed since, certify the pool again"
+            )
     if not _filtered(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
 

@@ -243,7 +243,7 @@ FALSE = {
     "shortcut not told": (fewer("shortcuts"), "check shortcuts cannot"),
     "ablation solves": (first_of("ablations", outcome="success"), "check ablations cannot"),
     "ablation not told": (fewer("ablations"), "check ablations cannot"),
-    "features": (fewer("feasible"), "check feasible has other features"),
+    "features": (fewer("feasible"), "check feasible cannot"),
     "numerics flip": (numbers("numerics", half_time_step={"witness": "timeout"}), "check numerics cannot"),
     "numerics half told": (fewer("numerics"), "check numerics cannot"),
     "oracle timed out": (numbers("solved", outcome="timeout"), "check solved cannot"),
