@@ -196,11 +196,14 @@ class CupInversion(Scenario):
         }
 
     def _topple(self, world: World) -> Plan:
-        """Push the cup near its base, which is up, as fast as the jaw's hand goes."""
-        arm, along = world.arms[1], np.array([1.0, 0.0, 0.0])
+        """Push the cup near its base, which is up, as fast as the jaw's hand goes: across its reach, so that it does
+        not get out of it, and with the other arm out of the way."""
+        other, arm = world.arms
+        x, y, _ = self.start - panda.bases(2)[1]
+        along = np.array([y, -x, 0.0]) / math.hypot(x, y)
         beside = world.pos("cup") - 0.01 * UP - (self.cup.rim + 0.03) * along
         pushed = jaw.poke(arm, beside, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.16)
-        yield from alone(arm, pushed)
+        yield from together(world, go_to(other, ASIDE, pace=COARSE), pushed)
 
     def _as_it_is(self, world: World) -> Plan:
         """Put the cup into the square upside down."""
