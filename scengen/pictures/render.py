@@ -111,9 +111,9 @@ THROUGH = 1e-6
 
 
 def hide_hulls(model: mujoco.MjModel) -> None:
-    """Make the robot's collision hulls invisible; its visual meshes lie in the same places."""
-    robot = model.body_rootid == model.body("robot0_base").id
-    hulls = robot[model.geom_bodyid] & (model.geom_group == 0)
+    """Make the collision hulls of all arms invisible; their visual meshes lie in the same places."""
+    robots = np.isin(model.body_rootid, [model.body(names.base).id for names in arms(model)])
+    hulls = robots[model.geom_bodyid] & (model.geom_group == 0)
     model.geom_rgba[hulls, 3] = 0.0
 
 

@@ -19,7 +19,7 @@ from scengen.scenario import Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import certify
-from scengen.validate.rebuilt import world_of
+from scengen.validate.rebuilt import rebuild, world_of
 
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)))
 drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
@@ -107,6 +107,18 @@ def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
     world = World.load(scene_text.emit(scene)[0])
     first, best = render.fitted(world, 1.0), render.clearest(world, 1.0)
     assert ((best.azimuth, best.elevation) != (first.azimuth, first.elevation)) == hidden
+
+
+def test_no_collision_hull_of_any_arm_is_in_the_picture():
+    task = config.task("plate_shelf_hobi")
+    model = World.load(rebuild(task.family()), task.embodiment, visual=True).model
+    render.hide_hulls(model)
+    names = [model.body(body).name for body in model.geom_bodyid]
+    for number in (0, 1):
+        arm = np.array([name.startswith((f"robot{number}_", f"gripper{number}_")) for name in names])
+        hulls, meshes = arm & (model.geom_group == 0), arm & (model.geom_group == 1)
+        assert hulls.sum() > 10 and not model.geom_rgba[hulls, 3].any()
+        assert meshes.sum() > 10 and model.geom_rgba[meshes, 3].all()
 
 
 @pytest.mark.parametrize("free", [False, True])
