@@ -29,7 +29,7 @@ rim between the open fingers 35 mm, the pads on the bead 5 mm along it, the foot
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -41,7 +41,7 @@ from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, solid, table
 from ..assets.ring_rack import RingRack
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_y, corners, gap, shortest
+from ..geometry import UP, Mat3, Vec3, about_y, about_z, corners, gap, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over
@@ -69,7 +69,6 @@ from ..skills.motion import (
     push,
     retreat,
     together,
-    turn_about_vertical,
     turn_to,
     until,
 )
@@ -92,8 +91,11 @@ ASIDE: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
 """Where the cup's hand is out of the way [m]."""
 OVERLAP = 0.007
 """How far the rim goes between the fingers, beyond the grip site [m]: with it the pads cover the 12 mm of the bead."""
-CARRYING = Pace(0.15, 0.01)
+CARRYING = Pace(0.20, 0.01)
 """With the bowl in the jaw, whose way down is to be clearly slower than a fall that breaks it."""
+ROUND = math.radians(60.0)
+"""How far the hand goes round the bowl, of 90 deg from its right to the robot's side [rad]: at 90 joint 5 comes to its
+end with a bowl that droops."""
 ROCKS = 0.05
 """How far the middle of the foot comes back to the robot when a bowl on its side rocks upright [m]."""
 DOWNWARDS = 0.04
@@ -165,12 +167,12 @@ class BowlTable(Scenario):
         yield from alone(taker, self.put_down(taker))
 
     def extract(self, arm: Arm) -> Plan:
-        """Suck the bowl by its foot and pull it straight out of the ring."""
+        """Suck the bowl by its foot, pull it out over the middle of the ring: a rim that rubs there peels it off."""
         foot, down = arm.world.pos("bowl"), facing_down()
         yield from go_to(arm, foot + 0.03 * UP, down, STEADY, OPEN)
         yield from suction.suck(arm, foot, down)
-        out = arm.world.pos("bowl") + (self.rack.height + 0.02) * UP
-        yield from suction.carry_to(arm, "bowl", out, arm.world.rot("bowl"), Pace(0.10, 0.004))
+        out = [*self.start[:2], arm.world.pos("bowl")[2] + self.rack.height + 0.02]
+        yield from suction.carry_to(arm, "bowl", np.array(out), arm.world.rot("bowl"), Pace(0.10, 0.004))
 
     def present(self, arm: Arm) -> Plan:
         """Hold the bowl out so that its rim, on top, is level where the jaw comes to."""
@@ -197,17 +199,23 @@ class BowlTable(Scenario):
         yield from go_to(arm, ASIDE, pace=COARSE)
 
     def turn_up(self, arm: Arm) -> Plan:
-        """Turn the opening up, then bring the hand to the robot's side of the bowl: there its palm meets no rack."""
-        yield from turn_to(arm, shortest(arm.world.rot("bowl")[:, 2], UP) @ arm.hand_rot, 0.8)
-        yield from turn_about_vertical(arm, -math.pi / 2, 1.2)
+        """Turn the opening up, and the hand to the robot's side of the bowl: there its palm meets no rack."""
+        yield from turn_to(arm, about_z(-ROUND) @ self.level(arm), 1.0)
+
+    def level(self, arm: Arm) -> Mat3:
+        """Orientation of the hand in which the bowl that it holds is upright."""
+        return shortest(arm.world.rot("bowl")[:, 2], UP) @ arm.hand_rot
 
     def put_down(self, arm: Arm) -> Plan:
-        """Over the square, down until the foot is on the table; let go."""
+        """Over the square, down until the foot is on the table; let go.
+
+        The bowl droops all the while, and by 7 deg at every jerk: it is levelled evenly, before the way and on it.
+        """
         world = arm.world
         for height in (0.18, 0.02):
-            level = shortest(world.rot("bowl")[:, 2], UP) @ world.rot("bowl")
+            yield from turn_to(arm, self.level(arm), 0.8)
             com = self.goal + (height + world.com("bowl")[2] - world.pos("bowl")[2]) * UP
-            yield from jaw.carry(arm, "bowl", com, level, CARRYING)
+            yield from jaw.carry(arm, "bowl", com, pace=CARRYING)
         yield from push(arm, -DOWNWARDS * UP, lambda: world.touching("bowl", "table"))
         yield from jaw.release(arm)
         yield from retreat(arm)
@@ -221,10 +229,8 @@ class BowlTable(Scenario):
             "cup_flings_it": Shortcut(self._fling),
             "cup_rights_it_in_the_rack": Shortcut(self._right_in_the_rack),
             "cup_on_the_dome": Shortcut(lambda world: alone(world.arms[0], self._by_the_dome(world.arms[0]))),
-            "jaw_on_the_dome": Shortcut(
-                lambda world: alone(world.arms[1], self._on_the_dome(world.arms[1])), to_rest=True
-            ),
-            "jaw_pries_it_out": Shortcut(lambda world: alone(world.arms[1], self._pry(world.arms[1]))),
+            "jaw_on_the_dome": Shortcut(lambda world: self._beside(world, self._on_the_dome), to_rest=True),
+            "jaw_pries_it_out": Shortcut(lambda world: self._beside(world, self._pry)),
             "jaw_leaves_it_turned": Shortcut(self._unturned),
         }
 
@@ -303,6 +309,11 @@ class BowlTable(Scenario):
         yield from push(arm, -DOWNWARDS * UP, lambda: arm.world.touching_bodies("bowl") > {ROBOT}, give_up=8.0)
         yield from suction.let_go(arm)
         yield from retreat(arm)
+
+    def _beside(self, world: World, plan: Callable[[Arm], Plan]) -> Plan:
+        """A plan of the jaw's arm, with the other hand out of its way: both reach for the rack."""
+        other, arm = world.arms
+        yield from together(world, go_to(other, ASIDE, pace=COARSE), plan(arm))
 
     def _on_the_dome(self, arm: Arm) -> Plan:
         """Pinch the dome with the jaw, as far down as that opens, lift, bring it to the square."""
