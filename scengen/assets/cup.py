@@ -151,10 +151,10 @@ class Cup(Turned):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         super().fill(body, spec)
         # On the mesh of the floor a box would stand on one point and rock; MuJoCo gives two boxes four. This one's top
-        # is the floor, and the mesh lies a little lower.
+        # is the floor, and the mesh lies a little lower. It is not shown: underneath, both lie in one plane.
         flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - PROUD) / 2
         size, pos = [flat, flat, half], [0.0, 0.0, self.floor - half]
-        solid(body, "floor", size, pos, friction=self.friction, mass=0.0, rgba=self.rgba)
+        solid(body, "floor", size, pos, friction=self.friction, mass=0.0, group=3)
         for i, (kind, start, end) in enumerate(self._bars()):
             along = end - start
             half = float(np.linalg.norm(along)) / 2

@@ -182,6 +182,24 @@ def test_a_box_stands_in_a_cup_on_its_floor_and_does_not_rock(tilt):
     assert np.abs(data.qvel).max() < 1e-3
 
 
+def test_underneath_two_faces_of_a_cup_that_are_seen_do_not_lie_in_one_plane():
+    """They would flicker in pictures, of a cup that is upside down from the start."""
+    model = Cup().spec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    below, upwards = np.array([0.003, 0.001, -0.1]), np.array([0.0, 0.0, 1.0])
+
+    def distance(g):
+        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH:
+            return mujoco.mj_rayMesh(model, data, g, below, upwards)
+        where = data.geom_xpos[g], data.geom_xmat[g], model.geom_size[g]
+        return mujoco.mju_rayGeom(*where, below, upwards, model.geom_type[g])
+
+    seen = sorted(d for g in np.flatnonzero(model.geom_group < 3) if (d := distance(g)) >= 0.0)
+    assert seen[0] == pytest.approx(0.1 + PROUD, abs=1e-6)
+    assert np.diff(seen).min(initial=1.0) > 1e-4
+
+
 @given(bowl=anywhere(Bowl), turn=st.floats(0, 2 * math.pi), tilt=st.floats(0.0, 1.0))
 @settings(max_examples=25, deadline=None)
 def test_a_ball_may_lie_anywhere_against_the_inner_sphere_of_a_bowl(bowl, turn, tilt):
