@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.table import Table
-from rich.text import Text
 
 from .. import config
 from ..analysis.redraw import task_of
@@ -175,7 +174,7 @@ def _tell(pool: Pool, report: Report) -> None:
     if report.differences:
         table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
         for d in report.differences[:SHOWN]:
-            table.add_row(*(Text(d[name]) for name in ("key", "pool", "installed")))
+            table.add_row(d["key"], d["pool"], d["installed"])
         out.print(table)
         if (more := len(report.differences) - SHOWN) > 0:
             say(f"and {more} more; json= writes them all")

@@ -243,6 +243,9 @@ class _Run:
 
     def count(self) -> None:
         """Compare the counts of the manifest with what has been seen."""
+        if not self.pool.chosen and len(self.pool) < (asked := self.pool.manifest["n"]):
+            told = f"{asked} scenarios were asked for, and the run ended with {len(self.pool)}"
+            self.found.remarks.append(f"{told}: how many is the author's word")
         for what in self._miscounted():
             self.found.of_pool(MANIFEST, "refuted", what)
 

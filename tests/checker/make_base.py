@@ -22,7 +22,7 @@ BASE = Path(__file__).parent / "base"
 QUICKLY = ("certify.robust.runs=1", "certify.robust.bound=0.04")
 """Settings that keep every check, with one jittered run."""
 EDGE = (
-    "+task.axes.edge={why: the gap is as wide as a falling tile is high, replace: {gap_ratio: [uniform, 1.80, 1.95]}}"
+    "+task.axes.edge={why: the gap is as wide as a falling tile is high, replace: {gap_ratio: [uniform, 1.85, 1.95]}}"
 )
 """An axis on which the oracle of `domino_single` fails now and then."""
 HEAVY = "+task.axes.heavy={why: tiles weigh more than in training, replace: {tile: {mass: [uniform, 0.065, 0.075]}}}"

@@ -17,7 +17,7 @@ import pytest
 from helpers import REFERENCE
 from pools import certificate_of
 
-from scengen import config, pool
+from scengen import cli, config, pool
 from scengen.certificate import as_json
 from scengen.errors import PoolError
 from scengen.parallel import Limits
@@ -478,6 +478,23 @@ def test_a_changed_task_is_told_key_by_key(mine):
     changed(mine, lambda m: m["config"]["task"].update(horizon=9.0, limits={}))
     told = {d["key"]: (d["pool"], d["installed"]) for d in report(mine).differences}
     assert told["horizon"] == ("9.0", "12.0")
+
+
+def test_what_a_pool_says_of_its_task_is_shown_and_not_obeyed(mine, capsys):
+    changed(mine, lambda m: m["config"]["task"]["axes"]["diagonal"].update(why="[/] \x1b[2J", source="\u202e"))
+    assert cli.run(["verify", f"pool={mine}", "level=replay"]) == 0
+    shown = capsys.readouterr().out
+    assert "differs from the installed" in shown and "[/] \\x1b[2J" in shown and "\\u202e" in shown
+    assert not set(shown) & set("\x1b\u202e")
+
+
+def test_a_run_that_ended_with_fewer_than_were_asked_for_is_told(mine):
+    assert not report(mine).remarks
+    changed(mine, lambda m: m.update(n=60))
+    found = report(mine)
+    assert found.holds and found.remarks == [
+        "60 scenarios were asked for, and the run ended with 6: how many is the author's word"
+    ]
 
 
 def test_own_settings_are_told(mine):
