@@ -264,7 +264,7 @@ SAYS = {
     "task": r"task",
     "horizon": r"horizon|finite",
     "settle": r"settl|finite",
-    "params": r"param|JSON|id |deep|nested",
+    "params": r"param|JSON|id |deep|nested|finite",
     "family": r"family",
 }
 """Reasons by the first word of a name; a line is enough for the others."""

@@ -43,8 +43,8 @@ TEXTS = [
     "7",
 ]
 NUMBERS = [0, 1, -1, 2, 7, 0.5, -0.0, 1e-9, 1e9, 1e308, 2**62, 2**64, float("nan"), float("inf"), True]
-JUST_BEYOND = 1e-8
-"""Relative; ten times what numbers may differ by where machines round otherwise."""
+JUST_BEYOND, LEAST = 1e-8, 1e-11
+"""Relative and absolute; ten times what numbers may differ by where machines round otherwise."""
 OTHER_TYPES = [None, [], {}, "", 0, [[]], {"a": {}}, [1, 2], True]
 
 FREE: dict[str, dict[str, str]] = {
@@ -127,7 +127,7 @@ class Mutator:
         if isinstance(old, bool):
             return not old
         if isinstance(old, (int, float)):
-            near = [old + 1, old - 1, old * 1.01, old * (1 + JUST_BEYOND), -old, old / 2]
+            near = [old + 1, old - 1, old * 1.01, old + max(JUST_BEYOND * abs(old), LEAST), -old, old / 2]
             return pick.choice([*near, *near, *NUMBERS])
         if isinstance(old, str):
             return self._text(old)
