@@ -25,6 +25,8 @@ from judging import Outcome, attempt
 from make_base import BASE, KEPT
 from make_corpus import sealed
 
+from scengen.validate.rebuilt import SAME, ZERO
+
 Path_ = tuple[str | int, ...]
 
 TEXTS = [
@@ -43,7 +45,7 @@ TEXTS = [
     "7",
 ]
 NUMBERS = [0, 1, -1, 2, 7, 0.5, -0.0, 1e-9, 1e9, 1e308, 2**62, 2**64, float("nan"), float("inf"), True]
-JUST_BEYOND, LEAST = 1e-8, 1e-11
+JUST_BEYOND, LEAST = 10 * SAME, 10 * ZERO
 """Relative and absolute; ten times what numbers may differ by where machines round otherwise."""
 OTHER_TYPES = [None, [], {}, "", 0, [[]], {"a": {}}, [1, 2], True]
 
