@@ -15,7 +15,7 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@sh tools/opengl.sh
-	$(BIN)/python -c "from scengen.validate.identity import fingerprint; fingerprint()"  # compiles the control loop
+	$(BIN)/python -c "from scengen.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
 	@touch $(READY)
 
 demo: setup

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .config import task as load_task
     from .config import tasks as list_tasks
     from .params import param
-    from .pool import Pool
+    from .pool.pool import Pool
     from .samplers.task import Draw, Task
     from .scenario import Scenario, Shortcut
     from .sim.world import World

@@ -20,13 +20,13 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from .cluster import AUTO, Cluster
 from .errors import BadConfig, UnknownName, cut
-from .parallel import Workers, cores
 from .samplers.task import Task, load
 from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path
 from .task_files import tasks as tasks  # for those who load them all
 from .validate.settings import CertifySettings
+from .work.cluster import AUTO, Cluster
+from .work.parallel import Workers, cores
 
 T = TypeVar("T")
 

@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
-from scengen import config, pool
-from scengen.pool import Pool
+from scengen import config
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.runs.generate import Settings, generate
 
 QUICKLY = ["certify.robust.runs=1", "certify.robust.bound=0.04"]

@@ -15,12 +15,13 @@ from pathlib import Path
 import pytest
 from faults import lost, work
 
-from scengen import cli, cluster, config
-from scengen.cluster import QUIET, Cluster, ClusterError, about
+from scengen import cli, config
 from scengen.commands.verify import Settings as Asked
 from scengen.errors import BadConfig, ScengenError
-from scengen.parallel import Executor, Limits, WorkerDied, each
 from scengen.runs.progress import ProgressBar
+from scengen.work import cluster
+from scengen.work.cluster import QUIET, Cluster, ClusterError, about
+from scengen.work.parallel import Executor, Limits, WorkerDied, each
 
 LIMITS = Limits(2.0, 400)
 POOL = ("generate", "task=domino_single", "n=8", "certify.robust.runs=1", "certify.robust.bound=0.04")

@@ -13,17 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_pool import synthetic
 
-from scengen import cli, pool, shards
+from scengen import cli
 from scengen.analysis import redraw
 from scengen.analysis.distance import MOST_PAIRS, near_duplicates
 from scengen.analysis.space import Batch
-from scengen.directory import Directory
 from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError
-from scengen.library import Library
-from scengen.names import NoScenario
 from scengen.pictures import report, sheet
-from scengen.pool import Pool
+from scengen.pool import pool, shards
+from scengen.pool.directory import Directory
+from scengen.pool.library import Library
+from scengen.pool.names import NoScenario
+from scengen.pool.pool import Pool
 
 N = 1000
 SHARD = 400

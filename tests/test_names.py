@@ -8,11 +8,11 @@ from helpers import REFERENCE
 
 from scengen import cli, config
 from scengen.commands import show
-from scengen.directory import Directory
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
-from scengen.names import Misnamed, Name, NoScenario, find
-from scengen.pool import Pool
+from scengen.pool.directory import Directory
+from scengen.pool.names import Misnamed, Name, NoScenario, find
+from scengen.pool.pool import Pool
 
 KNOWN = [
     Name("domino_single", "id", 0, "8ed4a4577fe0"),

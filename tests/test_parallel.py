@@ -7,11 +7,11 @@ import time
 import pytest
 from faults import lost, work
 
-from scengen import parallel
 from scengen.commands.verify import Settings as Asked
 from scengen.config import read
 from scengen.errors import BadConfig
-from scengen.parallel import Limits, WorkerDied, cores, each
+from scengen.work import parallel
+from scengen.work.parallel import Limits, WorkerDied, cores, each
 
 LIMITS = Limits(0.5, 200)
 

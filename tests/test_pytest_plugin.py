@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from foreign.push_block import PushBlock
 
-from scengen import conformance
-from scengen.conformance import Nonconformity
+from scengen.conformance import rules
+from scengen.conformance.rules import Nonconformity
 
 CONF = str(Path(__file__).parent / "foreign" / "conf")
 
@@ -22,7 +22,7 @@ def checked(capsys, tmp_path, monkeypatch):
 
     def run(*argv):
         plain = ("-p", "no:cacheprovider", "-p", "no:xdist", "-c", os.devnull, "--rootdir", str(tmp_path))
-        status = pytest.main([*plain, "-p", "scengen.pytest_plugin", f"--scengen-conf={CONF}", *argv])
+        status = pytest.main([*plain, "-p", "scengen.conformance.pytest_plugin", f"--scengen-conf={CONF}", *argv])
         both = capsys.readouterr()
         return int(status), both.out + both.err
 
@@ -77,23 +77,23 @@ def card(verdict="breaks replay", oracle=1.0, findings=("breaks", "too weak"), l
 
 
 def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
-    conformance._solvable(card())
-    conformance._breaks(card())
-    conformance._breaks(card("cannot tell", findings=("too weak", "not tried"), leaves=True))
+    rules._solvable(card())
+    rules._breaks(card())
+    rules._breaks(card("cannot tell", findings=("too weak", "not tried"), leaves=True))
 
 
 @pytest.mark.parametrize(
     ("check", "made", "says"),
     [
-        (conformance._solvable, card(oracle=0.9), "the oracle solves 90% of the twins, less than 95%"),
-        (conformance._solvable, card(oracle=None), "solves 0%"),
+        (rules._solvable, card(oracle=0.9), "the oracle solves 90% of the twins, less than 95%"),
+        (rules._solvable, card(oracle=None), "solves 0%"),
         (
-            conformance._breaks,
+            rules._breaks,
             card("cosmetic to memory", findings=("holds",)),
             "say in its why what it asks of the eye",
         ),
-        (conformance._breaks, card("cannot tell", findings=("holds",), leaves=True), "more twins may tell"),
-        (conformance._breaks, card("cannot tell", findings=("too weak",)), "baseline_0 too weak"),
+        (rules._breaks, card("cannot tell", findings=("holds",), leaves=True), "more twins may tell"),
+        (rules._breaks, card("cannot tell", findings=("too weak",)), "baseline_0 too weak"),
     ],
 )
 def test_an_axis_that_is_unsolvable_or_asks_nothing_new_fails(check, made, says):

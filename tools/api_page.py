@@ -25,14 +25,14 @@ MODULES = {
         "samplers.designs",
     ),
     "Playing and certifying": ("validate.rollout", "validate.certify", "validate.settings", "certificate"),
-    "Checks and tests": ("conformance", "frames", "errors"),
+    "Checks and tests": ("conformance.rules", "conformance.frames", "errors"),
     "Assets": (
         "assets.prop",
         *(f"assets.{path.stem}" for path in sorted((ROOT / "scengen" / "assets").glob("[a-z]*.py"))),
     ),
 }
 """What stands on the page, by heading."""
-LEFT_OUT = ("assets.kits",)
+LEFT_OUT = ("assets.kits", "assets.mesh_prop")
 """Modules that list and find assets for commands."""
 LONGEST = 80
 """Letters of a constant's value; a longer one is told by its docstring alone."""

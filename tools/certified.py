@@ -22,12 +22,12 @@ from scengen import config
 from scengen.envs.agreement import compare_all
 from scengen.errors import Infeasible
 from scengen.ood.behaviour import solves
-from scengen.parallel import Limits
 from scengen.runs.generate import Settings, generate
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.task_files import certified
+from scengen.work.parallel import Limits
 
 FILE = Path(__file__).parent.parent / "conf" / "certified.yaml"
 HEAD = """# What certification came to, by task and split. Written by tools/certified.py.

@@ -13,7 +13,7 @@ from typing import Any
 from scengen import cli, config
 from scengen.attack.evidence import Rate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
-from scengen.pool import MANIFEST
+from scengen.pool.pool import MANIFEST
 
 VERSIONS = ("3.3.7", "3.4.0", "3.5.0")
 LEVEL = "recheck"

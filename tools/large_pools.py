@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 from scengen.envs.gym import PoolEnv
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 
 COMMANDS = {
     "show": "show pool={pool}",

@@ -22,7 +22,7 @@ from scengen.analysis.redraw import task_of
 from scengen.certificate import STAGES, Check
 from scengen.errors import Infeasible
 from scengen.params import values
-from scengen.pool import Pool, PoolRow, sha256, write
+from scengen.pool.pool import Pool, PoolRow, sha256, write
 from scengen.samplers.task import Draw
 from scengen.validate.rebuilt import rebuild
 

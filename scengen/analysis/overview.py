@@ -11,14 +11,14 @@ import numpy as np
 
 from ..certificate import STAGES
 from ..errors import Infeasible
-from ..library import names
 from ..pictures import render
 from ..pictures.plots import svg
 from ..pictures.report import LARGEST_PAGE, template, thumbnail
-from ..pool import Pool
+from ..pool.library import names
+from ..pool.pool import Pool
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..targets import write
+from ..work.targets import write
 from .bias import Bias, bias
 from .coverage import Evenness, evenness
 from .distance import CLOSE, ENERGY_OF, MOST_PAIRS, Energy, Pair, energy, near_duplicates, per_parameter

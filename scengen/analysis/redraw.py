@@ -9,7 +9,7 @@ import numpy as np
 from .. import config
 from ..errors import BadConfig, Infeasible, PoolError
 from ..params import Value, values
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate import survey

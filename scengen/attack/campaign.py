@@ -9,17 +9,17 @@ from typing import Any
 
 from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
-from ..log import Log
-from ..names import Name
-from ..parallel import Limits, Workers, each
-from ..pool import Pool, PoolRow, sha256
+from ..pool.names import Name
+from ..pool.pool import Pool, PoolRow, sha256
+from ..pool.schema import why_no_plain_file
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
-from ..schema import why_no_plain_file
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
+from ..work.log import Log
+from ..work.parallel import Limits, Workers, each
 from .evidence import Hit, Rate, rates, unsound
 from .play import Player
 from .priors import Judge, Prior, by_statics, fit, has_statics

@@ -10,18 +10,18 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from ..columns import witness_of
 from ..episode import Actions
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
+from ..pool.columns import witness_of
+from ..pool.schema import memory_bounded, read_json
 from ..samplers.task import Task
-from ..schema import memory_bounded, read_json
 from ..sim.world import World
-from ..targets import refused
 from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
+from ..work.targets import refused
 from .play import SETTLE, Attempt, Node, Played, Player
 from .signature import Pair, pairs
 

@@ -9,14 +9,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .. import collection
 from ..errors import BadConfig, cut
-from ..library import Library
-from ..library import names as names  # for the commands
-from ..names import Misnamed
-from ..pool import Pool, PoolRow
-from ..printed import PlainConsole, printable
-from ..targets import write as write  # for the commands
+from ..pool import collection
+from ..pool.library import Library
+from ..pool.library import names as names  # for the commands
+from ..pool.names import Misnamed
+from ..pool.pool import Pool, PoolRow
+from ..work.printed import PlainConsole, printable
+from ..work.targets import write as write  # for the commands
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 out = PlainConsole(width=None if sys.stdout.isatty() else 160)

@@ -13,7 +13,7 @@ from ..errors import BadConfig, cut
 from ..export.mesh import FORMATS, encode
 from ..params import parameters
 from ..pictures import render
-from ..targets import try_file, try_folder
+from ..work.targets import try_file, try_folder
 from . import FAILED, OK, Arguments, intake, out, remark, say, write
 
 if TYPE_CHECKING:

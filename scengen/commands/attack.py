@@ -13,11 +13,11 @@ from ..attack.priors import Prior
 from ..config import read
 from ..errors import BadConfig
 from ..pictures.report import attack_table
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
-from ..targets import try_file, try_folder
 from ..task_files import search_path
+from ..work.targets import try_file, try_folder
 from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
 
 

@@ -8,7 +8,7 @@ from ..config import read_task
 from ..ood.behaviour import Baseline
 from ..ood.card import Card, Settings, make
 from ..runs.progress import ProgressBar
-from ..targets import try_folder
+from ..work.targets import try_folder
 from . import OK, Arguments, err, out, remark, say
 
 

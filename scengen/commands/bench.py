@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from ..bench import bench, certificates
 from ..config import read
 from ..errors import at_least
-from ..targets import try_file
+from ..evaluate.speed import bench, certificates
+from ..work.targets import try_file
 from . import OK, Arguments, out, write_json
 
 

@@ -10,10 +10,10 @@ from ..analysis.redraw import MOST, Redrawn, redrawn, told
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
 from ..config import read
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
-from ..targets import try_file
 from ..task_files import search_path
+from ..work.targets import try_file
 from . import OK, Arguments, err, one, out, say, write_json
 
 

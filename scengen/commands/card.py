@@ -8,12 +8,12 @@ from ..attack.check import attacked
 from ..config import read
 from ..errors import BadConfig, PoolError, at_least, cut
 from ..export.hub import Part, check_parts, check_target, own_license, publish
-from ..parallel import Workers
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report
+from ..work.parallel import Workers
 from . import OK, Arguments, err, say, several
 from .verify import EXPIRED, verified
 

@@ -13,10 +13,10 @@ from ..analysis.space import Batch, of_features
 from ..analysis.tables import SHOWN, pairs_table
 from ..config import read
 from ..errors import BadConfig, at_least
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..samplers.task import Task
-from ..targets import try_file
 from ..task_files import search_path
+from ..work.targets import try_file
 from . import FAILED, OK, Arguments, names, out, say, several, write_json
 
 

@@ -9,7 +9,7 @@ from ..errors import UnknownName, at_least
 from ..ood.discover import LEAST, METHODS, Finding, Search, Settings, as_yaml, discover
 from ..runs.progress import ProgressBar
 from ..samplers.axis import spell
-from ..targets import try_folder
+from ..work.targets import try_folder
 from . import OK, Arguments, err, out, say, write
 
 

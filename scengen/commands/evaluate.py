@@ -4,7 +4,7 @@ from rich.table import Table
 
 from ..config import read
 from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_json

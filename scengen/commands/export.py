@@ -6,10 +6,10 @@ from pathlib import Path
 
 from ..config import read
 from ..export.mjcf import export
-from ..parallel import SHOWN, each
-from ..pool import Pool, PoolRow
+from ..pool.pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
-from ..targets import try_folder
+from ..work.parallel import SHOWN, each
+from ..work.targets import try_folder
 from . import FAILED, OK, Arguments, chosen, err, holder, one, say, warn
 
 

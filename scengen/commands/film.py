@@ -11,12 +11,12 @@ from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
-from ..targets import try_file
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
+from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, say, write
 
 STRIP = 100_000_000

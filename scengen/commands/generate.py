@@ -9,10 +9,10 @@ from typing import TypeVar
 
 from rich.table import Table
 
-from .. import collection
 from ..config import Combination, combinations, read_task
 from ..errors import BadConfig, ScengenError
 from ..pictures.report import attack_table, funnel_table, summary_lines
+from ..pool import collection
 from ..runs.generate import Settings, Summary, generate
 from ..runs.progress import ProgressBar
 from ..samplers.designs import SOBOL

@@ -8,10 +8,10 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 from .. import config
-from ..conformance import SNAKE_CASE
+from ..conformance.rules import SNAKE_CASE
 from ..errors import BadConfig, cut
-from ..targets import try_folder, write
 from ..task_files import shipped
+from ..work.targets import try_folder, write
 from . import OK, Arguments, say
 
 TASK, PACKAGE = "push_off", "my_tasks"

@@ -7,7 +7,7 @@ from ..config import read
 from ..errors import BadConfig
 from ..evaluate.power import PowerAnalysis, seeds_for
 from ..runs.progress import ProgressBar
-from ..targets import try_file
+from ..work.targets import try_file
 from . import OK, Arguments, err, out, say, write_json
 
 

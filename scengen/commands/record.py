@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..config import read
 from ..export.recording import ROBOMIMIC, Settings, record
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn

@@ -6,9 +6,9 @@ from pathlib import Path
 from ..analysis.overview import gather, page, plain
 from ..config import read
 from ..errors import BadConfig
-from ..pool import Pool
-from ..targets import try_file
+from ..pool.pool import Pool
 from ..task_files import search_path
+from ..work.targets import try_file
 from . import OK, Arguments, remark, say, several, write_json
 
 

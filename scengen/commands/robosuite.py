@@ -7,11 +7,11 @@ from rich.table import Table
 
 from ..config import read
 from ..errors import BadConfig, at_least
-from ..parallel import Limits, Workers
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
-from ..targets import try_file
 from ..task_files import search_path
+from ..work.parallel import Limits, Workers
+from ..work.targets import try_file
 from . import FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
 
 

@@ -8,11 +8,11 @@ from ..config import read
 from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
 from ..pictures.sheet import contact_sheet
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
-from ..targets import try_file
 from ..task_files import search_path
 from ..validate.playable import check_row
+from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
 
 TOLD = 3

@@ -10,14 +10,14 @@ from ..attack.check import attacked
 from ..certificate import Check
 from ..config import read_task
 from ..errors import BadConfig, at_least
-from ..names import Name
 from ..params import Value, values, with_values
+from ..pool.names import Name
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..targets import try_file
 from ..validate.certify import certify
 from ..validate.settings import CertifySettings
+from ..work.targets import try_file
 from . import OK, Arguments, err, out, say, write_json
 
 

@@ -9,10 +9,10 @@ from ..analysis.redraw import batch_of, task_of
 from ..analysis.space import of_tables
 from ..config import read
 from ..errors import BadConfig, PoolError
-from ..pool import MANIFEST, Pool, write
-from ..targets import try_folder
+from ..pool.pool import MANIFEST, Pool, write
 from ..task_files import search_path
 from ..validate import lock
+from ..work.targets import try_folder
 from . import OK, Arguments, one, say
 
 

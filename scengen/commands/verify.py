@@ -16,17 +16,17 @@ from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..config import read
 from ..errors import BadConfig, at_least, cut
-from ..parallel import Limits, WorkerDied, Workers, apart
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
-from ..targets import try_file
 from ..task_files import search_path
 from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
 from ..validate.stored import task_of_manifest as stored_task
 from ..validate.verify import LIMITS, Options, Report, verify
+from ..work.parallel import Limits, WorkerDied, Workers, apart
+from ..work.targets import try_file
 from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
 
 SHOWN = 20

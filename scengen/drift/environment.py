@@ -22,7 +22,7 @@ from typing import Any
 from filelock import FileLock
 
 from ..errors import BadConfig, ScengenError, cut, nearest
-from ..targets import cache_folder, refused
+from ..work.targets import cache_folder, refused
 
 READY = "ready"
 """The file that is written last: without it an environment is unfinished and made again."""

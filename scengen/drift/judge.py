@@ -19,18 +19,18 @@ from ..attack.check import attacked
 from ..certificate import Check
 from ..control import native
 from ..errors import NoOracle, ScengenError
-from ..parallel import Limits, each
-from ..pool import Pool, PoolRow
+from ..fingerprint import fingerprint
+from ..pool.pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate.certify import Trial
 from ..validate.claims import wrong_names
-from ..validate.identity import fingerprint
 from ..validate.rebuilt import difference
 from ..validate.recheck import FIRST, REPLAYED
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
 from ..validate.stored import settings_of, task_of_manifest
+from ..work.parallel import Limits, each
 
 ORACLES = ("shortcuts", "solved", "robust")
 """Checks that ask tempting plans and the oracle, and not the witness."""

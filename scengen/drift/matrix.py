@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..samplers.task import leaves
 
 SAME_BITS, SAME_VERDICT, FLIPPED, UNKNOWN = "same bits", "same verdict", "flipped", "unknown"

@@ -20,7 +20,7 @@ from ..episode import Episode, Outcome
 from ..errors import BadConfig, UnknownName, cut
 from ..params import Value
 from ..pictures.render import Camera
-from ..pool import PoolRow
+from ..pool.pool import PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size, hands

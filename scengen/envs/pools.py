@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..collection import members
 from ..errors import PoolError
-from ..library import Library
-from ..pool import Pool
+from ..pool.collection import members
+from ..pool.library import Library
+from ..pool.pool import Pool
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]

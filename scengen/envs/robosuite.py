@@ -22,8 +22,8 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
-from ..library import Library
-from ..pool import PoolRow
+from ..pool.library import Library
+from ..pool.pool import PoolRow
 from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands

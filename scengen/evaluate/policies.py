@@ -20,8 +20,8 @@ from ..control.teleop import Filter, unfiltered
 from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
 from ..errors import BadConfig, ForeignCode, GaveUp, ScengenError, UnknownName, cut
-from ..library import Library
 from ..params import Value
+from ..pool.library import Library
 from ..samplers.task import Task
 from ..sim.world import IDLE, hands
 

@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from .. import collection
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..errors import BadConfig, PoolError, ScengenError, at_least
-from ..library import Library
-from ..log import Log
-from ..parallel import Workers, each
-from ..pool import Pool
+from ..pool import collection
+from ..pool.library import Library
+from ..pool.pool import Pool
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
-from ..targets import refused, try_folder
 from ..validate.playable import unplayable
+from ..work.log import Log
+from ..work.parallel import Workers, each
+from ..work.targets import refused, try_folder
 from .policies import AT_FULL_RATE, REPLAY, Policy, blamed, find, identity, made
 
 

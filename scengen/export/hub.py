@@ -20,10 +20,10 @@ from jinja2 import Template
 from ..attack.evidence import Rate, rates, spelled
 from ..certificate import CHECKS, Check, StoredCertificate
 from ..errors import BadConfig
-from ..pool import MANIFEST, Pool
-from ..printed import printable
+from ..pool.pool import MANIFEST, Pool
 from ..samplers.split import ID
-from ..targets import refused, try_folder
+from ..work.printed import printable
+from ..work.targets import refused, try_folder
 
 CARD = "README.md"
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))

@@ -10,7 +10,7 @@ from ..control.loop import ACTION
 from ..envs.observations import Stream
 from ..episode import Actions, Episode
 from ..pictures.render import Picture
-from ..pool import PoolRow
+from ..pool.pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 

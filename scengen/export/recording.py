@@ -18,22 +18,23 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from .. import collection, config
+from .. import config
 from ..control.loop import Loop
 from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
 from ..errors import BadConfig, PoolError, UnknownName, at_least
 from ..orientation import Orientation
-from ..parallel import Workers
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
-from ..pool import Pool, PoolRow
+from ..pool import collection
+from ..pool.pool import Pool, PoolRow
 from ..sim.world import World, hands
-from ..targets import refused, try_file, try_folder
 from ..validate.identity import check_versions
 from ..validate.playable import unplayable
 from ..versions import versions
+from ..work.parallel import Workers
+from ..work.targets import refused, try_file, try_folder
 from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DataSet, Feature

@@ -11,11 +11,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ..assets.mesh_prop import MeshProp
 from ..assets.prop import TABLE_TOP, Prop, place, table
 from ..assets.turned import FOOT
 from ..errors import BadConfig, UnknownName, cut
 from ..geometry import Mat3
-from ..mesh_prop import MeshProp
 from ..sim.scene_text import emit
 from .feet import feet
 from .pieces import Pieces, Surface, cut_up, one_hull

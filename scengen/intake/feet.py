@@ -5,9 +5,9 @@ import math
 import numpy as np
 from manifold3d import Manifold
 
+from ..assets.mesh_prop import Points
 from ..assets.turned import FEET, FOOT, PROUD
 from ..geometry import Vec3
-from ..mesh_prop import Points
 
 LEVEL = 0.0003
 """How far above the plane that it stands on a corner may be to have a foot [m]."""

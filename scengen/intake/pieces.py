@@ -10,7 +10,7 @@ from manifold3d import Manifold, OpType
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..mesh_prop import Points
+from ..assets.mesh_prop import Points
 from .solid import Solid, as_mesh, sampled
 
 DETAIL = 0.1

@@ -6,9 +6,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from ..assets.mesh_prop import MeshProp
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, heading
-from ..mesh_prop import MeshProp
 from ..pictures.render import VIEWS, Picture, camera
 from ..sim.scene_text import emit
 from ..sim.world import JAW

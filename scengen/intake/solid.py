@@ -10,9 +10,9 @@ import trimesh
 from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 
+from ..assets.mesh_prop import Points
 from ..errors import BadConfig, UnknownName, cut, nearest
-from ..mesh_prop import Points
-from ..targets import remedy
+from ..work.targets import remedy
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in a unit."""

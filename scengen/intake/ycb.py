@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from ..assets.mesh_prop import Points
 from ..assets.prop import Prop
 from ..assets.ycb import Ycb, by_name, mesh_of
 from ..errors import BadConfig
 from ..geometry import UP, Mat3, about_z, shortest
-from ..mesh_prop import Points
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
-from ..targets import cache_folder, try_folder, write
+from ..work.targets import cache_folder, try_folder, write
 from .asset import Request, Taken, key, take_in
 from .feet import side_below
 from .solid import content

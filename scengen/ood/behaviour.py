@@ -21,8 +21,6 @@ from typing import Any
 
 from ..episode import Actions
 from ..errors import Infeasible
-from ..log import Log
-from ..parallel import Limits, Workers, each
 from ..params import with_values
 from ..samplers.dists import Fixed
 from ..samplers.keyed import unit
@@ -33,6 +31,8 @@ from ..statistics import Difference, Rate, paired, rate
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
+from ..work.log import Log
+from ..work.parallel import Limits, Workers, each
 from .memory import Memory, remember
 
 BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")

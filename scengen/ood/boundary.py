@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadConfig, OutOfBounds
-from ..log import Log
 from ..params import Value, with_values
 from ..samplers.axis import Axis
 from ..samplers.dists import Choice, Fixed
@@ -26,6 +25,7 @@ from ..samplers.split import ID
 from ..samplers.support import distance
 from ..samplers.task import Task
 from ..validate.identity import source_sha256
+from ..work.log import Log
 from . import threshold
 from .behaviour import try_both, twin_actions
 from .threshold import Bools, Floats, Ints

@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 from ..analysis import distance
 from ..analysis.space import Space, of_features, of_parameters
 from ..errors import BadConfig, Infeasible, UnknownName, at_least
-from ..parallel import Workers
 from ..pictures import film, render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
-from ..pool import Pool, PoolRow
+from ..pool.pool import Pool, PoolRow
 from ..runs import generate
 from ..samplers.axis import Proof, spell
 from ..samplers.split import ID
@@ -25,9 +24,10 @@ from ..samplers.support import Support
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..statistics import Rate
-from ..targets import write
 from ..validate.rebuilt import rebuild
 from ..validate.settings import CertifySettings
+from ..work.parallel import Workers
+from ..work.targets import write
 from . import behaviour, boundary, features
 
 NOT_SEARCHED = "boundaries were not searched for (rounds=0)"

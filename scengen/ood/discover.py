@@ -27,8 +27,6 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import Halton
 
 from ..errors import BadConfig, ScengenError
-from ..log import Log
-from ..parallel import Limits, Workers, each
 from ..params import with_values
 from ..samplers.axis import Axis, Proof
 from ..samplers.dists import Dist, Fixed, Integer, Mixture, Uniform
@@ -38,6 +36,8 @@ from ..scenario import Scenario
 from ..validate.certify import certify
 from ..validate.identity import source_sha256
 from ..validate.settings import CertifySettings
+from ..work.log import Log
+from ..work.parallel import Limits, Workers, each
 from . import behaviour
 from .regions import Region, located, regions, spelled
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from ..attack.campaign import Report as AttackReport
 from ..attack.evidence import Rate, spelled
 from ..certificate import STAGES
-from ..pool import Pool, PoolRow
+from ..pool.pool import Pool, PoolRow
 from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed

@@ -9,13 +9,13 @@ from markupsafe import Markup
 
 from ..certificate import STAGES
 from ..errors import ScengenError
-from ..pool import Pool, PoolRow
+from ..pool.pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..targets import write
 from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
+from ..work.targets import write
 from . import film, render
 from .report import LARGEST_PAGE, template, thumbnail
 

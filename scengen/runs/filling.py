@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import pool, schema, shards
+from ..pool import pool, schema, shards
 from .journal import Journal, Record
 
 

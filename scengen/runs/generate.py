@@ -10,21 +10,22 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from .. import pool, shards
 from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
-from ..parallel import Limits, Workers, each
+from ..fingerprint import fingerprint
 from ..params import values
+from ..pool import pool, shards
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
-from ..targets import refused
 from ..validate import lock
 from ..validate.certify import Certified, certify
-from ..validate.identity import fingerprint, source_sha256
+from ..validate.identity import source_sha256
 from ..validate.settings import CertifySettings
 from ..versions import versions
+from ..work.parallel import Limits, Workers, each
+from ..work.targets import refused
 from .filling import Filling, placed
 from .journal import Journal, Record
 

@@ -14,10 +14,10 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..errors import PoolError
-from ..log import different
-from ..pool import MANIFEST, PoolRow
+from ..pool.pool import MANIFEST, PoolRow
 from ..sim.world import action_size
-from ..targets import refused, try_folder
+from ..work.log import different
+from ..work.targets import refused, try_folder
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,8 @@ from types import TracebackType
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..parallel import Executor, Workers
-from ..printed import PlainConsole, printable
+from ..work.parallel import Executor, Workers
+from ..work.printed import PlainConsole, printable
 
 EVERY = 15.0
 """Seconds between two lines where there is no terminal."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ..assets.mesh_prop import MeshProp
 from ..assets.ycb import Scan, Ycb, by_name
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
-from ..mesh_prop import MeshProp
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
 from ..sim.world import EMBODIMENTS

@@ -12,7 +12,7 @@ from ..control.loop import Loop
 from ..control.teleop import ALPHA, LARGEST_CHANGE, MOTION
 from ..errors import Infeasible, ScengenError
 from ..params import canonical
-from ..pool import Pool, PoolRow, sha256
+from ..pool.pool import Pool, PoolRow, sha256
 from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..errors import ScengenError
-from ..pool import PoolRow
+from ..fingerprint import fingerprint
+from ..pool.pool import PoolRow
 from . import claims as claim
 from . import survey
 from .certify import Adversary
 from .claims import Claims
-from .identity import fingerprint
 from .rebuilt import difference, rebuild
 from .recheck import fails_again, simulate, why_not_certified
 

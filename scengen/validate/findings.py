@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import PoolError, cut
+from ..fingerprint import fingerprint
 from ..versions import versions
 from . import lock
 from .claims import Claims
 from .examine import Examination, Verdict
-from .identity import fingerprint, source_sha256
+from .identity import source_sha256
 from .settings import CertifySettings
 
 

@@ -1,4 +1,4 @@
-"""What a certificate was made with: versions, the code that it depends on, and how this machine rounds."""
+"""The code and the versions that a certificate depends on."""
 
 import ast
 import hashlib
@@ -12,14 +12,8 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
-from ..assets.box import Domino
-from ..assets.prop import TABLE_TOP, place, table
 from ..errors import PoolError
 from ..scenario import Scenario
-from ..sim import scene_text
-from ..sim.world import World
 from ..versions import versions
 
 
@@ -35,21 +29,6 @@ def check_versions(made: Mapping[str, str], where: str) -> None:
                 f"{where} was certified with {package} {made[package]}, this is {versions()[package]}; install that "
                 "version, or run scengen verify and certify the pool again"
             )
-
-
-@cache
-def fingerprint() -> str:
-    """How this machine rounds: a hash of the end of a fixed short rollout of the arm and a falling tile.
-
-    Machines with equal fingerprints replay bit by bit; on others (another libm, another instruction set) the same
-    actions ends in nearly the same state.
-    """
-    scene = table()
-    place(scene, Domino(), "tile", [0.1, 0.0, TABLE_TOP + 0.01], yaw=0.3)
-    world = World.load(scene_text.emit(scene)[0])
-    for k in range(30):
-        world.step(np.array([np.sin(0.3 * k), np.cos(0.2 * k), -0.5, 0.1, -0.2, 0.3, 1.0]))
-    return world.digest
 
 
 JUDGES = ("scengen.episode", "scengen.validate.rollout", "scengen.validate.certify")

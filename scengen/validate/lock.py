@@ -12,10 +12,10 @@ from typing import Any
 
 from llvmlite import binding
 
-from .. import schema
 from ..errors import PoolError
+from ..pool import schema
 from ..scenario import Scenario
-from ..targets import write
+from ..work.targets import write
 from .identity import packages
 
 FILE = "scengen.lock"

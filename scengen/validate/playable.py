@@ -5,9 +5,9 @@ from contextlib import suppress
 
 from ..episode import Actions
 from ..errors import Unstable
-from ..parallel import SHOWN, Workers, apart, each
-from ..pool import NO_WITNESS, PoolRow
+from ..pool.pool import NO_WITNESS, PoolRow
 from ..sim.world import World
+from ..work.parallel import SHOWN, Workers, apart, each
 
 Played = tuple[str, str, Actions]
 """A scene, its robot, and what is done in it."""

@@ -7,11 +7,11 @@ import numpy as np
 
 from ..certificate import Check, as_json
 from ..errors import NoOracle
-from ..pool import PoolRow, uncounted
+from ..fingerprint import fingerprint
+from ..pool.pool import PoolRow, uncounted
 from ..scenario import Scenario
 from .certify import Adversary, Trial, certify
 from .claims import Claims, alike
-from .identity import fingerprint
 from .rollout import Rollout, replay
 from .settings import CertifySettings
 

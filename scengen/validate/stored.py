@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from ..errors import PoolError, ScengenError
-from ..pool import Pool
+from ..pool.pool import Pool
 from ..samplers.task import Task, load
 from .settings import CertifySettings
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ..certificate import CHECKS, STAGES
 from ..errors import Infeasible
-from ..pool import PROCESS, Pool, PoolRow, uncounted
+from ..pool.pool import PROCESS, Pool, PoolRow, uncounted
 from .claims import Claims
 
 CHUNK = 50

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import PoolError, ScengenError, cut
-from ..parallel import Limits, Workers, each
-from ..pool import Pool, PoolRow
+from ..fingerprint import fingerprint
+from ..pool.pool import Pool, PoolRow
 from ..samplers.task import Task
+from ..work.parallel import Limits, Workers, each
 from . import survey
 from .certify import Adversary
 from .claims import Claims
 from .examine import MANIFEST, Answer, Examination, Examiner, Failed, Job, Left, lost
 from .findings import Findings, Report
-from .identity import fingerprint
 from .settings import CertifySettings
 from .spot import excluded_share
 from .stored import settings_of, task_of_manifest

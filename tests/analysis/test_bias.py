@@ -14,7 +14,7 @@ from scengen.analysis.bias import acceptance_map, bias
 from scengen.analysis.redraw import redrawn
 from scengen.errors import BadConfig, PoolError
 from scengen.params import values
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.samplers.split import ID
 
 TASK = config.task("domino_single")

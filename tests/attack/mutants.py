@@ -18,7 +18,7 @@ from unittest import mock
 from scengen import config
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
-from scengen.names import Name
+from scengen.pool.names import Name
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.sim import scene_text

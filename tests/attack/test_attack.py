@@ -17,7 +17,7 @@ from scengen.attack.priors import fit
 from scengen.attack.search import RANDOM, RETRY, Attack
 from scengen.attack.solids import handles, sides
 from scengen.attack.variations import perturbed, rest
-from scengen.cli import run
+from scengen.cli.program import run
 from scengen.control.teleop import Filter
 from scengen.predicates import touched_only
 from scengen.scenario import Answer

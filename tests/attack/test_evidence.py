@@ -14,7 +14,7 @@ from scengen.attack.campaign import drawn
 from scengen.attack.check import attacked
 from scengen.attack.evidence import Hit
 from scengen.errors import BadConfig
-from scengen.pool import Pool, sha256
+from scengen.pool.pool import Pool, sha256
 from scengen.predicates import touched_only
 from scengen.validate.certify import certify
 from scengen.validate.settings import QUICK, Robust

@@ -115,8 +115,8 @@ def _command(*command: str) -> Checker:
     def run(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
         from scengen import cli
         from scengen.commands import export
-        from scengen.parallel import Limits
         from scengen.validate import playable
+        from scengen.work.parallel import Limits
 
         playable.SHOWN = export.SHOWN = Limits(SECONDS, MEGABYTES)
         return cli.run([command[0], f"pool={folder}", *command[1:]])

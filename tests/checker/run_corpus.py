@@ -108,7 +108,8 @@ def warm() -> None:
     """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
     from scengen import cli, config  # noqa: F401
     from scengen.commands import verify  # noqa: F401
-    from scengen.validate.identity import fingerprint, source_sha256
+    from scengen.fingerprint import fingerprint
+    from scengen.validate.identity import source_sha256
 
     fingerprint()
     for name in config.tasks():

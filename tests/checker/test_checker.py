@@ -13,7 +13,7 @@ from make_base import BASE, KEPT, POOLS, expired
 from make_corpus import cases, write
 
 from scengen import config
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.validate.claims import alike
 from scengen.validate.spot import excluded_share
 

@@ -22,7 +22,7 @@ from scengen.export import recording
 from scengen.export.mjcf import export, without_slashes
 from scengen.ood import card, discover
 from scengen.pictures import film, render
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.runs import generate
 from scengen.sim import scene_text
 from scengen.sim.world import World

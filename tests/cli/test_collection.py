@@ -7,10 +7,11 @@ import pytest
 from helpers import REFERENCE
 from pools import make
 
-from scengen import cli, collection, config, task_files
+from scengen import cli, config, task_files
 from scengen.envs.pools import rows_of
 from scengen.errors import PoolError
-from scengen.pool import Pool
+from scengen.pool import collection
+from scengen.pool.pool import Pool
 
 
 @pytest.fixture(scope="module")

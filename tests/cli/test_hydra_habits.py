@@ -11,11 +11,11 @@ from helpers import REFERENCE
 from pools import QUICKLY
 
 from scengen import cli, config, task_files
+from scengen.cli.completion import BASH, completions
+from scengen.cli.usage import usage
 from scengen.commands import generate
-from scengen.completion import BASH, completions
 from scengen.errors import BadConfig
-from scengen.pool import Pool
-from scengen.usage import usage
+from scengen.pool.pool import Pool
 
 DOMINO = "task=domino_single"
 

@@ -48,7 +48,7 @@ def test_the_list_of_tasks_imports_no_family(given, families):
 def test_the_first_compilation_is_told_of_once(tmp_path):
     """Twice with a cache of compiled code that is empty at first: what is compiled is told, what is read is not."""
     simulate = "from scengen import cli; cli.run(['--complete', 'x']); cli.run(['--complete', 'x']); "
-    simulate += "from scengen.validate.identity import fingerprint; print(fingerprint())"
+    simulate += "from scengen.fingerprint import fingerprint; print(fingerprint())"
     first, second = (
         subprocess.run(
             [sys.executable, "-c", simulate],

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pools import make
 
-from scengen import cli, config, pool
+from scengen import cli, config
 from scengen.certificate import CHECKS
 from scengen.commands import drift
 from scengen.drift import environment as environments
@@ -19,10 +19,11 @@ from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge
 from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.errors import BadConfig, ScengenError
-from scengen.parallel import Limits
-from scengen.validate.identity import fingerprint
+from scengen.fingerprint import fingerprint
+from scengen.pool import pool
 from scengen.validate.recheck import FIRST, REPLAYED
 from scengen.validate.stored import settings_of
+from scengen.work.parallel import Limits
 
 ROOT = Path(__file__).parents[2]
 HERE = mujoco.__version__

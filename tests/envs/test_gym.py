@@ -16,7 +16,7 @@ from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.sim.world import IDLE
 
 EVERYTHING = (*observations.streams_of("panda_jaw"),)

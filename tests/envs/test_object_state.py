@@ -12,7 +12,7 @@ from helpers import REFERENCE
 from scengen import config
 from scengen.envs.object_state import ObjectState, bodies_of
 from scengen.params import values, with_values
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.samplers.split import ID
 from scengen.sim.world import World, hands
 from scengen.validate.rebuilt import rebuild, world_of

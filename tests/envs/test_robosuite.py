@@ -14,7 +14,7 @@ from pools import certificate_of
 from scengen import config
 from scengen.assets.prop import servo
 from scengen.certificate import Certificate
-from scengen.cli import run as scengen
+from scengen.cli.program import run as scengen
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import agreement
 from scengen.envs.agreement import Comparison, compare, compare_all
@@ -23,7 +23,7 @@ from scengen.envs.robosuite import RobosuiteEnv, env_class
 from scengen.envs.robosuite_models import SceneModel
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.pool import NO_WITNESS, Pool
+from scengen.pool.pool import NO_WITNESS, Pool
 from scengen.robots import panda
 from scengen.runs.generate import row_of
 from scengen.sim import scene_text

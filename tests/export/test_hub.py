@@ -14,7 +14,7 @@ from pools import certificate_of, rewritten
 from scengen import cli
 from scengen.certificate import CHECKS
 from scengen.export import hub
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 POOLS = (BASE / "single_severity", BASE / "mirror_id")

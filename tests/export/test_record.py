@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import cli, pool
+from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import streams_of
 from scengen.export import recording
@@ -23,7 +23,8 @@ from scengen.export.cameras import calibration
 from scengen.export.lerobot import DataSet, Feature
 from scengen.export.recording import Settings, record
 from scengen.export.stats import QUANTILES, Shades
-from scengen.pool import Pool
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.sim.world import IDLE, SUCTION, World
 
 PAPER = {

@@ -12,7 +12,7 @@ from robosuite.environments.base import REGISTERED_ENVS
 from scengen import cli
 from scengen.errors import BadConfig
 from scengen.export.recording import Settings, record
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.sim.world import World
 
 PROPRIOCEPTION = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")

@@ -21,6 +21,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
 
 from fuzz.grammar import Grammar  # noqa: E402
 from scengen import cli  # noqa: E402
+from scengen.cli.program import LONGEST  # noqa: E402
 
 REFERENCE = ROOT / "generated" / "reference"
 LIMIT = 60
@@ -58,7 +59,7 @@ def judge(line: list[str], place: Path) -> str:
         return f"unforeseen: {told[:500]}"
     if status == 2 and not REMEDY.search(told):
         return f"no remedy: {told[:300]}"
-    if any(len(x) > cli.LONGEST + 100 for x in errors):
+    if any(len(x) > LONGEST + 100 for x in errors):
         return f"a line of {max(map(len, errors))} letters"
     if re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", told + out.getvalue()):
         return f"control characters: {told[:300]!r}"

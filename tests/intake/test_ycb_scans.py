@@ -8,10 +8,10 @@ import pytest
 import trimesh
 
 from scengen import cli, config
+from scengen.assets.mesh_prop import MeshProp
 from scengen.assets.ycb import ITEMS, Ycb
 from scengen.errors import BadConfig
 from scengen.intake.ycb import with_scans
-from scengen.mesh_prop import MeshProp
 from scengen.params import values
 from scengen.samplers.task import load
 

@@ -14,7 +14,7 @@ from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
 from scengen.pictures import film, render
 from scengen.pictures.view import view
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.scenario import Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World

@@ -20,11 +20,11 @@ from pools import QUICKLY, make
 
 from scengen import cli
 from scengen.errors import ScengenError
-from scengen.log import Log
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.runs import generate
 from scengen.runs.journal import Journal, Record
-from scengen.targets import try_folder
+from scengen.work.log import Log
+from scengen.work.targets import try_folder
 
 RECORD = Record(0, "refuted", "rest", "it falls", 1, {}, None, 0.1)
 

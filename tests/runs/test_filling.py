@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from helpers import REFERENCE
 
-from scengen import pool
-from scengen.pool import Pool
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.runs.filling import Filling, placed
 from scengen.runs.journal import Journal, Record
 

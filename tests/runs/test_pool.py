@@ -17,11 +17,12 @@ import pyarrow.parquet as pq
 import pytest
 from pools import QUICKLY, certificate_of, make, rewritten
 
-from scengen import config, pool
+from scengen import config
 from scengen.certificate import StoredCertificate
 from scengen.errors import PoolError, UnknownName
-from scengen.pool import FORMAT, Pool, PoolRow
-from scengen.shards import SCHEMAS
+from scengen.pool import pool
+from scengen.pool.pool import FORMAT, Pool, PoolRow
+from scengen.pool.shards import SCHEMAS
 from scengen.validate.settings import CertifySettings
 from scengen.validate.verify import Options, verify
 

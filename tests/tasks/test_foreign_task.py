@@ -7,7 +7,8 @@ import pytest
 from foreign.push_block import PushBlock
 
 from scengen import cli, config, conformance, task_files
-from scengen.conformance import Nonconformity
+from scengen.conformance import rules
+from scengen.conformance.rules import Nonconformity
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, UnknownName
 from scengen.samplers.dists import Fixed
@@ -44,33 +45,33 @@ def test_what_does_not_vary_is_caught():
     still = replace(
         task, training={name: Fixed(0.12 if name == "distance" else p.nominal) for name, p in task.known.items()}
     )
-    assert "nothing varies" in broken(conformance._draws_are_keyed, still)
+    assert "nothing varies" in broken(rules._draws_are_keyed, still)
 
 
 def test_an_axis_whose_value_twins_share_is_caught():
     task = config.task("push_block", SEARCH)
     same = replace(task.axes["far"], replace={"distance": Fixed(0.12)})
     here = replace(task, training={**task.training, "distance": Fixed(0.12)}, axes={"far": same})
-    told = broken(conformance._twins_differ_in_the_axis_alone, here, "far")
+    told = broken(rules._twins_differ_in_the_axis_alone, here, "far")
     assert "the axis names distance, and twins are equal there" in told
 
 
 def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {"the_oracle_itself": Shortcut(self.oracle)})
-    told = broken(conformance._scenarios_are_certified, config.task("push_block", SEARCH))
+    told = broken(rules._scenarios_are_certified, config.task("push_block", SEARCH))
     assert "is refuted" in told and "the_oracle_itself" in told
 
 
 def test_a_feature_with_the_name_of_a_parameter_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "features", lambda self: {"distance": self.distance})
-    told = broken(conformance._scenes_have_controls, config.task("push_block", SEARCH))
+    told = broken(rules._scenes_have_controls, config.task("push_block", SEARCH))
     assert "distance name both parameters and features" in told
 
 
 def test_an_instruction_that_names_its_axis_is_caught():
     task = replace(config.task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
-        conformance._told_well(task)
+        rules._told_well(task)
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ from controls import load
 from foreign.push_block import PushBlock
 from foreign.push_pair import PushPair
 
-from scengen import config, frames
+from scengen import config
+from scengen.conformance import frames
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.rollout import run
 

@@ -16,7 +16,7 @@ from controls import (
 )
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import config, pool
+from scengen import config
 from scengen.assets.bar import Bar
 from scengen.certificate import Certificate
 from scengen.envs.gym import PoolEnv
@@ -26,7 +26,8 @@ from scengen.export import recording
 from scengen.export.lerobot import DataSet
 from scengen.export.recording import record
 from scengen.orientation import FACED
-from scengen.pool import Pool
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.runs.generate import row_of
 from scengen.sim.world import IDLE
 from scengen.tasks.mirror_pick_place import ASIDE, LIFTED, VIEWS, MirrorPickPlace

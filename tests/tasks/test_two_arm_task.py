@@ -27,8 +27,8 @@ from scengen.errors import BadConfig, PoolError
 from scengen.evaluate import policies
 from scengen.evaluate.rollouts import BadPolicy, PolicyPlayer, RolloutId
 from scengen.evaluate.rollouts import Settings as Evaluation
-from scengen.pool import Pool
-from scengen.schema import Malformed
+from scengen.pool.pool import Pool
+from scengen.pool.schema import Malformed
 from scengen.sim.world import World
 from scengen.validate.rollout import Jitter, replay
 

@@ -10,7 +10,7 @@ from pools import QUICKLY, make
 
 from scengen import cli, config
 from scengen.errors import PoolError
-from scengen.pool import Pool
+from scengen.pool.pool import Pool
 from scengen.validate import identity, lock
 from scengen.versions import versions
 

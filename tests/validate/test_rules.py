@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import pytest
 
 from scengen import config, conformance
-from scengen.conformance import Nonconformity
+from scengen.conformance import rules
+from scengen.conformance.rules import Nonconformity
 from scengen.scenario import Shortcut
 from scengen.tasks.domino_single import DominoSingle
 
@@ -73,7 +74,7 @@ class SpelledAblation(DominoSingle):
 )
 def test_what_shows_nothing_or_is_spelled_badly_is_caught(family, says):
     with pytest.raises(Nonconformity, match=says):
-        conformance._scenes_have_controls(replace(TASK, family=family), "id", 1, 0)
+        rules._scenes_have_controls(replace(TASK, family=family), "id", 1, 0)
 
 
 def test_all_rules_are_asked_of_every_split_but_certificates_only_where_wanted():

@@ -17,16 +17,17 @@ import pytest
 from helpers import REFERENCE
 from pools import certificate_of
 
-from scengen import cli, config, pool
+from scengen import cli, config
 from scengen.certificate import as_json
 from scengen.errors import PoolError
-from scengen.parallel import Limits
-from scengen.pool import Pool
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.validate.claims import Claims
 from scengen.validate.junit import junit
 from scengen.validate.spot import excluded_share
 from scengen.validate.stored import settings_of, task_of_manifest
 from scengen.validate.verify import Examiner, Options, verify
+from scengen.work.parallel import Limits
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 SOURCES = {"single": REFERENCE, "cage": BASE / "cage_id", "tool": BASE / "tool_id"}

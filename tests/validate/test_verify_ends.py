@@ -8,13 +8,14 @@ import pytest
 from helpers import REFERENCE
 from pools import certificate_of
 
-from scengen import config, pool
+from scengen import config
 from scengen.errors import ScengenError
-from scengen.parallel import Limits, WorkerDied
-from scengen.pool import Pool
+from scengen.pool import pool
+from scengen.pool.pool import Pool
 from scengen.validate import survey, verify
 from scengen.validate.playable import check_row, check_scene
 from scengen.validate.survey import Reject
+from scengen.work.parallel import Limits, WorkerDied
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from .errors import BadConfig, ForeignCode, ScengenError, cut, nearest
+from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest
 
 OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
@@ -123,7 +123,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     except MemoryError as error:
         return _told("the memory is used up; ask for less at once, or use fewer workers", _kept(error))
     except OSError as error:
-        from .targets import remedy
+        from ..work.targets import remedy
 
         if told := remedy(error):
             return _told(f"{cut(str(error.filename or 'a file'))}: {told}")
@@ -139,14 +139,14 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         return OK
     verb, *arguments = argv
     if verb == "--version":
-        from .versions import versions
+        from ..versions import versions
 
         print(" ".join(f"{k} {v}" for k, v in versions().items()))
         return OK
     if verb not in (*VERBS, *COMPLETING):
         raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
 
-    from .task_files import ORIGINS
+    from ..task_files import ORIGINS
     from .usage import usage
 
     if {"-h", "--help"} & set(arguments) and verb in VERBS:
@@ -154,9 +154,9 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         return OK
 
     # What follows takes seconds to import on a busy machine; nothing above needs it.
-    from .commands import out
+    from ..commands import out
+    from ..control import compilation, native
     from .completion import BASH, completions
-    from .control import compilation, native
 
     compilation.announce()
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
@@ -176,7 +176,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is no option; {known}; see scengen {verb} --help")
-    command = import_module(f".commands.{verb}", __package__).command
+    command = import_module(f"scengen.commands.{verb}").command
     if signals:
         signals.working = True
     return command(arguments)
@@ -194,8 +194,8 @@ SHOWING = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--info"}
 
 def _show(verb: str, arguments: Sequence[str]) -> int:
     """Show what a command would work with, or where it comes from: `--cfg job`, `--info defaults`."""
-    from . import config
-    from .commands import out
+    from .. import config
+    from ..commands import out
 
     words = list(arguments)
     place = next(i for i, word in enumerate(words) if word.startswith("-"))
@@ -215,7 +215,7 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
 
 def _line(text: str) -> None:
     """One line on standard error, whatever stands in the text."""
-    from .printed import printable
+    from ..work.printed import printable
 
     words = re.sub(r"\S{1000,}", lambda found: cut(found[0]), printable(text))
     if len(words) > LONGEST:  # what would be right stands at the end
@@ -247,7 +247,7 @@ def _kept(error: BaseException) -> str:
 
 
 def _help() -> str:
-    folder = Path(__file__).with_name("commands")
+    folder = Path(__file__).parents[1] / "commands"
     told = {verb: ast.get_docstring(ast.parse((folder / f"{verb}.py").read_text())) for verb in VERBS}
     return "\n".join(
         [

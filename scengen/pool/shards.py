@@ -14,9 +14,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from ..control.loop import ACTION
+from ..errors import PoolError
 from . import columns, schema
-from .control.loop import ACTION
-from .errors import PoolError
 
 FORMAT = 3
 GROUP_ROWS = 100

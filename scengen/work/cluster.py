@@ -25,12 +25,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TextIO, TypeVar
 
-from .errors import BadConfig, ScengenError, cut
+from ..errors import BadConfig, ScengenError, cut
+from ..fingerprint import fingerprint
+from ..task_files import conf_dir
+from ..versions import versions
 from .parallel import Limits, each, made_of_lost, portable
 from .printed import printable
-from .task_files import conf_dir
-from .validate.identity import fingerprint
-from .versions import versions
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -190,7 +190,7 @@ def code_sha256() -> str:
     That of one family is in every certificate; what else a node may run, such as an adversary, is in none.
     """
     parts = []
-    for root, pattern in ((Path(__file__).parent, "*.py"), (conf_dir(), "*.yaml")):
+    for root, pattern in ((Path(__file__).parents[1], "*.py"), (conf_dir(), "*.yaml")):
         names = {path.relative_to(root): path for path in root.rglob(pattern)}
         shipped = (name for name in names if name.parts[0] not in ("conf", "example"))  # beside it in a checkout
         parts += [f"{name} {hashlib.sha256(names[name].read_bytes()).hexdigest()}" for name in sorted(shipped)]

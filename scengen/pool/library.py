@@ -7,8 +7,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import UnknownName
 from .directory import Directory, joined
-from .errors import UnknownName
 from .names import Name
 from .pool import Pool, PoolRow
 

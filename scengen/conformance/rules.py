@@ -17,18 +17,19 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
-from . import config, frames
-from .errors import ScengenError
-from .ood import behaviour, card, features
-from .params import canonical, values, with_values
-from .samplers.split import ID
-from .samplers.task import Task
-from .scenario import Scenario
-from .sim import scene_text
-from .validate.certify import NOT_TRIED, certify
-from .validate.rebuilt import rebuild, world_of
-from .validate.rollout import run
-from .validate.settings import QUICK
+from .. import config
+from ..errors import ScengenError
+from ..ood import behaviour, card, features
+from ..params import canonical, values, with_values
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..scenario import Scenario
+from ..sim import scene_text
+from ..validate.certify import NOT_TRIED, certify
+from ..validate.rebuilt import rebuild, world_of
+from ..validate.rollout import run
+from ..validate.settings import QUICK
+from . import frames
 
 TRIED = 2
 """How many shortcuts of every scenario must be carried out to their end: one that gives up shows nothing."""

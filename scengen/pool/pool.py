@@ -19,12 +19,12 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from ..certificate import StoredCertificate, as_json, from_json
+from ..errors import PoolError, UnknownName
+from ..params import Value
 from . import schema, shards
-from .certificate import StoredCertificate, as_json, from_json
 from .directory import Directory, joined
-from .errors import PoolError, UnknownName
 from .names import Name
-from .params import Value
 from .shards import FORMAT
 
 MANIFEST = "manifest.json"

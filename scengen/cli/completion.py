@@ -8,9 +8,9 @@ from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.plugins.completion_plugin import DefaultCompletionPlugin
 
-from . import config, task_files
-from .errors import ScengenError
-from .pool import Pool
+from .. import config, task_files
+from ..errors import ScengenError
+from ..pool.pool import Pool
 
 BASH = r"""
 _scengen() {

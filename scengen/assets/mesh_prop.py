@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .assets.prop import Prop, Rgba, shown, solid
-from .assets.turned import FOOT
-from .geometry import Mat3, Vec3
+from ..geometry import Mat3, Vec3
+from .prop import Prop, Rgba, shown, solid
+from .turned import FOOT
 
 Points = NDArray[np.float64]
 """Shape (n, 3) [m]."""

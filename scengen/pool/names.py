@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from .errors import BadConfig, ScengenError, UnknownName, cut, nearest
+from ..errors import BadConfig, ScengenError, UnknownName, cut, nearest
 
 SHOWN = 20
 """How many names an error lists."""

@@ -13,13 +13,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .episode import Actions, Episode
-from .geometry import Mat3, Vec3, about_z, quat, yaw_of
-from .params import Parameter, parameters, with_values
-from .samplers.keyed import unit
-from .scenario import Scenario
-from .sim.world import World
-from .validate.rebuilt import world_of
+from ..episode import Actions, Episode
+from ..geometry import Mat3, Vec3, about_z, quat, yaw_of
+from ..params import Parameter, parameters, with_values
+from ..samplers.keyed import unit
+from ..scenario import Scenario
+from ..sim.world import World
+from ..validate.rebuilt import world_of
 
 EXACT = 1e-9
 """How far a geom may be from where a rigid motion takes it [m, and entries of matrices]: rounding."""

@@ -13,23 +13,23 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
 
-from . import config
-from .certificate import CHECKS
-from .control import native
-from .control.loop import ACTION, Loop
-from .envs.gym import PoolEnv
-from .episode import Actions
-from .pictures.render import NoPictures
-from .pool import Pool, PoolRow
-from .robots import panda
-from .runs.generate import Settings, generate
-from .samplers.split import ID
-from .samplers.task import Task
-from .sim.world import JAW, World
-from .validate.certify import Trial
-from .validate.rebuilt import rebuild, world_of
-from .validate.rollout import Rollout, run
-from .validate.settings import QUICK
+from .. import config
+from ..certificate import CHECKS
+from ..control import native
+from ..control.loop import ACTION, Loop
+from ..envs.gym import PoolEnv
+from ..episode import Actions
+from ..pictures.render import NoPictures
+from ..pool.pool import Pool, PoolRow
+from ..robots import panda
+from ..runs.generate import Settings, generate
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..sim.world import JAW, World
+from ..validate.certify import Trial
+from ..validate.rebuilt import rebuild, world_of
+from ..validate.rollout import Rollout, run
+from ..validate.settings import QUICK
 
 LIMITS = {
     "rollout_to_raw": (1.25, "at most"),
@@ -194,7 +194,7 @@ def _pool() -> Iterator[Pool]:
 
 def _robosuite(row: PoolRow, camera: bool) -> Any:
     """The same scenario in robosuite."""
-    from .envs.robosuite import env_class  # here, because robosuite takes seconds and nothing else needs it
+    from ..envs.robosuite import env_class  # here, because robosuite takes seconds and nothing else needs it
 
     return env_class("domino_single")(
         robots="Panda",
@@ -259,7 +259,7 @@ def robosuite_to_ours(repeats: int) -> float:
 
 def _lift() -> Any:
     """robosuite's own Lift environment, without pictures."""
-    from .envs import robosuite_models  # noqa: F401  # keeps robosuite's import quiet
+    from ..envs import robosuite_models  # noqa: F401  # keeps robosuite's import quiet
 
     # isort: split
     import robosuite  # here, because it takes seconds and nothing else needs it

@@ -9,8 +9,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..errors import PoolError, cut
 from . import schema, shards
-from .errors import PoolError, cut
 from .pool import MANIFEST, Pool
 
 INDEX = "index.json"

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .certificate import StoredCertificate
+from ..certificate import StoredCertificate
+from ..sim.world import EMBODIMENTS, action_size
 from .schema import (
     HASH,
     LARGEST_TEXT,
@@ -21,7 +22,6 @@ from .schema import (
     check_whole,
     require,
 )
-from .sim.world import EMBODIMENTS, action_size
 
 LARGEST_SCENE = 5_000_000
 """Letters of a scene; the largest scenes have 60 000."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from . import task_files
-from .errors import BadConfig
+from .. import task_files
+from ..errors import BadConfig
 
 WIDTH = 118
 """Letters of a line."""

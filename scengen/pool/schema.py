@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .certificate import from_json
+from ..certificate import from_json
 
 LARGEST_MANIFEST = 16_000_000
 """Bytes; the lines of ten thousand shards have 2 MB."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import BadConfig, cut
+from ..errors import BadConfig, cut
 
 STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/null")
 """Devices that make sense as a target."""

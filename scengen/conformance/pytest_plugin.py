@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from .errors import ScengenError
+from ..errors import ScengenError
 
 if TYPE_CHECKING:
-    from .conformance import Rule
+    from .rules import Rule
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,7 +43,7 @@ def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.It
 
 def _rules(config: pytest.Config) -> list["Rule"]:
     """All checks of a task, and of one of its axes if that is asked for."""
-    from . import conformance  # here: whoever does not ask for checks pays nothing
+    from .. import conformance  # here: whoever does not ask for checks pays nothing
 
     option = config.option
     task, axis, conf = option.scengen_task, option.scengen_axis, option.scengen_conf

@@ -8,7 +8,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from .errors import BadConfig
+from ..errors import BadConfig
 from .targets import refused
 
 

@@ -14,8 +14,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 
-from .control import native
-from .errors import ScengenError
+from ..control import native
+from ..errors import ScengenError
 
 A = TypeVar("A")
 B = TypeVar("B")

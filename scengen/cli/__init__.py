@@ -1,0 +1,5 @@
+"""The command line: `scengen COMMAND key=value ...`."""
+
+from .program import BAD_INPUT, INTERRUPTED, OK, VERBS, main, run
+
+__all__ = ["BAD_INPUT", "INTERRUPTED", "OK", "VERBS", "main", "run"]

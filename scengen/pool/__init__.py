@@ -1,0 +1,5 @@
+"""Pools of certified scenarios on disk: how they are written, read and searched."""
+
+from .pool import Pool, PoolRow
+
+__all__ = ["Pool", "PoolRow"]

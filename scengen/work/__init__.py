@@ -1,0 +1,1 @@
+"""How long work is distributed to processes, logged, and written to files."""
