@@ -8,6 +8,8 @@ the arm that it steers; `together` joins the moves of several.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +42,7 @@ STRAIGHT = math.radians(10.0)
 """How far to the right a hand may look and still close as it does after a reset [rad]."""
 
 Condition = Callable[[], bool]
+S = TypeVar("S")
 
 
 @dataclass(frozen=True)
@@ -262,6 +265,24 @@ def alone(arm: Arm, plan: Plan) -> Plan:
     """A plan of one arm while all others are held still."""
     plans = [plan if one is arm else None for one in arm.world.arms]
     yield from together(arm.world, *plans)
+
+
+def with_arm(index: int) -> Callable[[Callable[[S, Arm], Plan]], Callable[[S, World], Plan]]:
+    """Turn a method that plans for one arm into one that plans for the world, in which all other arms hold still.
+
+    Args:
+        index: of the arm in `world.arms`: 0 is the right one, 1 the left one.
+    """
+
+    def decorate(plan: Callable[[S, Arm], Plan]) -> Callable[[S, World], Plan]:
+        @wraps(plan)
+        def planned(scenario: S, world: World) -> Plan:
+            arm = world.arms[index]
+            yield from alone(arm, plan(scenario, arm))
+
+        return planned
+
+    return decorate
 
 
 def steer(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3, grip: float | None) -> Action:
