@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .errors import BadConfig
 from .geometry import Vec3
 
-FACED = np.array([-0.05, 0.0])
+VIEW_CENTRE = np.array([-0.05, 0.0])
 """Where the axis of the camera "agentview", in the middle of its pictures, meets the table: x and y [m]."""
 RIGHT_AND_UP = np.array([[0.0, 1.0], [-1.0, 0.0]])
 """Takes x and y to the picture's right and up, for cameras that look at the table from the front or from above."""
@@ -57,10 +57,10 @@ class Orientation:
         return found
 
     def seen_at(self, point: Vec3) -> Vec3:
-        """Where a thing seems to stand to somebody who takes the picture for upright [m], shape (3,).
+        """Position at which an object appears to a viewer who takes the picture for upright [m], shape (3,).
 
-        Told for cameras before the table and above it, without regard to perspective: turned about `FACED`, at its
-        own height.
+        Valid for cameras in front of the table and above it, without perspective: the position is turned about
+        `VIEW_CENTRE` at its own height.
         """
         return self._moved(point, self._right_and_up)
 
@@ -70,8 +70,8 @@ class Orientation:
 
     @staticmethod
     def _moved(point: Vec3, by: NDArray[np.float64]) -> Vec3:
-        moved = RIGHT_AND_UP.T @ by @ RIGHT_AND_UP @ (point[:2] - FACED)
-        return np.array([*(FACED + moved), point[2]])
+        moved = RIGHT_AND_UP.T @ by @ RIGHT_AND_UP @ (point[:2] - VIEW_CENTRE)
+        return np.array([*(VIEW_CENTRE + moved), point[2]])
 
     @property
     def _right_and_up(self) -> NDArray[np.float64]:

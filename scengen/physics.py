@@ -80,7 +80,7 @@ def passes(distance: float, speed: float, slowing: float) -> float:
     return 2 * distance / (speed + math.sqrt(left)) if left > 0.0 else math.inf
 
 
-def rolling_slows(resistance: float) -> float:
+def rolling_deceleration(resistance: float) -> float:
     """What a solid ball loses on the level that resists rolling with a share of its load [m/s^2].
 
     It carries 7/5 of its mass, as it turns.
@@ -106,7 +106,7 @@ def slipping(speed: float, spin: float, friction: float) -> tuple[float, float]:
     return seconds, speed - slip * SPIN / (1.0 + SPIN)
 
 
-def slips_at(friction: float) -> float:
+def slip_angle(friction: float) -> float:
     """The slope on which a block begins to slide [rad]."""
     return math.atan(friction)
 
@@ -124,5 +124,5 @@ def slid(friction: float, rate: float, seconds: float) -> tuple[float, float]:
     Returns:
         Way [m] and speed [m/s] along the slope.
     """
-    grows = GRAVITY * rate / math.cos(slips_at(friction))
+    grows = GRAVITY * rate / math.cos(slip_angle(friction))
     return grows * seconds**3 / 6, grows * seconds**2 / 2

@@ -8,7 +8,7 @@ import pytest
 from scengen.assets.prop import TABLE_TOP, table
 from scengen.errors import BadConfig
 from scengen.export.cameras import calibration
-from scengen.orientation import FACED, UPRIGHT, Orientation
+from scengen.orientation import UPRIGHT, VIEW_CENTRE, Orientation
 from scengen.sim import scene_text
 from scengen.sim.world import World
 
@@ -54,7 +54,9 @@ def test_every_pixel_is_where_the_matrix_says(one):
 def test_a_policy_that_corrects_the_picture_finds_the_place(one):
     point = np.array([0.13, -0.21, 0.83])
     assert one.stands_at(one.seen_at(point)) == pytest.approx(point)
-    assert np.linalg.norm(one.seen_at(point)[:2] - FACED) == pytest.approx(np.linalg.norm(point[:2] - FACED))
+    assert np.linalg.norm(one.seen_at(point)[:2] - VIEW_CENTRE) == pytest.approx(
+        np.linalg.norm(point[:2] - VIEW_CENTRE)
+    )
 
 
 def test_half_a_turn_shows_a_thing_on_the_other_side_of_the_middle():
@@ -62,7 +64,9 @@ def test_half_a_turn_shows_a_thing_on_the_other_side_of_the_middle():
 
 
 def test_the_middle_is_where_agentview_looks_to_2_mm(world):
-    middle, beside = (seen_in(world, "agentview", [x, FACED[1], TABLE_TOP]) for x in (FACED[0], FACED[0] + 0.002))
+    middle, beside = (
+        seen_in(world, "agentview", [x, VIEW_CENTRE[1], TABLE_TOP]) for x in (VIEW_CENTRE[0], VIEW_CENTRE[0] + 0.002)
+    )
     assert np.linalg.norm(middle - [100, 100]) < np.linalg.norm(beside - middle)
 
 
@@ -72,7 +76,7 @@ def test_a_turned_camera_shows_a_step_on_the_table_as_an_upright_one_shows_the_s
     world, camera, one
 ):
     """To first order: perspective shortens what is farther away, upright or not."""
-    middle = np.array([*FACED, TABLE_TOP])
+    middle = np.array([*VIEW_CENTRE, TABLE_TOP])
     for step in ([0.002, 0.0, 0.0], [0.0, 0.002, 0.0]):
         turned = seen_in(world, camera, middle + step, one) - seen_in(world, camera, middle, one)
         upright = seen_in(world, camera, one.seen_at(middle + step)) - seen_in(world, camera, one.seen_at(middle))

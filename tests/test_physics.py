@@ -18,10 +18,10 @@ from scengen.physics import (
     passes,
     reflected,
     rolled,
-    rolling_slows,
+    rolling_deceleration,
     slid,
+    slip_angle,
     slipping,
-    slips_at,
 )
 
 START = np.array([-0.2, 0.0, TABLE_TOP + 0.30])
@@ -97,18 +97,18 @@ def test_a_ball_that_slips_rolls_with_five_sevenths_of_its_speed():
 
 
 def test_resistance_brakes_a_rolling_ball_by_five_sevenths_of_its_share_of_gravity():
-    assert rolling_slows(0.01) == pytest.approx(5 / 7 * 0.01 * GRAVITY)
+    assert rolling_deceleration(0.01) == pytest.approx(5 / 7 * 0.01 * GRAVITY)
 
 
 @pytest.mark.parametrize(("friction", "degrees"), [(0.37, 20.3), (0.62, 31.8), (0.90, 42.0)])
 def test_a_block_on_a_turning_slope_lets_go_at_the_angle_of_friction(friction, degrees):
     """atan(mu); gravity turns instead of the slope, at 5 deg/s from 3 deg before it."""
-    assert math.degrees(slips_at(friction)) == pytest.approx(degrees, abs=0.1)
+    assert math.degrees(slip_angle(friction)) == pytest.approx(degrees, abs=0.1)
     scene, rate = table(), math.radians(5.0)
     place(scene, Block(width=0.035, height=0.020, mass=0.03, friction=friction), "block", [0.3, 0, TABLE_TOP])
     model = scene.compile()
     data = mujoco.MjData(model)
-    begins = slips_at(friction) - math.radians(3.0)
+    begins = slip_angle(friction) - math.radians(3.0)
     start, moved = None, None
     for step in range(round(1.5 / STEP)):
         angle = begins + rate * step * STEP
@@ -116,7 +116,7 @@ def test_a_block_on_a_turning_slope_lets_go_at_the_angle_of_friction(friction, d
         mujoco.mj_step(model, data)
         start = data.qpos[0] if start is None else start
         moved = start - data.qpos[0]
-        if angle < slips_at(friction) - math.radians(0.3):
+        if angle < slip_angle(friction) - math.radians(0.3):
             assert moved < 1e-3
     assert moved == pytest.approx(slid(friction, rate, 1.5 - 0.6)[0], rel=0.12)
 

@@ -18,7 +18,7 @@ from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.geometry import UP, Vec3, heading
 from scengen.params import param
 from scengen.predicates import fallen, inside, still
-from scengen.robots.jaw import FINGER
+from scengen.robots.jaw import FINGER_ACROSS
 from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from scengen.sim.world import ROBOT, World
 from scengen.skills.jaw import pick, poke, put
@@ -90,7 +90,7 @@ class PushOff(Scenario):
     def push(self, world: World, way: float) -> Plan:
         """Push the block with closed fingers until the cube has gone so far [m], then step back."""
         face = self.behind + self.block.width / 2
-        start = self.spot(-face - FINGER - 0.02) + self.block.height / 2 * UP
+        start = self.spot(-face - FINGER_ACROSS - 0.02) + self.block.height / 2 * UP
         yield from poke(world.arm, start, SPEED * self.u, lambda: self.gone(world) >= way)
 
     # --- shortcuts: tempting plans that must fail, or the task is not what it seems -----------------

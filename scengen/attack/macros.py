@@ -26,7 +26,7 @@ import numpy as np
 
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, about_z, heading, rotation
-from ..robots.jaw import FINGER, PALM_ABOVE, TIP
+from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan
 from ..sim.world import ROBOT, Arm, World
 from ..skills import suction
@@ -98,7 +98,7 @@ def _pick(field: Field, macro: Macro) -> Plan:
         yield from _suck(field, centre + up * UP, skew)
     else:
         closing = about_z(skew) @ solid.level_axes(world)[round(which)][0]
-        low, high = max(TIP + 0.003 - up, up - DEEPEST), max(up - 0.004, 0.0)
+        low, high = max(TIP_BELOW + 0.003 - up, up - DEEPEST), max(up - 0.004, 0.0)
         at = centre + (low + height * (high - low)) * UP if low < high else centre
         rot = closing_along(field.arm, closing)
         yield from _rise(field.arm, float(at[2]) + ABOVE)
@@ -163,7 +163,7 @@ def _push(field: Field, macro: Macro) -> Plan:
     u = heading(math.degrees(direction))
     across = np.array([-u[1], u[0], 0.0])
     if (load := held(arm)) is None:
-        radius, below, lag = FINGER, TIP, np.zeros(3)
+        radius, below, lag = FINGER_ACROSS, TIP_BELOW, np.zeros(3)
         rot = closing_along(arm, across)
     else:
         tool = field.solids[load]
@@ -252,7 +252,7 @@ def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
     """Bring what the hand holds, or its finger tips, over a point of a solid's upper face."""
     solid, world, arm = field.solids[target], field.world, field.arm
     load = held(arm)
-    below = TIP if load is None else field.solids[load].reach(world, UP)
+    below = TIP_BELOW if load is None else field.solids[load].reach(world, UP)
     lag = np.zeros(3) if load is None else arm.hand - field.solids[load].centre(world)
     (a, first), (b, second) = solid.level_axes(world)
     rot, half = solid.rot(world), solid.half

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from ..geometry import UP, Mat3, Outline, Vec3, corners, gap
-from ..robots.jaw import FINGER, OPENED, PALM_ABOVE, SPAN
+from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ABOVE, SPAN
 from ..sim.world import Arm, World
 
 TABLE = "table"
@@ -74,7 +74,7 @@ class Solid:
     @property
     def graspable(self) -> bool:
         """Whether a jaw may span it: a free body, and narrow in one direction."""
-        return self.free and 2 * float(self.half.min()) < OPENED
+        return self.free and 2 * float(self.half.min()) < OPEN_GAP
 
 
 def solids(world: World) -> Mapping[str, Solid]:
@@ -114,8 +114,8 @@ def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
     """Which of a solid's level axes an open jaw can close along, the one with the most room for the fingers first."""
     rooms = {}
     for which, (along, half) in enumerate(solid.level_axes(world)):
-        if 2 * half < OPENED:
-            jaw = corners(solid.centre(world), math.atan2(along[1], along[0]), (SPAN, 2 * FINGER))
+        if 2 * half < OPEN_GAP:
+            jaw = corners(solid.centre(world), math.atan2(along[1], along[0]), (SPAN, 2 * FINGER_ACROSS))
             others = [other for other in found.values() if other.body not in (solid.body, TABLE)]
             near = [
                 gap(jaw, other.outline(world)) for other in others if other.top(world) > solid.top(world) - PALM_ABOVE

@@ -1,11 +1,12 @@
 """Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v0", pool="generated/id")`.
 
-Importing this module registers every task; `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself.
-An environment plays the certified scenarios of a pool, the same scene text, physics and controller that the certificate
-speaks of. Nothing is sampled at reset: the seed chooses among the stored scenarios, and the id comes back in `info`.
+Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself.
+An environment plays the certified scenarios of a pool, with the scene text, the physics and the controller of the
+certificate. Reset samples nothing: the seed selects one of the stored scenarios, and `info` holds its id.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -18,39 +19,92 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
 from ..errors import BadConfig, UnknownName, cut
+from ..orientation import Orientation
 from ..params import Value
 from ..pictures.render import Camera
+from ..pool.library import Library
 from ..pool.pool import PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size, hands
 from .object_state import ObjectState, bodies_of
-from .observations import Reading, cameras_of, check_names, privileged, proprioception, streams_of
+from .observations import (
+    Reading,
+    Stream,
+    cameras_of,
+    check_names,
+    privileged,
+    proprioception,
+    streams_of,
+    turns_pictures,
+)
 from .pools import Folders, chosen, rows_of
 
 Observation = dict[str, Reading]
+
+RENDER_MODES = ("rgb_array",)
+"""Names of the render modes."""
+MAX_ACTION_REPEAT = 100
+"""Largest `action_repeat` [control periods]: one second. With longer repeats the arm is hardly controlled."""
+
+
+@dataclass(frozen=True)
+class ObservationSettings:
+    """What an environment observes: its streams, its cameras, and the size of all pictures."""
+
+    streams: Mapping[str, Stream]
+    """Streams to read, by name, in the requested order."""
+    cameras: Mapping[str, str]
+    """Cameras of the observation: robosuite's names by the paper's, in the requested order."""
+    width: int
+    """Width of all pictures [pixels]."""
+    height: int
+    """Height of all pictures [pixels]."""
+
+    @property
+    def entry_names(self) -> dict[str, tuple[str, ...]]:
+        """Names of the entries of each stream."""
+        return {name: stream.entries(name) for name, stream in self.streams.items()}
+
+    @property
+    def space(self) -> spaces.Dict:
+        """Gymnasium's space of the observations."""
+        boxes: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(np.float32(-s.bound), np.float32(s.bound), s.shape, np.float32)
+            for name, s in self.streams.items()
+        }
+        pictures = {name: spaces.Box(0, 255, (self.height, self.width, 3), np.uint8) for name in self.cameras}
+        return spaces.Dict({**boxes, **pictures})
+
+    def check_picture_size(self, task: Task, rows: Library) -> None:
+        """Raise `BadConfig` if a scenario turns pictures by a quarter and they are not square."""
+        if self.width == self.height or not turns_pictures(task.family):
+            return
+        for (params,) in rows.columns("params"):
+            task.scenario(params).orientation.check_size(self.width, self.height)
 
 
 class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
     Actions: shape (7,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1
-    closed), at 100 Hz; shape (14,) for two arms, the right one's seven first; none for an arm that belongs to the
-    scene. They go to the controller as they are, clipped to [-1, 1], which is the paper's interface for policies;
-    `action_filter="teleop"` puts the filter of people and oracles in between (`scengen.control.teleop`).
+    closed), at 100 Hz. With two arms the shape is (14,), the right arm's seven numbers first. An arm that belongs to
+    the scene has no action. Actions are clipped to [-1, 1] and go to the controller unfiltered, which is the paper's
+    interface for policies. `action_filter="teleop"` applies the filter of teleoperation and of the oracles
+    (`scengen.control.teleop`).
 
-    Observations: a dictionary of the streams asked for (`scengen.envs.observations`), float32; cameras give uint8.
-    `metadata["names"]` tells of each stream what its entries are. Nothing that a scenario hides is in any of them.
-    Some scenarios are seen turned or mirrored (`Scenario.orientation`): then every picture is, `render` included, while
-    actions and all other streams stay as they are; `seen_<body>_pos` is where the picture lets a body appear.
+    Observations: a dictionary of the requested streams (`scengen.envs.observations`), float32; pictures are uint8.
+    `metadata["names"]` lists the entries of each stream. No observation contains a hidden parameter of a scenario.
+    Some scenarios are seen turned or mirrored (`Scenario.orientation`). Then every picture is turned, that of `render`
+    included; actions and all other streams stay as they are. `seen_<body>_pos` is where the picture shows a body.
 
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
-    With `settle` a reached goal counts as in a certificate: it must still hold after the robot was left idle for a
+    With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `scenario`, `scene_sha256`, `split`, `axes`, `success`, `is_success`, and `reason` once it is over.
+    `info` holds `scenario`, `scene_sha256`, `split`, `axes`, `success`, `is_success`, and at the end `reason`.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": round(1 / Loop.PERIOD)}  # noqa: RUF012
+    metadata = {"render_modes": [*RENDER_MODES], "render_fps": round(1 / Loop.PERIOD)}  # noqa: RUF012
 
     def __init__(
         self,
@@ -71,73 +125,67 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Open the pools.
 
         Args:
-            task: name of the task; scenarios of others are refused.
-            pool: folder of a pool, or several.
-            observations: names of streams and cameras; what is not asked for costs nothing. Proprioception if None.
-                Privileged are `object-state`, all poses and velocities in one vector (`scengen.envs.object_state`),
-                each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m], if the family turns pictures.
+            task: name of the task. Pools of other tasks are refused.
+            pool: folder of a pool, or several folders.
+            observations: names of streams and cameras; only these are computed. Default: proprioception.
+                Privileged streams are `object-state`, all poses and velocities in one vector
+                (`scengen.envs.object_state`), each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m]
+                if the family turns pictures.
             render_mode: None or `rgb_array`.
-            width: of all pictures [pixels].
-            height: of all pictures [pixels].
-            camera: what `render` shows: one of the paper's cameras (`cameras_of`) or any camera of the model.
-            action_filter: None, or "teleop" for the filter that the actions of people and oracles pass.
-            settle: whether a reached goal has to last as in the certificate.
+            width: width of all pictures [pixels].
+            height: height of all pictures [pixels].
+            camera: camera of `render`: one of the paper's (`cameras_of`) or any camera of the model.
+            action_filter: None, or "teleop" for the filter of teleoperation and of the oracles.
+            settle: whether a reached goal must last as in the certificate.
             search: `hydra.searchpath=[file:///path/to/conf]` for a task of a package that is not installed.
-            scenario: the only one that is to be played, named as in `reset`; all of the pools if None.
-            split: play those of one split only, such as `id` or `wide_gaps@3`.
-            action_repeat: control periods for which an action is held, 4 for data of 25 Hz. All else goes on at 100 Hz:
-                controller, events, goal and the filter, which sees the same action several times. The time limit is
-                in seconds and stays what it is. A step ends early where the episode does.
+            scenario: the only scenario to play, named as in `reset`. Default: all scenarios of the pools.
+            split: the only split to play, such as `id` or `wide_gaps@3`.
+            action_repeat: control periods for which an action is held, 4 for data of 25 Hz. The controller, the events,
+                the goal and the filter keep running at 100 Hz; the filter gets the same action several times. The
+                time limit in seconds does not change. A step ends early if the episode ends.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
-                seen turned by a quarter are not square.
+                turned by a quarter are not square.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
+        _check_render_mode(render_mode)
         check_filter(action_filter)
-        if action_repeat not in range(1, MOST_REPEATED + 1):
-            told = f"it must be a whole number of control periods in [1, {MOST_REPEATED}]"
-            raise BadConfig(f"action_repeat = {cut(repr(action_repeat))}; {told}")
+        _check_action_repeat(action_repeat)
+        self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.task: Task = config.task(task, search)
         rows = rows_of(pool, task)
         self._rows = chosen(rows, scenario, split)
-        robot = self.task.embodiment
-        if observations is None:
-            observations = proprioception(robot)
-        known, self.views = streams_of(robot), cameras_of(robot)
-        if not set(observations) <= {*known, *self.views}:  # which bodies there are costs some scenes
-            bodies = bodies_of(self.task, (scene for (scene,) in rows.columns("scene_xml")))
-            state = ObjectState(bodies, len(hands(robot)))
-            known |= privileged(state, self.task.family, lambda: self.scenario.orientation)
-            check_names(observations, robot, known)
-        self.render_mode, self.size, self.camera = render_mode, (width, height), camera
-        self.streams = {name: known[name] for name in observations if name in known}
-        self.cameras = [name for name in observations if name in self.views]
+        names = proprioception(self.task.embodiment) if observations is None else observations
+        streams, cameras = _requested(names, self.task, rows, lambda: self.scenario.orientation)
+        self.observed = ObservationSettings(streams, cameras, width, height)
+        if self._needs_pictures:
+            self.observed.check_picture_size(self.task, self._rows)
         self.metadata = {
             **type(self).metadata,
             "render_fps": round(1 / (Loop.PERIOD * action_repeat)),
-            "names": {name: stream.entries(name) for name, stream in self.streams.items()},
+            "names": self.observed.entry_names,
         }
-        if self._sees and width != height and self.task.family.orientation is not Scenario.orientation:
-            for (params,) in self._rows.columns("params"):
-                self.task.scenario(params).orientation.check_size(width, height)
+        self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
+        self.observation_space = self.observed.space  # type: ignore[assignment]
         self._next = 0
         self._world: World | None = None
-        self._eye: Camera | None = None
+        self._renderer: Camera | None = None
         self._row: PoolRow = self._rows[0]
-        self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
-        boxes: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(np.float32(-s.bound), np.float32(s.bound), s.shape, np.float32)
-            for name, s in self.streams.items()
-        }
-        pictures = {name: spaces.Box(0, 255, (height, width, 3), np.uint8) for name in self.cameras}
-        self.observation_space = spaces.Dict({**boxes, **pictures})  # type: ignore[assignment]
+
+    @property
+    def streams(self) -> Mapping[str, Stream]:
+        """Streams of the observation, by name."""
+        return self.observed.streams
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """The paper's names of the cameras of the observation."""
+        return tuple(self.observed.cameras)
 
     @property
     def task_description(self) -> str:
-        """What is asked for, in words."""
+        """The instruction of the running scenario."""
         return self._row.instruction
 
     @property
@@ -154,36 +202,36 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def world(self) -> World:
         """The running simulation."""
         if self._world is None:
-            raise BadConfig("call reset before anything else")
+            raise BadConfig("no scenario is running; call reset first")
         return self._world
 
     @property
     def row(self) -> PoolRow:
-        """The running scenario as its pool tells it. Privileged, like `scenario`."""
+        """Row of the running scenario in its pool. Privileged, like `scenario`."""
         return self._row
 
     @property
     def scenario(self) -> Scenario:
-        """The running scenario. Privileged: a policy that reads it knows what it should find out."""
+        """The running scenario. Privileged: it holds the hidden parameters, which a policy must find out."""
         if self._world is None:
-            raise BadConfig("call reset before anything else")
+            raise BadConfig("no scenario is running; call reset first")
         return self._scenario
 
     @property
     def values(self) -> Mapping[str, Value]:
-        """Parameter values of the running scenario, by name. Privileged like `scenario`."""
+        """Parameter values of the running scenario, by name. Privileged, like `scenario`."""
         return self._row.params
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Put a scenario at its start: `options={"scenario": name}`, else number `seed` of the pool, else the next one.
+        """Start a scenario: `options={"scenario": name}`, else number `seed` of the pool, else the next one.
 
-        A scenario is named by its id, by the beginning of it, or as `PoolRow.name` does.
+        The name is a scenario's id, a unique prefix of its id, or its `PoolRow.name`.
 
         Raises:
             UnknownName: there is no such scenario or option.
-            BadConfig: several ids begin so.
+            BadConfig: several ids have this prefix.
         """
         super().reset(seed=seed)
         unknown = set(options or {}) - {"scenario"}
@@ -195,14 +243,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         number = self._next if named is None else self._rows.find(str(named))
         self._next = (number + 1) % len(self._rows)
         self._load(self._rows[number])
-        self._over = False
         return self._observe(), self._info("", False)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance one control period (10 ms), or `action_repeat` of them.
 
         Raises:
-            ValueError: the action has another shape than `action_space`, or is not finite; nothing was simulated then.
+            ValueError: the action has another shape than `action_space`, or is not finite. Nothing is simulated then.
         """
         given, size = np.asarray(action, np.float32), action_size(self.task.embodiment)
         if given.shape != (size,) or not np.isfinite(given).all():
@@ -218,19 +265,21 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(), float(success), terminated, truncated, self._info(reason, success)
 
     def render(self) -> Reading | None:  # type: ignore[override]
-        """A picture from the chosen camera, shape (height, width, 3), or None without a render mode."""
-        return self._picture(self.views.get(self.camera, self.camera)) if self.render_mode == "rgb_array" else None
+        """A picture of `camera`, shape (height, width, 3), or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return self._picture(cameras_of(self.task.embodiment).get(self.camera, self.camera))
 
     def close(self) -> None:
         """Free the renderer."""
-        if self._eye is not None:
-            self._eye.close()
-            self._eye = None
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = World.load(row.scene_xml, row.embodiment, visual=self._sees)
+            self._world = World.load(row.scene_xml, row.embodiment, visual=self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
         self._row = row
         self._world.reset()
@@ -240,27 +289,24 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._episode.step(self.world.filter(action) if self.action_filter else unfiltered(action))
 
     def _settled(self) -> tuple[Outcome, str]:
-        """Whether the goal lasts while the robot is idle, as in the certificate; what came of it, and the reason."""
+        """Outcome and reason after the robot has been idle for the certificate's settling time."""
         for _ in range(round((self._row.certificate.settle or 0.0) / Loop.PERIOD)):
             if self._advance(self.world.idle) != "success":
                 break
         return self._episode.settled()
 
     @property
-    def _sees(self) -> bool:
+    def _needs_pictures(self) -> bool:
         return bool(self.cameras) or self.render_mode is not None
 
     def _observe(self) -> Observation:
-        world = self.world
-        seen: Observation = {name: _clipped(s.read(world), s.bound) for name, s in self.streams.items()}
-        for name in self.cameras:
-            seen[name] = self._picture(self.views[name])
-        return seen
+        read = {name: _clipped(s.read(self.world), s.bound) for name, s in self.streams.items()}
+        return {**read, **{name: self._picture(camera) for name, camera in self.observed.cameras.items()}}
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:
-        if self._eye is None:
-            self._eye = Camera(self.world, *self.size)
-        return self._scenario.orientation.apply(self._eye.take(camera)).copy()
+        if self._renderer is None:
+            self._renderer = Camera(self.world, self.observed.width, self.observed.height)
+        return self._scenario.orientation.apply(self._renderer.take(camera)).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
         row = self._row
@@ -268,8 +314,39 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return {**about, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
 
 
-MOST_REPEATED = 100
-"""Control periods of one second: an arm that gets an action less often is hardly controlled."""
+def _check_render_mode(render_mode: str | None) -> None:
+    if render_mode not in (None, *RENDER_MODES):
+        raise UnknownName("render_mode", str(render_mode), RENDER_MODES)
+
+
+def _check_action_repeat(action_repeat: int) -> None:
+    if action_repeat not in range(1, MAX_ACTION_REPEAT + 1):
+        accepted = f"it must be a whole number of control periods in [1, {MAX_ACTION_REPEAT}]"
+        raise BadConfig(f"action_repeat = {cut(repr(action_repeat))}; {accepted}")
+
+
+def _requested(
+    names: Sequence[str], task: Task, rows: Library, orientation: Callable[[], Orientation]
+) -> tuple[dict[str, Stream], dict[str, str]]:
+    """The streams and the cameras among some names, each in the order of the names.
+
+    Args:
+        rows: whose scenes are searched for bodies if a name is neither a stream of the robot nor a camera.
+        orientation: that of the running scenario.
+
+    Raises:
+        UnknownName: a name is neither a stream nor a camera.
+    """
+    streams, cameras = streams_of(task.embodiment), cameras_of(task.embodiment)
+    if not set(names) <= {*streams, *cameras}:  # only then: finding the bodies takes time, it builds some scenes
+        bodies = bodies_of(task, (scene for (scene,) in rows.columns("scene_xml")))
+        state = ObjectState(bodies, len(hands(task.embodiment)))
+        streams |= privileged(state, task.family, orientation)
+        check_names(names, task.embodiment, streams)
+    return (
+        {name: streams[name] for name in names if name in streams},
+        {name: cameras[name] for name in names if name in cameras},
+    )
 
 
 def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import UnknownName
 from ..orientation import Orientation
-from ..robots.panda import JOINTS, MOST_ARMS, Names
+from ..robots.panda import JOINTS, MAX_ARMS, Names
 from ..scenario import Scenario
 from ..sim.world import JAW, Arm, World, hands
 from .object_state import NAME, POSE, ObjectState, xyzw
@@ -167,7 +167,7 @@ def proprioception(embodiment: str) -> tuple[str, ...]:
     return tuple(name for name in streams_of(embodiment) if name in poses)
 
 
-ALL = "+".join([JAW] * MOST_ARMS)
+ALL = "+".join([JAW] * MAX_ARMS)
 """The robot that has every stream and camera that any has."""
 
 

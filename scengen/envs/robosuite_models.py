@@ -75,7 +75,7 @@ class SceneTask(ManipulationTask):
                 self.root.remove(theirs)
             self.root.extend(scene.root.findall(tag))
         for robot in robots:
-            for one, other in panda.NEVER_TOUCH:
+            for one, other in panda.CONTACT_FREE_LINKS:
                 names = {"body1": robot.correct_naming(one), "body2": robot.correct_naming(other)}
                 self.contact.append(Element("exclude", names))
 

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from ..geometry import between
 from . import panda
 
-TOUCH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
+GRIPPER_REACH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
 """No posture takes any point of the gripper farther than this from `panda.SHOULDER` [m].
 
 The first two stretches are those of `panda.REACH`; the third ends at the tip of an open finger, 0.0545 across the axis
@@ -85,7 +85,7 @@ def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
     Not positive where the bound says nothing. It ignores joint limits, and so is smaller than `reach` finds.
 
     Args:
-        length: `panda.REACH` to ask about the grip site, `TOUCH` to ask about any point of the gripper [m].
+        length: `panda.REACH` to ask about the grip site, `GRIPPER_REACH` to ask about any point of the gripper [m].
     """
     return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - length
 

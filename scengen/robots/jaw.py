@@ -12,10 +12,10 @@ import math
 
 OPENING = 0.079
 """Largest gap [m]: 40 mm of travel for each finger, less `OVERLAP`. No wider thing fits between the pads."""
-OPENED = 0.077
+OPEN_GAP = 0.077
 """Gap that the fingers really reach [m], 0.5 s after the command: dry friction stalls them 1 mm short of where they
 are sent. They creep the rest of the way, half of it in 0.8 s."""
-AT_RESET = 0.0407
+RESET_GAP = 0.0407
 """Gap after a reset [m]: `panda.FINGERS`."""
 OVERLAP = 0.001
 """By how much the pads would overlap if both fingers could go where "closed" sends them [m]."""
@@ -23,11 +23,11 @@ SPAN = 0.133
 """Width of the open jaw along, its fingers included [m]; 0.109 at the tips."""
 SPAN_CLOSED = 0.054
 """Width of the closed jaw along, its fingers included [m]."""
-TIPS_CLOSED = 0.030
+TIP_SPAN_CLOSED = 0.030
 """The same at the tips [m]."""
-FINGER = 0.0105
+FINGER_ACROSS = 0.0105
 """How far the fingers, open or closed, reach across, to either side [m]: half their width. 0.0088 at the tips."""
-TIP = 0.0092
+TIP_BELOW = 0.0092
 """How far the finger tips reach below the grip site [m]."""
 PAD = 0.016
 """Width of a finger pad across, and its height [m]."""
@@ -44,7 +44,7 @@ PALM_ABOVE = 0.031
 
 STIFFNESS = 1000.0
 """Force per distance from the place that is commanded [N/m]: kp."""
-STRONGEST = 20.0
+MAX_FORCE = 20.0
 """Largest force of a finger [N]: forcerange."""
 DAMPING = 100.0
 """Viscous friction [N s/m]."""
@@ -57,9 +57,9 @@ COMMAND_SPEED = 0.8
 
 _SHORT = 2 * FRICTION / STIFFNESS
 """How much of the gap's way is left where friction stalls the fingers [m]."""
-_FAST = 2 * (STRONGEST - FRICTION) / DAMPING
+_FAST = 2 * (MAX_FORCE - FRICTION) / DAMPING
 """Speed of the gap at the largest force [m/s]."""
-_NEAR = 2 * (STRONGEST - FRICTION) / STIFFNESS
+_NEAR = 2 * (MAX_FORCE - FRICTION) / STIFFNESS
 """Way left, as far as friction allows, below which the force decays with it [m]."""
 _DECAY = (DAMPING + math.sqrt(DAMPING**2 - 4 * INERTIA * STIFFNESS)) / (2 * STIFFNESS)
 """Time constant of that decay [s]: the slow root of a damped spring."""
@@ -74,11 +74,13 @@ def pinch(width: float) -> float:
     within 1.5 % at 0.1 kg and more; a lighter thing gives way to the pads, by 2 % of the force at 0.05, 4 % at 0.02 kg.
     A hand that closes up and down holds the same way, with everything sagging by 1 mm under the fingers' weight.
     """
-    return min(STIFFNESS * (width + OVERLAP), 2 * STRONGEST)
+    return min(STIFFNESS * (width + OVERLAP), 2 * MAX_FORCE)
 
 
 def time_to_touch(width: float, gap: float = OPENING) -> float:
-    """From the command to close until both pads touch a thing in their middle [s]; inf at 1 mm and less, see `OPENED`.
+    """Time from the command to close until both pads touch an object in their middle [s].
+
+    It is inf for a width of 1 mm and less, where dry friction stalls the fingers (see `OPEN_GAP`).
 
     Args:
         gap: from which the jaw closes [m].
@@ -97,8 +99,8 @@ def time_to_grip(width: float, gap: float = OPENING) -> float:
 
 
 def time_to_open(gap: float, start: float = 0.0) -> float:
-    """From the command to open an empty jaw until the gap has grown from `start` to `gap` [s]; inf from `OPENED` on."""
-    return _stroke(OPENED - start, OPENED - gap)
+    """Time from the command to open an empty jaw until the gap grows from `start` to `gap` [s]; inf from `OPEN_GAP` on."""
+    return _stroke(OPEN_GAP - start, OPEN_GAP - gap)
 
 
 def time_to_free(width: float) -> float:

@@ -30,12 +30,12 @@ BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
 """Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), mounted."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
 """Base orientation (wxyz): robosuite leaves a single arm, and two parallel ones, unturned, facing +x."""
-APART = 0.25
+ARM_OFFSET = 0.25
 """How far to the right of `BASE` the first of two arms stands, and the second to the left [m]: the layout "parallel" of
 robosuite's two-arm environments."""
-MOST_ARMS = 2
+MAX_ARMS = 2
 """Arms of a robot, at most: robosuite has no layout for more."""
-NEVER_TOUCH = (("link0", "link1"), ("link2", "link4"), ("link3", "link5"))
+CONTACT_FREE_LINKS = (("link0", "link1"), ("link2", "link4"), ("link3", "link5"))
 """Links of an arm that lie so close that MuJoCo would look for contacts between their hulls at every step, though no
 posture within the joints' ranges, nor 0.3 rad beyond, makes them touch: contacts between them are left out, which
 changes no bit and saves some 5 % of a step."""
@@ -140,7 +140,7 @@ class Names:
 
 def bases(arms: int) -> NDArray[np.float64]:
     """Base positions [m], shape (arms, 3), in the order of the arms: one in the middle, or two side by side."""
-    sides = (0.0,) if arms == 1 else (-APART, APART)
+    sides = (0.0,) if arms == 1 else (-ARM_OFFSET, ARM_OFFSET)
     return BASE + np.array([[0.0, side, 0.0] for side in sides])
 
 
@@ -172,13 +172,13 @@ def attach(
     foot, wrist = scene.body(names.base), scene.body(f"{names.arm}right_hand")
     foot.add_frame().attach_body(mount.body("base"), names.mount, "")
     wrist.add_frame().attach_body(hand.body("right_gripper"), names.hand, "")
-    for one, other in NEVER_TOUCH:
+    for one, other in CONTACT_FREE_LINKS:
         scene.add_exclude(bodyname1=names.arm + one, bodyname2=names.arm + other)
 
 
 def arms(model: mujoco.MjModel) -> list[Names]:
     """The arms in a model, in their order."""
-    every = (Names(number) for number in range(MOST_ARMS))
+    every = (Names(number) for number in range(MAX_ARMS))
     return [names for names in every if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, names.base) >= 0]
 
 
@@ -238,7 +238,7 @@ def _assets() -> Path:
 
 FOLDERS = {
     prefix: folder
-    for names in map(Names, range(MOST_ARMS))
+    for names in map(Names, range(MAX_ARMS))
     for prefix, folder in ((names.hand, "grippers"), (names.mount, "bases"), (names.arm, "robots/panda"))
 }
 """Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""

@@ -24,9 +24,9 @@ PAD = 0.012
 """Edge of one square pad [m]."""
 PITCH = 0.015
 """Distance of neighbouring pads' middles [m]; with `PAD` the cup covers a square of 27 mm."""
-REACHES = (PITCH + PAD) / 2
+CUP_HALF_WIDTH = (PITCH + PAD) / 2
 """How far the cup reaches to each side of the grip site [m]: a face must go on that far to take all four pads."""
-TORQUE = PULL / 2 * (REACHES + ((PITCH - PAD) / 2) ** 2 / REACHES)
+TORQUE = PULL / 2 * (CUP_HALF_WIDTH + ((PITCH - PAD) / 2) ** 2 / CUP_HALF_WIDTH)
 """What peels the cup off [N m]. The pull acts on every corner of a pad alike; under a torque the pressure falls evenly
 across the cup, until it is gone at its edge. Corners that have come off no longer pull, and the others follow."""
 LEAKY = 1.0

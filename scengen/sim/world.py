@@ -19,7 +19,7 @@ from ..errors import NoEvent, UnknownName, Unstable
 from ..geometry import Mat3, Vec3
 from ..robots import panda, suction
 from ..robots.jaw import OVERLAP
-from ..robots.panda import MOST_ARMS, Names
+from ..robots.panda import MAX_ARMS, Names
 from . import scene_text
 from .memory import Memory
 
@@ -39,8 +39,8 @@ HANDS: dict[str, Callable[[mujoco.MjSpec, bool, int, NDArray[np.float64]], None]
 SCRIPTED = "scripted_"
 """What the name of a hand begins with whose arm belongs to the scene: its events move it, and no action does."""
 EMBODIMENTS = (
-    *("+".join(hands) for arms in range(1, MOST_ARMS + 1) for hands in product(HANDS, repeat=arms)),
-    *(f"{driven}+{SCRIPTED}{partner}" for driven, partner in product(HANDS, repeat=MOST_ARMS)),
+    *("+".join(hands) for arms in range(1, MAX_ARMS + 1) for hands in product(HANDS, repeat=arms)),
+    *(f"{driven}+{SCRIPTED}{partner}" for driven, partner in product(HANDS, repeat=MAX_ARMS)),
 )
 """The robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one
 on the right. What is scripted comes last."""

@@ -9,7 +9,7 @@ import numpy as np
 from ..assets.prop import TABLE_TOP
 from ..errors import GaveUp
 from ..geometry import UP, Vec3
-from ..robots.jaw import PALM_ABOVE, TIP
+from ..robots.jaw import PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan
 from ..sim.world import Arm, World
 from .jaw import pick
@@ -64,7 +64,7 @@ def grips(world: World, body: str) -> list[Grip]:
     Taken at the middle of its height, or as low as the palm allows.
     """
     low, high = extent(world, body, UP)
-    height = max((low + high) / 2, high - PALM_ABOVE + UNDER_THE_PALM, TABLE_TOP + TIP + UNDER_THE_PALM)
+    height = max((low + high) / 2, high - PALM_ABOVE + UNDER_THE_PALM, TABLE_TOP + TIP_BELOW + UNDER_THE_PALM)
     found = []
     for closing in directions(world, body):
         beside = np.array([-closing[1], closing[0], 0.0])

@@ -10,14 +10,14 @@ import numpy as np
 from ..assets.hook import Hook
 from ..assets.prop import TABLE_TOP
 from ..geometry import about_y, about_z, polar
-from ..robots.jaw import TIP
+from ..robots.jaw import TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Plan
 from ..sim.world import Arm
 from .jaw import carry, pick, release
 from .motion import STEADY, go_to, retreat
 
-FROM_END, GRASP_HEIGHT = 0.035, TIP + 0.005
+FROM_END, GRASP_HEIGHT = 0.035, TIP_BELOW + 0.005
 """Where the handle is held: least distance from its end to the middle of the pads, height over the table [m]."""
 HAND_AT = 0.65
 """How far out the hand is when the tip is behind a thing, if the handle is long enough [m]."""
@@ -27,7 +27,7 @@ and a hook that has slipped in the jaw asks for more."""
 RAISED, NOSE_UP = 0.003, 0.07
 """How far the held end of the hook is raised while it moves [m], and how much its far end is tilted up [rad].
 Dragged flat, the tip catches the table's edge from outside as soon as it has been behind a cube that stands there."""
-CLEAR, WIDE = 0.012, 0.03
+HOOK_CLEARANCE, WIDE = 0.012, 0.03
 """Free space kept between hook and cube where the tip goes behind it, and on the way there [m]."""
 SQUARING = 0.015
 """How far the handle pushes the cube sideways before the tip pulls it [m]: that turns a cube that stands askew by
@@ -74,7 +74,7 @@ def pull(arm: Arm, hook: Hook, body: str, cube: str, half: float, to: float, mir
     bearing, there = polar(arm.world.com(cube) - BASE)
     along = arm.world.rot(cube).T @ about_z(bearing)[:, 0]
     across = half * float(np.abs(along).sum())  # half the cube's width, seen along the bearing
-    before, behind, drawn = there - across - hook.width - WIDE, there + across + CLEAR + hook.depth, half + to
+    before, behind, drawn = there - across - hook.width - WIDE, there + across + HOOK_CLEARANCE + hook.depth, half + to
     past, against = across + WIDE + hook.aside + hook.width / 2, half + hook.width / 2 - SQUARING
     for inside, beside in ((before, past), (behind, past), (behind, against), (drawn, against)):
         yield from slide(arm, hook, body, bearing, inside, mirror * beside)

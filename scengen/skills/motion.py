@@ -35,10 +35,10 @@ ALIGNED = 0.05
 WRIST_SPARE = math.radians(10.0)
 """How far joint 7 stays away from its limits when a hand may be turned either way [rad]."""
 
-INTEGRAL, MOST, LAG, ASKEW = 4.0, 0.012, 0.03, 0.2
+INTEGRAL_RATE, MAX_CORRECTION, INTEGRAL_RANGE, INTEGRAL_ANGLE = 4.0, 0.012, 0.03, 0.2
 """How fast the error of a hand that stays somewhere adds up [1/s], to how much at most along each axis [m], and how far
 from there [m] or turned from its orientation [rad] a hand is on its way still, so that nothing adds up."""
-STRAIGHT = math.radians(10.0)
+ROLL_SWITCH_ANGLE = math.radians(10.0)
 """How far to the right a hand may look and still close as it does after a reset [rad]."""
 
 Condition = Callable[[], bool]
@@ -78,7 +78,7 @@ def facing(azimuth: float, tilt: float) -> Mat3:
     ends on the way.
     """
     out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    closing = np.array([-out[1], out[0], 0.0]) * (1.0 if azimuth > -STRAIGHT else -1.0)
+    closing = np.array([-out[1], out[0], 0.0]) * (1.0 if azimuth > -ROLL_SWITCH_ANGLE else -1.0)
     along = math.cos(tilt) * out - math.sin(tilt) * UP
     return np.stack([closing, np.cross(along, closing), along], axis=1)
 
@@ -150,8 +150,8 @@ def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STE
         velocity = ahead * (min(pace.speed, 4.0 * distance) / max(distance, 1e-9))
         setpoint = setpoint + velocity * Loop.PERIOD
         left, turn = goal - arm.hand, between(arm.hand_rot, rot)
-        if max(math.sqrt(left @ left) / LAG, math.sqrt(turn @ turn) / ASKEW) < 1.0:
-            more = np.clip(more + INTEGRAL * Loop.PERIOD * left, -MOST, MOST)
+        if max(math.sqrt(left @ left) / INTEGRAL_RANGE, math.sqrt(turn @ turn) / INTEGRAL_ANGLE) < 1.0:
+            more = np.clip(more + INTEGRAL_RATE * Loop.PERIOD * left, -MAX_CORRECTION, MAX_CORRECTION)
         yield steer(arm, setpoint + more, velocity, turn, grip)
 
 

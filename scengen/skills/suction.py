@@ -9,7 +9,7 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.world import Arm
-from .motion import ASKEW, CLOSED, MOST, OPEN, STEADY, Pace, hold, retreat, steer
+from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, hold, retreat, steer
 
 FIRMLY = 0.15
 """How long the cup must hold on before a piece is lifted [s]."""
@@ -62,11 +62,14 @@ def suck_upright(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.02, give_up: 
 
     def add_up(aim: Mat3) -> Mat3:
         turn = between(arm.hand_rot, rot)
-        return rotation(ADDING * Loop.PERIOD * turn) @ aim if turn @ turn < ASKEW**2 else aim
+        return rotation(ADDING * Loop.PERIOD * turn) @ aim if turn @ turn < INTEGRAL_ANGLE**2 else aim
 
     while math.sqrt(mean @ mean) > SQUARE and world.time - start < SQUARED:
         mean = mean + Loop.PERIOD / MEMORY * (between(arm.hand_rot, rot) - mean)
-        aim, off = add_up(aim), np.clip(off + ADDING * Loop.PERIOD * (before - arm.hand), -MOST, MOST)
+        aim, off = (
+            add_up(aim),
+            np.clip(off + ADDING * Loop.PERIOD * (before - arm.hand), -MAX_CORRECTION, MAX_CORRECTION),
+        )
         yield steer(arm, before + off, np.zeros(3), FIRM_TURN * between(arm.hand_rot, aim), OPEN)
     setpoint, sealed, end = before + off, world.time, world.time + give_up
     while world.time - sealed < FIRMLY:

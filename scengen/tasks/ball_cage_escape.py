@@ -37,7 +37,7 @@ from ..assets.stool import Stool
 from ..geometry import UP, Mat3, Vec3, about_z, shortest
 from ..params import param
 from ..predicates import fallen, inside, still
-from ..robots.jaw import FINGER
+from ..robots.jaw import FINGER_ACROSS
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import pick, poke
@@ -213,7 +213,7 @@ class BallCageEscape(Scenario):
     def _knock_off(self, world: World) -> Plan:
         """Push the cage across the stool, and off it, with closed fingers."""
         across = self.axes[:, 1]
-        beside = self.handle - (self.cage.width / 2 + FINGER + 0.04) * across
+        beside = self.handle - (self.cage.width / 2 + FINGER_ACROSS + 0.04) * across
         yield from poke(world.arm, beside, 0.15 * across, until=lambda: world.touched("cage", "table"))
 
     def answer(self) -> Answer:

@@ -46,8 +46,8 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, TIP, pinch
-from ..robots.suction import REACHES, TORQUE
+from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch
+from ..robots.suction import CUP_HALF_WIDTH, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, suction
@@ -318,7 +318,7 @@ class BowlTable(Scenario):
     def _on_the_dome(self, arm: Arm) -> Plan:
         """Pinch the dome with the jaw, as far down as that opens, lift, bring it to the square."""
         across, below = (math.sqrt(self.bowl.outer**2 - r**2) for r in (OPENING / 2, self.bowl.foot))
-        at = arm.world.pos("bowl") + (TIP + across - below) * UP
+        at = arm.world.pos("bowl") + (TIP_BELOW + across - below) * UP
         yield from go_to(arm, at + 0.10 * UP, closing_along(arm, LEFT), COARSE, OPEN)
         yield from until(go_to(arm, at, pace=FINE), _after(arm.world, 2.0))  # the dome may stop it a little higher
         yield from jaw.grasp(arm, 0.5)
@@ -329,7 +329,7 @@ class BowlTable(Scenario):
 
     def _pry(self, arm: Arm) -> Plan:
         """Push the bowl with closed fingers where it stands out of the ring, up and to the other side."""
-        beside = self.foot + (self.rack.top + TIP) * UP + (self.rack.radius + 0.02) * LEFT
+        beside = self.foot + (self.rack.top + TIP_BELOW) * UP + (self.rack.radius + 0.02) * LEFT
         yield from jaw.poke(arm, beside, 0.15 * (0.2 * UP - LEFT), _after(arm.world, 4.0))
         yield from self._on_the_dome(arm)
 
@@ -362,7 +362,7 @@ class BowlTable(Scenario):
         yield on_table("the square", corners(self.goal, 0.0, 2 * [self.patch.size]))
         apart = gap(corners(self.foot, 0.0, 2 * [2 * rack.outer]), corners(self.goal, 0.0, 2 * [2 * bowl.radius]))
         yield require(apart > 0.01, "there is no room for the bowl beside the rack", apart=apart)
-        flat = bowl.foot - math.sqrt(2.0) * REACHES
+        flat = bowl.foot - math.sqrt(2.0) * CUP_HALF_WIDTH
         yield require(flat > 0.005, "the cup does not fit on the bowl's foot", room=flat)
         weight, lever = GRAVITY * bowl.mass, float(bowl.inertial()[0][2])
         yield require(TORQUE > 3 * weight * lever, "the bowl peels off the cup", torque=weight * lever, most=TORQUE)

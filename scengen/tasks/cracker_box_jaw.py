@@ -35,7 +35,7 @@ from ..geometry import UP, Mat3, Vec3, axes, gap
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
-from ..robots.jaw import OPENED, PALM_ABOVE, PALM_ALONG, pinch
+from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import carry, pick, poke, release
@@ -245,7 +245,7 @@ class CrackerBoxJaw(BoxAndSlot):
         yield on_table("the slot", self._outline)
         apart = gap(self._footprint, self._outline)
         yield require(apart > APART, "the box stands in the slot's place", apart=apart)
-        widest = OPENED - SPARE_GAP
+        widest = OPEN_GAP - SPARE_GAP
         yield require(thickness < widest, "the box is too thick for the jaw", thickness=thickness, most=widest)
         grip, weight = self.box.friction * pinch(thickness), GRAVITY * self.box.mass
         yield require(grip > HOLDS * weight, "the box slips out of the jaw", grip=grip, weight=weight)

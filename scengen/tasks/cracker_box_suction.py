@@ -35,7 +35,7 @@ from ..geometry import UP, Mat3, Vec3, axes, gap, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
-from ..robots.suction import PULL, REACHES, TORQUE
+from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import poke
@@ -221,7 +221,7 @@ class CrackerBoxSuction(BoxAndSlot):
     def _by_the_top(self, world: World) -> Plan:
         """Take the box by its top, turn the hand level, lower the box until something stops the hand, let go."""
         arm = world.arm
-        yield from self._take_top(arm, self.box.size[0] / 2 - REACHES)
+        yield from self._take_top(arm, self.box.size[0] / 2 - CUP_HALF_WIDTH)
         yield from retreat(arm, self.box.size[2] / 2, LIFTING)
         yield from turn_to(arm, axes(arm.hand_rot[:, 0], self.broad_face(world)[1]), TIPPING)
         with suppress(GaveUp):
@@ -233,7 +233,7 @@ class CrackerBoxSuction(BoxAndSlot):
         """Push the box at its top."""
         face, out = self.broad_face(world)
         high = world.pos("box")[2] + 0.9 * self.box.size[2]
-        start = np.array([*(face - (REACHES + 0.03) * out)[:2], high])
+        start = np.array([*(face - (CUP_HALF_WIDTH + 0.03) * out)[:2], high])
         yield from poke(world.arm, start, 0.15 * out, lambda: world.tilt("box") > KNOCKED)
 
     def _let_drop(self, world: World) -> Plan:

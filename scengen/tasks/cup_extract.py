@@ -42,7 +42,7 @@ from ..geometry import UP, Vec3, about_y, about_z, heading, polar
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
-from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP, TIPS_CLOSED, pinch
+from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP_BELOW, TIP_SPAN_CLOSED, pinch
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
@@ -184,11 +184,11 @@ class CupExtract(Scenario):
     def _reach_in(self, world: World) -> Plan:
         """Fingers as far apart as the mouth allows, down as far as the palm allows, close, lift, to the square."""
         arm, across = world.arm, world.rot("cup")[:, 1]
-        mouth = world.pos("cup") + (self.cup.height + TIP + 0.02) * UP
+        mouth = world.pos("cup") + (self.cup.height + TIP_BELOW + 0.02) * UP
         yield from go_to(arm, mouth, closing_along(arm, across), STEADY, OPEN)
-        narrow = 2 * (self.cup.rim - self.cup.wall - AIR) - TIPS_CLOSED
+        narrow = 2 * (self.cup.rim - self.cup.wall - AIR) - TIP_SPAN_CLOSED
         yield from until(grasp(arm, 1.0), lambda: arm.gap <= narrow)
-        yield from go_to(arm, mouth - (TIP + 0.02 + PALM_ABOVE - AIR) * UP, pace=FINE, grip=0.0)
+        yield from go_to(arm, mouth - (TIP_BELOW + 0.02 + PALM_ABOVE - AIR) * UP, pace=FINE, grip=0.0)
         yield from grasp(arm)
         yield from retreat(arm, 0.15)
         yield from go_to(arm, self.goal + 0.08 * UP)
@@ -236,7 +236,7 @@ class CupExtract(Scenario):
         yield require(beside >= AIR, "the palm does not fit between handle and cup", room=beside)
         narrowest = 2 * min(cup.base, cup.rim)
         yield require(narrowest > OPENING, "the jaw can span the cup", width=narrowest, jaw=OPENING)
-        room = cup.height - cup.floor - block.height - PALM_ABOVE - TIP
+        room = cup.height - cup.floor - block.height - PALM_ABOVE - TIP_BELOW
         yield require(room >= AIR, "the fingers come down to the block", room=room)
         air = min(cup.base, cup.rim) - max(cup.wall, cup.bead) - block.width / math.sqrt(2)
         yield require(air >= AIR, "the block sticks in the cup", room=air)
@@ -265,7 +265,7 @@ class CupExtract(Scenario):
         return {
             "handle_to_robot": math.remainder(math.radians(self.handle) - math.pi - towards, math.tau),
             "sliding_tilt": self.sliding_tilt,
-            "depth_over_fingers": self.cup.height / (PALM_ABOVE + TIP),
+            "depth_over_fingers": self.cup.height / (PALM_ABOVE + TIP_BELOW),
             "curve": self.cup.curve,
             "moment_over_pinch": moment / pinch(self.cup.bar),
             "goal_bearing": polar(self.goal - BASE)[0],

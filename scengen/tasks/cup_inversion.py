@@ -39,7 +39,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP, pinch
+from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
 from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
@@ -258,7 +258,7 @@ class CupInversion(Scenario):
         """Press both hands on the wall, half way up, lift the cup, roll both by half a turn, put it down."""
         middle, far = self.start + self.cup.height / 2 * UP, self.goal + (self.cup.height / 2 + 0.003) * UP
         beside, high = self.cup.outer(self.cup.height / 2), 0.2 * UP
-        hands = list(zip(world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0.0, TIP), strict=True))
+        hands = list(zip(world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0.0, TIP_BELOW), strict=True))
 
         def both(seconds: float, pose: Callable[[float], tuple[Vec3, float, float]]) -> Plan:
             """Place between the hands, way from there to each, and roll, against the share of the time."""

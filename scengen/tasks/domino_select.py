@@ -42,7 +42,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, about_z, heading
 from ..params import param
 from ..predicates import carried, displaced, touched_only
-from ..robots.jaw import FINGER, TIP
+from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
@@ -118,7 +118,7 @@ class DominoSelect(Scenario):
     def topple(self, world: World, tile: str) -> Plan:
         """Push a tile over along its chain with the closed finger tips, then step back."""
         piece = self.lanes.piece(tile)
-        behind = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER + 0.02) * self.u
+        behind = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER_ACROSS + 0.02) * self.u
         lean = max(TOPPLED, 1.3 * piece.tipping_angle)
         yield from poke(world.arm, behind, 0.08 * self.u, lambda: world.tilt(tile) > lean, above=0.08)
 
@@ -149,7 +149,7 @@ class DominoSelect(Scenario):
         """Take the intact chain's first tile, which may be touched, and knock its slab over with the tile's foot."""
         tile, slab = self.feet[f"tile_{self.intact}_0"], self.feet[f"slab_{self.intact}"]
         yield from pick(world.arm, tile + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
-        yield from go_to(world.arm, slab + (self.slab.height + TIP + 0.012) * UP - 0.04 * self.u)
+        yield from go_to(world.arm, slab + (self.slab.height + TIP_BELOW + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
     def answer(self) -> Answer:

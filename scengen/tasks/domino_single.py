@@ -25,7 +25,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, heading
 from ..params import param
 from ..predicates import carried, displaced, touched_only
-from ..robots.jaw import FINGER
+from ..robots.jaw import FINGER_ACROSS
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
@@ -87,8 +87,8 @@ class DominoSingle(Scenario):
         Behind any tile but the first the tips go into the middle of the gap.
         """
         tile = self.pieces[i]
-        room = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGER)
-        behind = self.spot(i) + 0.8 * tile.height * UP - (tile.thickness / 2 + FINGER + room) * self.u
+        room = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGER_ACROSS)
+        behind = self.spot(i) + 0.8 * tile.height * UP - (tile.thickness / 2 + FINGER_ACROSS + room) * self.u
 
         def falls() -> bool:
             return self._falling(world, i) or self._falling(world, i + 1)

@@ -37,7 +37,7 @@ from ..geometry import UP, Mat3, Outline, Vec3, between, corners
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, held
-from ..robots.jaw import OPENING, PAD, TIP, pinch, time_to_grip
+from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch, time_to_grip
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import grasp, pick
@@ -133,7 +133,7 @@ class EdgeSlide(Scenario):
         """
         arm, rot = world.arm, facing_down()  # the other way round joint 7 ends
         behind = min(float(corner @ self.out) for corner in self.underside(world))
-        start = self.contact(world) * self.along + (behind - 0.03) * self.out + (TABLE_TOP + TIP + 0.002) * UP
+        start = self.contact(world) * self.along + (behind - 0.03) * self.out + (TABLE_TOP + TIP_BELOW + 0.002) * UP
         yield from go_to(arm, start + 0.08 * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot, FINE)
         yield from self._push(world, lambda: overhang - self.overhang(world), rot, speed, last)
@@ -151,7 +151,7 @@ class EdgeSlide(Scenario):
             if world.time > end:
                 raise GaveUp(f"the plate was not over the edge after {PATIENCE:g} s")
             sideways = STEERING * (self.contact(world) - float(setpoint @ self.along))
-            rise = LEVELLING * (TABLE_TOP + TIP + HOVER * self.plate.thickness - arm.hand[2])
+            rise = LEVELLING * (TABLE_TOP + TIP_BELOW + HOVER * self.plate.thickness - arm.hand[2])
             velocity = (speed if left() > LAST else last) * self.out + sideways * self.along + rise * UP
             setpoint = setpoint + velocity * Loop.PERIOD
             yield steer(arm, setpoint, velocity, between(arm.hand_rot, rot), CLOSED)
@@ -199,14 +199,14 @@ class EdgeSlide(Scenario):
     def _close_from_above(self, world: World) -> Plan:
         """As if it were a block: over its middle, down, close across the shorter side, lift."""
         axis = 0 if self.plate.length < self.plate.width else 1
-        at = world.com("plate") + (self.plate.thickness / 2 + TIP) * UP
+        at = world.com("plate") + (self.plate.thickness / 2 + TIP_BELOW) * UP
         yield from pick(world.arm, at, world.rot("plate")[:, axis], lift=0.16)
 
     def _squeeze_corner(self, world: World) -> Plan:
         """A corner is narrow enough: down astride it, close, lift. The fingers slide off its two sides."""
         into, across = (world.rot("plate") @ np.array([1.0, sign, 0.0]) / math.sqrt(2) for sign in (1.0, -1.0))
         corner = world.com("plate") - world.rot("plate") @ [self.plate.length / 2, self.plate.width / 2, 0.0]
-        at = np.array([*corner[:2], TABLE_TOP + TIP + 0.001]) + ASTRIDE * into
+        at = np.array([*corner[:2], TABLE_TOP + TIP_BELOW + 0.001]) + ASTRIDE * into
         yield from pick(world.arm, at, across, lift=0.16)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:

@@ -195,7 +195,7 @@ class GalileoRampDrop(Scenario):
         # A hand that points down holds the ball on the incline by its middle.
         fall, centre, fits = math.tan(ramp.slope), self.ball.radius / math.cos(ramp.slope), ramp.width >= jaw.SPAN
         yield require(fits, "the open jaw does not fit between the walls", jaw=jaw.SPAN, width=ramp.width)
-        room = centre - jaw.TIP - jaw.FINGER * fall
+        room = centre - jaw.TIP_BELOW - jaw.FINGER_ACROSS * fall
         yield require(room >= 0.0, "the fingers meet the floor before the ball does", room=room)
         room = centre + jaw.PALM_ABOVE - jaw.PALM_ACROSS * fall - RIM / math.cos(ramp.slope)
         yield require(room >= 0.0, "the palm meets the walls before the ball meets the floor", room=room)

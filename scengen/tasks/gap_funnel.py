@@ -42,7 +42,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
-from ..robots.jaw import FINGER, OPENED, PALM_ACROSS, PALM_ALONG, TIP
+from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, pick, release
@@ -74,7 +74,7 @@ BEHIND, AIR = 0.03, 0.008
 """Of the hand behind the ball at first, and before the wall in the end [m]."""
 ROOM = 0.10
 """Way on which the hand gets as fast as the ball must be, at least [m]."""
-LOW = TIP + 0.010
+LOW = TIP_BELOW + 0.010
 """Height of the grip site over the table when it pushes [m]: at the ball's middle the fingers are flat."""
 OVER = 0.09
 """How far the hand rises over the ball [m]."""
@@ -173,7 +173,7 @@ class GapFunnel(Scenario):
         """
         arm, way = world.arm, (spot - world.com("ball")) * [1.0, 1.0, 0.0]
         along = way / np.linalg.norm(way)
-        start = world.com("ball") - (self.ball.radius + FINGER + BEHIND) * along
+        start = world.com("ball") - (self.ball.radius + FINGER_ACROSS + BEHIND) * along
         start[2] = TABLE_TOP + LOW
         side = np.array([-along[1], along[0], 0.0])
         rot = closing_along(arm, side)
@@ -237,7 +237,7 @@ class GapFunnel(Scenario):
     def constraints(self) -> Iterator[Refutation | None]:
         wide, gap = 2 * self.ball.radius, self.wall.gap
         yield require(wide * SPARE <= gap, "the ball does not fit through the gap", gap=gap, ball=wide)
-        yield require(wide + 0.010 <= OPENED, "the jaw cannot take the ball", ball=wide, opening=OPENED)
+        yield require(wide + 0.010 <= OPEN_GAP, "the jaw cannot take the ball", ball=wide, opening=OPEN_GAP)
         yield require(abs(self.offset) >= ASIDE, "the ball lies before the gap already", offset=self.offset)
         yield on_table("the ball", self.start, margin=self.ball.radius)
         jambs = [self.gap_at + side * gap * self.t for side in (-1, 1)]
@@ -309,7 +309,7 @@ class GapFunnel(Scenario):
     @property
     def needed(self) -> float:
         """Speed with which a ball that the hand lets go comes to rest in the middle of the zone [m/s]."""
-        return self.speed_for(self.run + self.stop - self.ball.radius - FINGER)
+        return self.speed_for(self.run + self.stop - self.ball.radius - FINGER_ACROSS)
 
     @property
     def arriving(self) -> float:

@@ -15,7 +15,7 @@ Decisions, where the paper (App. B, T20) is silent or cannot be meant as it is w
   between hand and target, in line with the zone.
 * Out of reach. The arm swings about a shoulder 0.445 m above the table, and a band before the far edge is beyond it.
   It is deep enough for a target, a way to go and a zone only towards the corners: hence the bearing near 20 deg.
-  Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.TOUCH`).
+  Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.GRIPPER_REACH`).
 * One block must not do: the zone begins beyond what the arm at full stretch reaches with one, by the triangle
   inequality and no search. Two do in training; three do, without stretching the arm to its limit, where the zone is
   farther or the blocks are smaller.
@@ -45,7 +45,7 @@ from ..params import check_bounds, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots import ik
-from ..robots.jaw import TIP
+from ..robots.jaw import TIP_BELOW
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.world import ROBOT, World
@@ -282,7 +282,7 @@ class IndirectPush(Scenario):
     def stretch(self) -> float:
         """How far the tips come in any posture, up to the height of a block's upper edge [m]: `panda.REACH`."""
         drop = SHOULDER[2] - TABLE_TOP - self.edge
-        return math.sqrt(REACH**2 - drop**2) + TIP
+        return math.sqrt(REACH**2 - drop**2) + TIP_BELOW
 
     @property
     def chosen(self) -> list[str]:
@@ -323,7 +323,7 @@ class IndirectPush(Scenario):
     @property
     def height(self) -> float:
         """Of the grip site when it pushes [m]: below the middle of a block, the tips 8 mm above the table."""
-        return TABLE_TOP + max(0.4 * self.edge, TIP + 0.008)
+        return TABLE_TOP + max(0.4 * self.edge, TIP_BELOW + 0.008)
 
     def at(self, distance: float) -> Vec3:
         """A place on the table along the bearing, by its distance from the robot's first axis [m]."""
@@ -358,4 +358,4 @@ class IndirectPush(Scenario):
     def out_of_touch(self) -> float:
         """How far at least any point of the gripper stays away from the target [m]; not positive if it may touch."""
         middle = self.at(self.distance) + self.edge / 2 * UP
-        return ik.box_shortfall(middle, about_z(self.turn), self.edge / 2, ik.TOUCH)
+        return ik.box_shortfall(middle, about_z(self.turn), self.edge / 2, ik.GRIPPER_REACH)

@@ -161,7 +161,7 @@ class LaunchedBall(Scenario):
     def grip(self) -> float:
         """Height of the grip site of a hand that takes the ball [m]: finger tips over the floor, palm over the ball."""
         centre, palm = self.ball.radius, 2 * self.ball.radius - jaw.PALM_ABOVE
-        return self.floor + max(centre, palm + AIR, jaw.TIP + AIR)
+        return self.floor + max(centre, palm + AIR, jaw.TIP_BELOW + AIR)
 
     @property
     def floor(self) -> float:

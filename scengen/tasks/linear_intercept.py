@@ -30,7 +30,7 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, between, polar, quat
 from ..params import param
-from ..physics import passes, rolled, rolling_slows
+from ..physics import passes, rolled, rolling_deceleration
 from ..robots import jaw
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require
@@ -190,7 +190,7 @@ class LinearIntercept(LaunchedBall):
     @property
     def slowing(self) -> float:
         """How fast it loses speed [m/s^2]."""
-        return rolling_slows(self.rolling)
+        return rolling_deceleration(self.rolling)
 
     @property
     def way_to_edge(self) -> float:

@@ -30,7 +30,7 @@ from ..assets.zone import Zone
 from ..geometry import UP, Outline, Vec3, corners, gap
 from ..params import check_bounds, param
 from ..predicates import fallen, rests_on, still
-from ..robots.jaw import OPENED, SPAN
+from ..robots.jaw import OPEN_GAP, SPAN
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put, release, weigh
@@ -191,7 +191,7 @@ class MassSort(Scenario):
         apart = min(heavier - lighter for lighter, heavier in pairwise(self.masses))
         yield require(apart >= APART, "two cubes weigh about the same, or not what their names say", apart=apart)
         yield require(self.order != 0, "the cubes lie in the order in which they belong", order=self.order)
-        yield require(self.edge + 0.008 <= OPENED, "the jaw cannot take a cube", edge=self.edge, opening=OPENED)
+        yield require(self.edge + 0.008 <= OPEN_GAP, "the jaw cannot take a cube", edge=self.edge, opening=OPEN_GAP)
         squares = [corners(self.zone_at(rank), 0.0, [self.zone.size] * 2) for rank in range(COUNT)]
         yield on_table("a cube or a zone", [*self.outlines, *squares])
         room = min(gap(one, other) for one, other in combinations(squares, 2)) + self.zone.size - self.edge
@@ -210,7 +210,7 @@ class MassSort(Scenario):
             "least_ratio": min(heavier / lighter for lighter, heavier in pairwise(self.masses)),
             "heaviest": self.heavy,
             "inversions": sum(a > b for a, b in combinations(self.ranks, 2)),
-            "air_over_opening": 1.0 - self.edge / OPENED,
+            "air_over_opening": 1.0 - self.edge / OPEN_GAP,
             "lightest_to_the_left": -1.0 if self.mirrored else 1.0,
         }
 

@@ -38,11 +38,11 @@ import numpy as np
 from ..assets.bar import Bar
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, corners
-from ..orientation import FACED, UPRIGHT, Orientation
+from ..orientation import UPRIGHT, VIEW_CENTRE, Orientation
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, held
-from ..robots.jaw import OPENED, PALM_ABOVE, TIP, pinch
+from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import pick
@@ -53,7 +53,7 @@ LIFTED = 0.04
 ASIDE = 0.12
 """How far from the cube the picture must show it at least [m]: the open jaw reaches 66 mm to either side of the hand,
 half a diagonal of the cube is 42 mm, so whoever goes there does not even touch it."""
-GRIP, LOWEST = 0.65, TIP + 0.004
+GRIP, LOWEST = 0.65, TIP_BELOW + 0.004
 """Where the cube is held: share of its height, and least height over the table [m]. Above its middle it hangs straight:
 below it the edges of the pads would be all that keeps it from turning."""
 ABOVE = 0.10
@@ -134,7 +134,7 @@ class MirrorPickPlace(Scenario):
         """Believing the picture, correcting it as training teaches, and not looking; without those that are right."""
         found = {
             "grasp_under_the_hand": Shortcut(lambda world: self._pick(world, self._below(world.arm.hand))),
-            "grasp_in_the_middle": Shortcut(lambda world: self._pick(world, self._below(FACED))),
+            "grasp_in_the_middle": Shortcut(lambda world: self._pick(world, self._below(VIEW_CENTRE))),
         }
         for name, taken_for in {"as_shown": UPRIGHT, "as_taught": TAUGHT}.items():
             if self.orientation != taken_for:
@@ -162,7 +162,7 @@ class MirrorPickPlace(Scenario):
     def constraints(self) -> Iterator[Refutation | None]:
         half, edge = self.cube.size[2] / 2, self.cube.edge
         yield on_table("the cube", corners(self.spot, math.radians(self.yaw), self.cube.size))
-        yield require(edge + ROOM < OPENED, "the cube is too wide for the jaw", edge=edge, jaw=OPENED)
+        yield require(edge + ROOM < OPEN_GAP, "the cube is too wide for the jaw", edge=edge, jaw=OPEN_GAP)
         shown = self._believed(UPRIGHT if self.orientation != UPRIGHT else TAUGHT)
         aside = float(np.linalg.norm(shown - self.spot))
         yield require(aside >= ASIDE, "the picture shows the cube about where it is", aside=aside, least=ASIDE)
@@ -174,10 +174,10 @@ class MirrorPickPlace(Scenario):
         """How far off the picture is [m], and what the jaw must do: how wide, how hard, how high; and across what."""
         return {
             "shown_aside": float(np.linalg.norm(self._believed(UPRIGHT) - self.spot)),
-            "edge_over_opening": self.cube.edge / OPENED,
+            "edge_over_opening": self.cube.edge / OPEN_GAP,
             "hold_over_weight": self.cube.friction * pinch(self.cube.edge) / (GRAVITY * self.cube.mass),
             "height_over_palm": self.cube.size[2] / PALM_ABOVE,
-            "length_over_opening": self.cube.size[1] / OPENED,
+            "length_over_opening": self.cube.size[1] / OPEN_GAP,
         }
 
     # --- geometry -------------------------------------------------------------------------

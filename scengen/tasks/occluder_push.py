@@ -41,7 +41,7 @@ from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap
 from ..params import check_bounds, param
 from ..predicates import fallen, over, rests_on, still
-from ..robots.jaw import FINGER, OPENED, SPAN, TIP
+from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, poke, put, release
@@ -58,7 +58,7 @@ STANDS = 0.01
 """Speed below which a cube stands [m/s]."""
 TOLERANCE = 1e-10
 """Solver tolerance: at MuJoCo's 1e-8 of the scene's inertia, mostly the arm's, cubes of 30 g under lids never rest."""
-LOW = TIP + 0.010
+LOW = TIP_BELOW + 0.010
 """Height of the grip site over the table while it pushes [m]: the tips are below the lid, the palm is 50 mm up."""
 GENTLE = 0.10
 """How fast a lid is pushed [m/s]."""
@@ -167,7 +167,7 @@ class OccluderPush(Scenario):
     def deliver(self, world: World, i: int) -> Plan:
         """Take a cube and put it down on the patch."""
         half = self.cube.edge / 2
-        at = self.foot(i) * [1.0, 1.0, 0.0] + (TABLE_TOP + max(half, TIP + 0.005)) * UP
+        at = self.foot(i) * [1.0, 1.0, 0.0] + (TABLE_TOP + max(half, TIP_BELOW + 0.005)) * UP
         at[:2] = world.com(self.cubes[i])[:2]
         yield from pick(world.arm, at, np.cross(UP, self.ways[i]), above=OVER, lift=OVER)
         yield from put(world.arm, self.cubes[i], self.goal + half * UP, on="table", hover=OVER)
@@ -233,7 +233,7 @@ class OccluderPush(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        edge, most = self.cube.edge, OPENED - 2 * AIR
+        edge, most = self.cube.edge, OPEN_GAP - 2 * AIR
         yield require(edge <= most, "the open jaw does not pass by a cube", edge=edge, most=most)
         yield require(self.shade > 0.0, "a camera sees part of a cube", shade=self.shade)
         fingers = self.lid.width - SPAN
@@ -330,7 +330,7 @@ class OccluderPush(Scenario):
 
     def swept(self, i: int, way: Vec3) -> Outline | None:
         """What hand and lid pass over when it is pushed along `way` [m]; None if that is not free."""
-        start, end = self.lid.width / 2 + BEHIND + FINGER, BEYOND + FINGER + self.lid.width
+        start, end = self.lid.width / 2 + BEHIND + FINGER_ACROSS, BEYOND + FINGER_ACROSS + self.lid.width
         yaw = math.atan2(way[1], way[0])
         middle = self.foot(i)
         area = corners(middle, yaw, [start + end, self.lid.width], [(end - start) / 2, 0.0])

@@ -49,7 +49,7 @@ from ..params import check_bounds, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside
 from ..robots.panda import WRIST_MIDDLE
-from ..robots.suction import PULL, REACHES
+from ..robots.suction import CUP_HALF_WIDTH, PULL
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, facing_down, go_to, retreat, until
@@ -243,7 +243,9 @@ class Packing(Scenario):
         area, floor = float(sum(slot.area for slot in self.slots)), float(self.footprint.area)
         yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=floor)
         narrow = min(min(piece.upright, piece.lying) for piece in self.pieces)
-        yield require(narrow >= 2 * REACHES, "an arm is too narrow for the cup", arm=narrow, cup=2 * REACHES)
+        yield require(
+            narrow >= 2 * CUP_HALF_WIDTH, "an arm is too narrow for the cup", arm=narrow, cup=2 * CUP_HALF_WIDTH
+        )
         weight = GRAVITY * max(piece.mass for piece in self.pieces)
         yield require(weight <= PULL / 2, "a piece is too heavy for the cup", weight=weight, most=PULL / 2)
         near = self._nearest()
@@ -314,7 +316,7 @@ class Packing(Scenario):
 
     def face(self, i: int) -> Vec3:
         """Where the cup takes piece `i`, in the axes of the piece [m]."""
-        return np.array([*self.pieces[i].hold(REACHES), self.thickness])
+        return np.array([*self.pieces[i].hold(CUP_HALF_WIDTH), self.thickness])
 
     def goal(self, i: int) -> tuple[Vec3, float]:
         """Position of piece `i` in its slot [m], and its yaw [rad]."""

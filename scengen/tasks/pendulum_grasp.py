@@ -222,7 +222,7 @@ class PendulumGrasp(Scenario):
         aside = pendulum.span * math.cos(math.radians(self.plane))
         yield require(aside >= HAND, "the posts leave no room for the hand", aside=aside, hand=HAND)
         yield require(width <= jaw.OPENING - 2 * AIR, "the bob is too wide for the jaw", width=width, jaw=jaw.OPENING)
-        at_reset = jaw.AT_RESET
+        at_reset = jaw.RESET_GAP
         yield require(MISSED * width < at_reset, "the jaw is too far closed at the start", width=width, jaw=at_reset)
         askew = math.radians(TILT - self.amplitude)
         room = jaw.PALM_ABOVE - jaw.PALM_ACROSS * math.tan(askew)

@@ -24,7 +24,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
 from ..predicates import fallen
-from ..robots.jaw import PALM_ABOVE, TIP
+from ..robots.jaw import PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Scenario
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw
@@ -166,7 +166,7 @@ class PlateAndSlot(Scenario):
             tilt: of the hand that takes it, below the level [rad].
         """
         world, radius, hand = taker.world, self.plate.radius, self.hand(tilt)
-        behind = self.start - (radius + 0.03) * self.outside + (0.75 * self.plate.rise + TIP) * UP
+        behind = self.start - (radius + 0.03) * self.outside + (0.75 * self.plate.rise + TIP_BELOW) * UP
         there = TABLE_HALF + 0.03 - radius
 
         def arrived() -> bool:
@@ -267,7 +267,7 @@ class PlateAndSlot(Scenario):
     @property
     def flat_tilt(self) -> float:
         """Least tilt of a hand whose finger tips hold the rim of the plate as it lies [rad]."""
-        return steepness(self.plate.rise + self.plate.thickness / 2, PALM_ABOVE + TIP)
+        return steepness(self.plate.rise + self.plate.thickness / 2, PALM_ABOVE + TIP_BELOW)
 
     def hand(self, tilt: float) -> Mat3:
         """A hand on that side, `tilt` below the level [rad], that closes up and down."""

@@ -42,8 +42,8 @@ from ..geometry import UP, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import PAD, TIP, TIPS_CLOSED, pinch
-from ..robots.suction import REACHES, TUBE
+from ..robots.jaw import PAD, TIP_BELOW, TIP_SPAN_CLOSED, pinch
+from ..robots.suction import CUP_HALF_WIDTH, TUBE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw, suction
@@ -139,7 +139,9 @@ class PlateShelf(PlateAndSlot):
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "cup_on_the_foot": Shortcut(lambda world: self._cup_alone(world, self.plate.foot - REACHES - 0.004, 0.0)),
+            "cup_on_the_foot": Shortcut(
+                lambda world: self._cup_alone(world, self.plate.foot - CUP_HALF_WIDTH - 0.004, 0.0)
+            ),
             "cup_on_the_lip": Shortcut(
                 lambda world: self._cup_alone(world, self.plate.radius - self.plate.lip / 2, self.plate.rise)
             ),
@@ -173,7 +175,7 @@ class PlateShelf(PlateAndSlot):
     def _cup_at_an_end(self, world: World) -> Plan:
         """Hold the plate on edge with the cup, on its left side, stand it half in the slot's left end, roll it in."""
         arm, rot = world.arms[0], about_z(math.radians(self.shelf_yaw)) @ FORWARDS
-        along, ahead, beside = rot[:, 1], rot[:, 2], self.plate.foot - REACHES - 0.006
+        along, ahead, beside = rot[:, 1], rot[:, 2], self.plate.foot - CUP_HALF_WIDTH - 0.006
         out = (self.shelf.length / 2 + TUBE - beside) * along
 
         def home() -> bool:
@@ -237,7 +239,7 @@ class PlateShelf(PlateAndSlot):
     def _jaw_alone(self, world: World) -> Plan:
         """Come down across the plate's lip with the jaw, and lift."""
         arm = world.arms[1]
-        rim = world.pos("plate") + (self.plate.radius - self.plate.lip) * LEFT + (self.plate.rise + TIP) * UP
+        rim = world.pos("plate") + (self.plate.radius - self.plate.lip) * LEFT + (self.plate.rise + TIP_BELOW) * UP
         yield from alone(arm, jaw.pick(arm, rim, closing=LEFT, lift=0.2))
         yield from alone(arm, go_to(arm, self.foot + (self.shelf.top + self.plate.radius + OVER) * UP))
         yield from alone(arm, jaw.release(arm))
@@ -274,11 +276,11 @@ class PlateShelf(PlateAndSlot):
         yield on_table("the shelf", self._outline)
         apart = gap(self._outline, corners(self.start, 0.0, 2 * [2 * plate.radius]))
         yield require(apart > 0.01, "plate and shelf stand in each other's place", apart=apart)
-        flat = plate.foot - math.sqrt(2.0) * REACHES
+        flat = plate.foot - math.sqrt(2.0) * CUP_HALF_WIDTH
         yield require(flat > 0.01, "the cup does not fit on the plate's foot", room=flat)
         yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
         beside = shelf.gap - AIR - plate.rise - plate.thickness / 2  # from the lip to the divider that is nearer to it
-        room = beside - (TIPS_CLOSED + plate.thickness) / 2
+        room = beside - (TIP_SPAN_CLOSED + plate.thickness) / 2
         yield require(room > 0.0, "the fingers that hold the lip meet the dividers", room=room)
         left = TUBE - self.proud  # the dividers stop the tube
         yield require(left > 2 * DEEP, "a cup on the lip puts the plate into the slot alone", left=left)

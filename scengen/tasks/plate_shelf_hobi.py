@@ -41,7 +41,7 @@ from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, sh
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import FINGER, PAD, PALM_ABOVE, TIP, pinch
+from ..robots.jaw import FINGER_ACROSS, PAD, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
@@ -133,8 +133,8 @@ class PlateShelfHobi(PlateAndSlot):
     def press(self, arm: Arm) -> Plan:
         """Press the rim to the table with closed fingers."""
         world, at = arm.world, self.start - (self.plate.radius - PRESS_AT) * self.outside
-        yield from go_to(arm, at + (self.plate.height + TIP + 0.03) * UP, facing_down(), STEADY, CLOSED)
-        below = go_to(arm, at + (self.plate.thickness + TIP - DEEPER) * UP, facing_down(), PRESSING, CLOSED)
+        yield from go_to(arm, at + (self.plate.height + TIP_BELOW + 0.03) * UP, facing_down(), STEADY, CLOSED)
+        below = go_to(arm, at + (self.plate.thickness + TIP_BELOW - DEEPER) * UP, facing_down(), PRESSING, CLOSED)
         yield from until(below, lambda: self.tilt(world) > PRESSED * self.plate.slope)
 
     def wait_beside(self, arm: Arm) -> Plan:
@@ -202,8 +202,8 @@ class PlateShelfHobi(PlateAndSlot):
         """Lift the plate between the fingers of both hands, lower it on the slot, let go."""
         pressing, taking = self.roles(world)
         out, across = self.outside, facing_down(math.pi / 2)
-        low, high = self.start + (self.plate.rise / 2 + TIP) * UP, self.foot[2] + self.shelf.top + TIP
-        beside = (self.plate.radius + FINGER) * out
+        low, high = self.start + (self.plate.rise / 2 + TIP_BELOW) * UP, self.foot[2] + self.shelf.top + TIP_BELOW
+        beside = (self.plate.radius + FINGER_ACROSS) * out
         away = self.foot - self.start - self.foot[2] * UP + self.start[2] * UP
 
         def go(arm: Arm, at: Vec3) -> Plan:
@@ -247,7 +247,7 @@ class PlateShelfHobi(PlateAndSlot):
         yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
         lean = math.atan2(self.slack, shelf.height)
         yield require(lean < 0.8 * LEAN, "the plate leans in the slot", lean=lean)
-        room = self.proud - OVERLAP - TIP
+        room = self.proud - OVERLAP - TIP_BELOW
         yield require(room > 0.0, "the fingers that hold the rim meet the dividers", room=room)
         askew, slips = self.flat_tilt - plate.slope, 2 * math.atan(plate.friction)
         yield require(askew > slips, "one jaw takes the plate from the table", askew=askew, slips=slips)

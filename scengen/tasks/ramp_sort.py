@@ -37,7 +37,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
-from ..robots.jaw import FINGER, PALM_ACROSS, PALM_ALONG, TIP
+from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
@@ -248,9 +248,9 @@ class RampSort(Scenario):
         yield require(rim > BIN_RIM, "the bins are higher than the end of the ramp", end=rim, rim=BIN_RIM)
         room = OVER - radius - float(ramp.surface(-ramp.length / 2, ramp.ridge)[2])
         yield require(room > 0.01, "balls are not carried over the ramp", room=room)
-        above = radius - TIP - SILL
+        above = radius - TIP_BELOW - SILL
         yield require(above > 0.0, "the finger tips meet the walls of the box", above=above)
-        beside = PITCH - radius - FINGER
+        beside = PITCH - radius - FINGER_ACROSS
         yield require(beside > 0.005, "a finger meets the next ball", beside=beside)
         yield on_table(
             "the ramp or the box", [self.outlines[0], corners([self.box_x, self.box_y], 0.0, self.box.outer)]

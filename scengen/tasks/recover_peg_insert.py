@@ -47,7 +47,7 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, axes, between, corners, gap, heading, polar, rotation
 from ..params import param
 from ..predicates import fallen, still
-from ..robots.jaw import FINGER, PALM_ABOVE, TIP
+from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
@@ -243,7 +243,7 @@ class RecoverPegInsert(Scenario):
             GaveUp: that took too long.
         """
         arm, foot, (rot, mouth) = world.arm, world.pos("peg"), self.slot(world)
-        behind = np.array([*foot[:2], mouth[2]]) - (FINGER + BEHIND) * rot[:, 0]
+        behind = np.array([*foot[:2], mouth[2]]) - (FINGER_ACROSS + BEHIND) * rot[:, 0]
         yield from go_to(arm, behind + 0.06 * UP, pace=COARSE, grip=CLOSED)
         yield from go_to(arm, behind, pace=FINE)
         yield from push(arm, SHOVING * rot[:, 0], lambda: self.progress(world) > HOME or self._close(world, 0.002))
@@ -252,7 +252,7 @@ class RecoverPegInsert(Scenario):
     def _close(self, world: World, spare: float) -> bool:
         """Whether the fingers are as near as that to the plane of the mouth [m]."""
         rot, mouth = self.slot(world)
-        return float((mouth - world.arm.hand) @ rot[:, 0]) < FINGER + spare
+        return float((mouth - world.arm.hand) @ rot[:, 0]) < FINGER_ACROSS + spare
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -315,14 +315,14 @@ class RecoverPegInsert(Scenario):
         yield require(wall < board.width / 2, "the board is narrower than its mouth", wall=wall, half=board.width / 2)
         room = board.centre + PALM_ABOVE - board.top
         yield require(room > 0.0, "the palm does not pass over the board", room=room)
-        into = peg.length - GRIP - FINGER - CLEAR - (board.depth - PLATE)
+        into = peg.length - GRIP - FINGER_ACROSS - CLEAR - (board.depth - PLATE)
         yield require(into > 0.0, "the fingers come to the board before the nose is in the back window", into=into)
         balance = board.depth - (HOME - 0.5) * peg.length
         yield require(balance > SAFE, "the peg's middle is behind the slot in the end", balance=balance)
         yield on_table("the board or the peg", self.outlines)
         apart = min(gap(self.outlines[0], turned) for turned in self.outlines[1:])
         yield require(apart > 0.08, "board and peg are in each other's way", apart=apart)
-        over = [self.mouth + (board.centre + TIP) * UP, self.foot + (peg.length + 0.05) * UP]
+        over = [self.mouth + (board.centre + TIP_BELOW) * UP, self.foot + (peg.length + 0.05) * UP]
         yield within_reach("the peg or the mouth", *over)
 
     def features(self) -> Mapping[str, float]:

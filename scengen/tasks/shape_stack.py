@@ -33,7 +33,7 @@ from ..assets.shape import CYLINDER, FRUSTUM, HEXAGON, STEEP, Shape
 from ..geometry import UP, Vec3, about_z
 from ..params import check_bounds, param
 from ..predicates import fallen, still
-from ..robots.jaw import OPENED, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP
+from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
@@ -49,7 +49,7 @@ BEYOND = 0.004
 """How far over the edge a shape's middle is let go, by who does not look for the one below [m]."""
 STANDS = 0.01
 """Speed below which a shape stands [m/s]."""
-LOWEST, CLEAR = TIP + 0.003, 0.004
+LOWEST, CLEAR = TIP_BELOW + 0.003, 0.004
 """Of the grip site over what a shape stands on; between a shape and the palm [m]."""
 BITE = 0.005
 """Of the cone's collar between the pads, at least [m]."""
@@ -202,7 +202,7 @@ class ShapeStack(Scenario):
         held = math.atan(max(piece.shape.friction for piece in pieces)) + SLACK
         yield require(held <= STEEP, "a shape may rest on the slope of the cone", slope=STEEP, needed=held)
         for shape in (piece.shape for piece in pieces):
-            yield require(shape.width + ROOM <= OPENED, "the jaw cannot take a shape", width=shape.width)
+            yield require(shape.width + ROOM <= OPEN_GAP, "the jaw cannot take a shape", width=shape.width)
             held = shape.collar - self.grip(shape) + PAD_BELOW if shape.pointed else BITE
             yield require(held >= BITE, "the jaw cannot hold the cone by its collar", held=held, needed=BITE)
         yield on_table("a shape", [piece.spot for piece in pieces], margin=0.05)

@@ -38,7 +38,7 @@ from ..assets.rack import STOREYS, TierRack
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
 from ..params import param
 from ..predicates import fallen, inside, still
-from ..robots.jaw import OPENED, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP
+from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, release
@@ -180,11 +180,11 @@ class ShelteredGrasp(Scenario):
         yield require(abs(self.along) <= self._farthest, "a wall is in the palm's way", along=self.along)
         room = rack.height - AT - PALM_ACROSS
         yield require(room >= AIR + RAISED, "a storey is too low for the hand", room=room)
-        room = rack.depth - self.depth - max(TIP, math.sqrt(2) * half)
+        room = rack.depth - self.depth - max(TIP_BELOW, math.sqrt(2) * half)
         yield require(room >= AIR, "the cube stands too near to the back", room=room)
         room = self.depth - math.sqrt(2) * half
         yield require(room >= 0.0, "the cube stands out of the rack", room=room)
-        across = OPENED - math.sqrt(2) * self.cube.edge
+        across = OPEN_GAP - math.sqrt(2) * self.cube.edge
         yield require(across >= AIR, "turned askew the cube is too wide for the jaw", across=across)
         low, high = AT - 0.02, AT + 0.03
         yield require(

@@ -43,7 +43,7 @@ from ..assets.incline import Incline, driven
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..geometry import UP, Vec3, about_z, yaw_of
 from ..params import check_bounds, param
-from ..physics import slid, slips_at
+from ..physics import slid, slip_angle
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
@@ -347,7 +347,7 @@ class SlideCatch(Scenario):
 
     def slips(self, lane: int, unsure: float = 0.0) -> float:
         """The slope at which the block of a lane begins to slide [rad], if it is by that share rougher than known."""
-        return slips_at(self.loads[lane].friction * (1.0 + unsure))
+        return slip_angle(self.loads[lane].friction * (1.0 + unsure))
 
     def lets_go(self, lane: int, unsure: float = 0.0) -> float:
         """When it does [s]."""

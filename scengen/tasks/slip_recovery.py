@@ -42,7 +42,7 @@ from ..geometry import UP, Vec3, heading
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
-from ..robots.jaw import OPENED, PALM_ABOVE, TIP
+from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
@@ -52,7 +52,7 @@ from ..skills.motion import Pace, go_to, retreat
 
 LIFTED, LOWERED = 0.05, 0.042
 """How far a thing must be lifted to count as carried, and how low it may sink then [m]: both more than `PALM_ABOVE` and
-`TIP` together."""
+`TIP_BELOW` together."""
 SLID = 0.04
 """How far in all the robot may push the thing over the table [m]; a grasp and a landing move it by less."""
 RAISED = 0.07
@@ -61,7 +61,7 @@ CALM, RESTED = 0.02, 0.2
 """Speed below which a thing counts as at rest [m/s], and for how long it must be so before it is taken again [s]."""
 BRISK = Pace(0.2, 0.01)
 """How fast the oracle carries."""
-LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP) / GRAVITY)
+LOST = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP_BELOW) / GRAVITY)
 """From the beginning of a slip until the thing is below the finger tips [s]: 20 ms to let go, then free fall."""
 FLOWN = 0.018
 """How far a thing flies that is lost at the oracle's pace [m]: 16 to 22 mm measured."""
@@ -245,11 +245,11 @@ class SlipRecovery(Scenario):
 
         Whoever guesses right needs not look whether it has slipped, nor when. Time allows for one guess.
         """
-        width = self.thing.row.width or OPENED
+        width = self.thing.row.width or OPEN_GAP
 
         def right(away: float) -> bool:
             lies = self.distance(0) + FLOWN if self.slips else math.inf
-            return self.slips == 1 and abs(away - lies) <= (OPENED - width) / 2
+            return self.slips == 1 and abs(away - lies) <= (OPEN_GAP - width) / 2
 
         return Answer(tuple(round(0.01 * k, 2) for k in range(2, 46)), self._guess, right, tries=1)
 

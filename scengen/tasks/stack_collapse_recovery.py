@@ -42,7 +42,7 @@ from ..control.loop import Loop
 from ..geometry import UP, Outline, Vec3, corners, gap, heading
 from ..params import check_bounds, param
 from ..predicates import fallen, still
-from ..robots.jaw import FINGER, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, SPAN, TIP
+from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, SPAN, TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
@@ -200,7 +200,7 @@ class StackCollapseRecovery(Scenario):
         """Take a cube by two of its sides, and lift it over the tower."""
         arm, half, at = world.arm, self.cubes[name].edge / 2, grips(world, name)[0].at
         high = max(extent(world, other, UP)[1] for other in NAMES) + half + OVER - at[2]
-        rise = half + TIP + CLEAR
+        rise = half + TIP_BELOW + CLEAR
         yield from go_to(arm, at + high * UP, pace=LEVEL, grip=OPEN)  # there it is seen how far the wrist can turn
         closing, turn = self.sides(world, name)
         rot = facing_down(hand_yaw(arm) + turn)
@@ -230,7 +230,10 @@ class StackCollapseRecovery(Scenario):
         air, yaw = math.inf, math.atan2(grip.closing[1], grip.closing[0])
         for other in NAMES:
             top = extent(world, other, UP)[1]
-            for bottom, size in ((-TIP, (SPAN, 2 * FINGER)), (PALM_ABOVE, (2 * PALM_ALONG, 2 * PALM_ACROSS))):
+            for bottom, size in (
+                (-TIP_BELOW, (SPAN, 2 * FINGER_ACROSS)),
+                (PALM_ABOVE, (2 * PALM_ALONG, 2 * PALM_ACROSS)),
+            ):
                 if other != name and top > grip.at[2] + bottom:
                     air = min(air, gap(corners(grip.at, yaw, size), self.outline(world, other)))
         return air

@@ -11,7 +11,7 @@ hook, pass it behind the cube on the side where its tip can catch, draw the cube
 
 Out of reach. The robot's own table is enough: the arm swings about a shoulder 0.445 m above it, and a band of 2 cm
 before the far edge, the corners aside, is beyond it. Scenarios are refuted unless *no part of the gripper* can touch
-the cube in any posture, by a bound that ignores joint limits (`ik.TOUCH`), so that no search has to be believed.
+the cube in any posture, by a bound that ignores joint limits (`ik.GRIPPER_REACH`), so no search has to be believed.
 
 The goal. The paper's "lift the cube above the table" has no numbers. Here: 4 cm above its height on the table, as in
 robosuite's Lift; held by the robot and by nothing else, the hook let go ("set the hook down, then grasp the cube and
@@ -38,7 +38,7 @@ from ..robots.jaw import OPENING
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.world import ROBOT, World
-from ..skills.hook import CLEAR, nearest_pull, pull, put_down, shortest_stretch, take_handle
+from ..skills.hook import HOOK_CLEARANCE, nearest_pull, pull, put_down, shortest_stretch, take_handle
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, OPEN, facing_down, go_to, push, retreat
 
@@ -181,7 +181,7 @@ class ToolRetrieve(Scenario):
         yield on_table("the hook", self.tool.corners @ turn.T + at)
         yield on_table("the cube", corners(self.spot, math.radians(self.cube_yaw), self.cube.size))
         gap, hand_at = self.out_of_touch, self._behind - self.stretch
-        yield require(gap > 0, "the arm may touch the cube without the hook", gap=gap, reach=ik.TOUCH)
+        yield require(gap > 0, "the arm may touch the cube without the hook", gap=gap, reach=ik.GRIPPER_REACH)
         yield require(hand_at <= ARM, "the hook is too short", hand_at=hand_at, arm=ARM)
         both, tip = self.cube.edge + self.hook.width, self.hook.tip
         yield require(both > OPENING, "the jaw can hold hook and cube together", both=both, jaw=OPENING)
@@ -226,7 +226,7 @@ class ToolRetrieve(Scenario):
     def out_of_touch(self) -> float:
         """How far at least any point of the gripper stays away from the cube [m]; not positive if it may touch."""
         turn = about_z(math.radians(self.cube_yaw))
-        return ik.box_shortfall(self.spot + self.half * UP, turn, self.half, ik.TOUCH)
+        return ik.box_shortfall(self.spot + self.half * UP, turn, self.half, ik.GRIPPER_REACH)
 
     @property
     def stretch(self) -> float:
@@ -236,4 +236,4 @@ class ToolRetrieve(Scenario):
     @property
     def _behind(self) -> float:
         """How far out the face that pulls is when it has passed the cube, whichever way the cube is turned [m]."""
-        return self.distance + self.half * math.sqrt(2) + CLEAR + self.tool.depth
+        return self.distance + self.half * math.sqrt(2) + HOOK_CLEARANCE + self.tool.depth

@@ -13,7 +13,7 @@ from scengen.assets.ycb import ITEMS, Banana, Bottle, Can, Carton, Item, Tin, Yc
 from scengen.errors import BadConfig
 from scengen.export.mesh import united
 from scengen.geometry import quat
-from scengen.robots.jaw import OPENED
+from scengen.robots.jaw import OPEN_GAP
 
 NAMES = [item.folder for item in ITEMS]
 ALL = pytest.mark.parametrize("index", range(len(ITEMS)), ids=NAMES)
@@ -99,9 +99,9 @@ def test_a_jaw_spans_it_where_it_says(index):
     low, high = np.split(np.array(united(item.prop).bounding_box()), 2)
     least = float((high - low)[:2].min())
     if item.width is None:
-        assert least > OPENED
+        assert least > OPEN_GAP
     elif item.name not in ("banana", "mug"):  # a jaw takes the one across its arc, the other by its handle
-        assert item.width == pytest.approx(least, abs=2e-4) and item.width < OPENED
+        assert item.width == pytest.approx(least, abs=2e-4) and item.width < OPEN_GAP
 
 
 @pytest.mark.parametrize("index", [i for i, item in enumerate(ITEMS) if isinstance(item.prop, Can | Carton | Tin)])

@@ -13,7 +13,7 @@ import numpy as np
 from scengen.assets.cage import lowered
 from scengen.errors import GaveUp
 from scengen.geometry import UP, heading, shortest
-from scengen.robots.jaw import TIP
+from scengen.robots.jaw import TIP_BELOW
 from scengen.scenario import Plan, Shortcut
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, grasp, pick, release
@@ -31,7 +31,7 @@ def _take_starter(self, world: World) -> Plan:
 def knock_slab_with_starter(self, world: World) -> Plan:
     """Carry the first tile over the chain and knock the slab over with it."""
     yield from _take_starter(self, world)
-    over = self.spot(self.count) + (self.slab.height + TIP + 0.012) * UP - 0.05 * self.u
+    over = self.spot(self.count) + (self.slab.height + TIP_BELOW + 0.012) * UP - 0.05 * self.u
     yield from go_to(world.arm, over, pace=STEADY)
     yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 

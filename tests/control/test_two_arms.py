@@ -88,7 +88,7 @@ def test_what_one_arm_does_in_the_air_is_nothing_to_the_other(pair: World) -> No
 def test_equal_actions_give_equal_paths_side_by_side(pair: World) -> None:
     both = paths(pair, np.hstack([waving(), waving()]))
     np.testing.assert_allclose(both[:, 0], both[:, 1], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(pair.arms[1].hand - pair.arms[0].hand, [0, 2 * panda.APART, 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pair.arms[1].hand - pair.arms[0].hand, [0, 2 * panda.ARM_OFFSET, 0], rtol=0, atol=1e-12)
 
 
 # --- bits ---------------------------------------------------------------------------------

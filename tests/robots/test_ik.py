@@ -102,7 +102,7 @@ def test_a_hand_that_points_down_reaches_760_mm_and_not_800_mm(away, reached):
 @settings(max_examples=150, deadline=None)
 def test_no_posture_leads_the_grip_site_or_the_gripper_beyond_its_bound(angles):
     assert ik.shortfall(grip_site(angles)[0]) < 0
-    assert farthest_of_gripper(angles) < ik.TOUCH
+    assert farthest_of_gripper(angles) < ik.GRIPPER_REACH
 
 
 def test_the_bounds_are_not_idle():
@@ -110,7 +110,7 @@ def test_the_bounds_are_not_idle():
     farthest = panda.SHOULDER + np.array([2.0, 0.0, 0.0])
     stretched = ik.reach(farthest)
     assert -0.04 < ik.shortfall(grip_site(stretched.angles)[0]) < 0
-    assert ik.TOUCH - 0.04 < farthest_of_gripper(stretched.angles) < ik.TOUCH
+    assert ik.GRIPPER_REACH - 0.04 < farthest_of_gripper(stretched.angles) < ik.GRIPPER_REACH
 
 
 @given(direction=st.tuples(*[st.floats(-1, 1)] * 3), away=st.floats(0.0, 0.5))
@@ -133,9 +133,9 @@ def test_a_box_is_missed_by_as_much_as_the_nearest_of_its_points(half, centre, y
     """The grid misses the nearest point by at most half the diagonal of a cell."""
     middle, rot = panda.SHOULDER + np.array(centre), about_z(yaw) @ about_y(tilt)
     grid = np.array(np.meshgrid(*[np.linspace(-1, 1, 11)] * 3)).reshape(3, -1).T * half
-    nearest = min(float(np.linalg.norm(middle + rot @ point - panda.SHOULDER)) for point in grid) - ik.TOUCH
-    assert nearest - 0.1 * float(np.linalg.norm(half)) - 1e-9 <= ik.box_shortfall(middle, rot, half, ik.TOUCH)
-    assert ik.box_shortfall(middle, rot, half, ik.TOUCH) <= nearest + 1e-9
+    nearest = min(float(np.linalg.norm(middle + rot @ point - panda.SHOULDER)) for point in grid) - ik.GRIPPER_REACH
+    assert nearest - 0.1 * float(np.linalg.norm(half)) - 1e-9 <= ik.box_shortfall(middle, rot, half, ik.GRIPPER_REACH)
+    assert ik.box_shortfall(middle, rot, half, ik.GRIPPER_REACH) <= nearest + 1e-9
 
 
 @pytest.mark.parametrize("half", [0.03, (0.03, 0.03, 0.03)])

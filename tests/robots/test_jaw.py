@@ -70,15 +70,15 @@ def test_gaps_are_those_of_the_pads(robot):
     travel = robot[0].joint(NAMES.finger_joints[0]).range[1]
     assert gap(robot, travel) == exactly(jaw.OPENING)
     assert gap(robot, 0.0) == exactly(-jaw.OVERLAP)
-    assert gap(robot, panda.FINGERS[0]) == exactly(jaw.AT_RESET)
+    assert gap(robot, panda.FINGERS[0]) == exactly(jaw.RESET_GAP)
 
 
 def test_open_and_closed_fingers_reach_as_far_as_is_said(robot):
     for apart, span in ((0.04, jaw.SPAN), (jaw.OVERLAP / 2, jaw.SPAN_CLOSED)):
         low, high = seen(robot, FINGERS, apart)
         assert high[0] - low[0] == exactly(span)
-        assert (-low[1], high[1]) == (exactly(jaw.FINGER), exactly(jaw.FINGER))
-        assert high[2] == exactly(jaw.TIP)
+        assert (-low[1], high[1]) == (exactly(jaw.FINGER_ACROSS), exactly(jaw.FINGER_ACROSS))
+        assert high[2] == exactly(jaw.TIP_BELOW)
 
 
 @pytest.mark.parametrize("pad", PADS)
@@ -99,7 +99,7 @@ def test_the_drive_is_the_models(robot):
     for name, motor, finger, tip in zip(NAMES.finger_joints, NAMES.finger_motors, FINGERS[::2], PADS, strict=True):
         actuator, joint = model.actuator(motor), model.joint(name)
         assert actuator.gainprm[0] == -actuator.biasprm[1] == jaw.STIFFNESS
-        assert actuator.forcerange.tolist() == [-jaw.STRONGEST, jaw.STRONGEST]
+        assert actuator.forcerange.tolist() == [-jaw.MAX_FORCE, jaw.MAX_FORCE]
         assert (joint.damping[0], joint.frictionloss[0]) == (jaw.DAMPING, jaw.FRICTION)
         mass = sum(model.body(NAMES.hand + body).mass[0] for body in (finger, tip))
         assert joint.armature[0] + mass == pytest.approx(jaw.INERTIA)
@@ -172,7 +172,7 @@ def test_force_and_times_of_a_grasp_and_a_release_are_those_of_the_functions(wid
     total = left + right
     assert total[-1] == pytest.approx(jaw.pinch(width), rel=0.015)
     assert left[-1] == pytest.approx(right[-1], rel=0.02)
-    start = jaw.OPENED + 0.0005  # it has crept on for half a second
+    start = jaw.OPEN_GAP + 0.0005  # it has crept on for half a second
     touch = times[np.flatnonzero((left > 0.0) & (right > 0.0))[0]]
     assert -0.005 < touch - jaw.time_to_touch(width, start) < 0.015  # a period, and what the law is uncertain by
     assert first(times, total > 0.95 * jaw.pinch(width)) < jaw.time_to_grip(width) + Loop.PERIOD
@@ -186,28 +186,28 @@ def test_times_from_the_half_open_jaw_of_a_reset(width):
     bench.offer()
     times, _, left, right, _ = bench.play(grasp(bench.arm, 0.6))
     touch = times[np.flatnonzero((left > 0.0) & (right > 0.0))[0]]
-    assert -0.005 < touch - jaw.time_to_touch(width, jaw.AT_RESET) < 0.015
-    assert first(times, left + right > 0.95 * jaw.pinch(width)) < jaw.time_to_grip(width, jaw.AT_RESET) + Loop.PERIOD
+    assert -0.005 < touch - jaw.time_to_touch(width, jaw.RESET_GAP) < 0.015
+    assert first(times, left + right > 0.95 * jaw.pinch(width)) < jaw.time_to_grip(width, jaw.RESET_GAP) + Loop.PERIOD
 
 
 def test_an_empty_jaw_opens_as_fast_as_is_said_and_then_creeps():
     bench = Bench(0.02)
-    for start, before in ((jaw.AT_RESET, 0.0), (0.0, 2.0)):
+    for start, before in ((jaw.RESET_GAP, 0.0), (0.0, 2.0)):
         bench.play(grasp(bench.arm, before))
         times, gaps, *_ = bench.play(release(bench.arm, 1.0))
         for wanted in (0.050, 0.060, 0.070, 0.075):
             there = float(np.interp(wanted, gaps, times))
             assert there == pytest.approx(jaw.time_to_open(wanted, start), abs=0.006)
-        assert np.interp(0.5, times, gaps) == pytest.approx(jaw.OPENED, abs=0.001)
-        assert jaw.OPENED < gaps[-1] < jaw.OPENED + 0.001
-    assert jaw.time_to_open(jaw.OPENED) == jaw.time_to_touch(0.001) == math.inf
+        assert np.interp(0.5, times, gaps) == pytest.approx(jaw.OPEN_GAP, abs=0.001)
+        assert jaw.OPEN_GAP < gaps[-1] < jaw.OPEN_GAP + 0.001
+    assert jaw.time_to_open(jaw.OPEN_GAP) == jaw.time_to_touch(0.001) == math.inf
 
 
 @pytest.mark.parametrize("width", [0.013, 0.070])
 def test_the_moves_squeeze_and_let_go_for_long_enough(width):
     """`SQUEEZE` covers 13 mm, the thinnest thing that it is meant for, and `LET_GO` the widest that the jaw takes."""
     assert jaw.time_to_grip(0.013) <= SQUEEZE < jaw.time_to_grip(0.011)
-    assert jaw.time_to_free(jaw.OPENED) + 2 * Loop.PERIOD <= LET_GO
+    assert jaw.time_to_free(jaw.OPEN_GAP) + 2 * Loop.PERIOD <= LET_GO
     bench = Bench(width)
     bench.play(release(bench.arm, 1.0))
     bench.offer()

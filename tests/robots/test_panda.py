@@ -14,7 +14,7 @@ POSTURES = 60
 """Angles of each joint."""
 
 
-@pytest.mark.parametrize("one, other", panda.NEVER_TOUCH)
+@pytest.mark.parametrize("one, other", panda.CONTACT_FREE_LINKS)
 def test_links_whose_contacts_are_left_out_never_touch(one, other):
     spec = mujoco.MjSpec()
     panda.attach(spec)

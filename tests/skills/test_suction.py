@@ -13,7 +13,7 @@ from scengen.errors import GaveUp
 from scengen.geometry import UP, yaw_of
 from scengen.physics import GRAVITY
 from scengen.robots import suction
-from scengen.robots.suction import LENGTH, PAD, PITCH, PULL, REACHES, TORQUE
+from scengen.robots.suction import CUP_HALF_WIDTH, LENGTH, PAD, PITCH, PULL, TORQUE
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, SUCTION, World
 from scengen.skills.jaw import release
@@ -140,7 +140,7 @@ def test_four_pads_cover_a_square_of_27_mm_around_the_grip_site_in_the_plane_of_
     middles = np.array([world.data.geom(name).xpos for name in names])
     away = (middles - world.arm.hand) @ world.arm.hand_rot
     sizes = np.array([world.model.geom(name).size for name in names])
-    assert np.abs(away[:, :2]).max() + sizes[:, :2].max() == pytest.approx(REACHES) == 0.0135
+    assert np.abs(away[:, :2]).max() + sizes[:, :2].max() == pytest.approx(CUP_HALF_WIDTH) == 0.0135
     assert away[:, 2] + sizes[:, 2] == pytest.approx(0.0, abs=1e-9)
 
 
@@ -149,7 +149,7 @@ def test_a_piece_is_taken_up_and_carried_to_a_pose(turn):
     scene, piece = table(), LPiece()
     place(scene, piece, "piece", [0.0, 0.1, TABLE_TOP])
     world = World.load(scene_text.emit(scene)[0], SUCTION)
-    arm, spot = world.arm, np.array([*piece.hold(REACHES), piece.thickness])
+    arm, spot = world.arm, np.array([*piece.hold(CUP_HALF_WIDTH), piece.thickness])
     play(world, go_to(arm, world.pos("piece") + spot + 0.03 * UP, facing_down(), grip=OPEN))
     play(world, suck(arm, world.pos("piece") + spot, facing_down()))
     play(world, retreat(arm, 0.05))

@@ -21,7 +21,7 @@ from scengen import config
 from scengen.geometry import UP, about_z, axes
 from scengen.params import values, with_values
 from scengen.robots import suction
-from scengen.robots.suction import REACHES, TORQUE
+from scengen.robots.suction import CUP_HALF_WIDTH, TORQUE
 from scengen.tasks.cracker_box_suction import BREAKS, FLAT, HIGH, OFF, CrackerBoxSuction
 
 TASK = config.task("cracker_box_suction")
@@ -108,7 +108,7 @@ def test_a_cup_on_a_side_face_meets_the_slots_wall_while_the_box_has_a_centimetr
     (bellows,) = (
         geom.size[0] for geom in mujoco.MjSpec.from_string(suction.xml()).geoms if geom.name == "hand_collision_2"
     )
-    lowest = scenario.box.size[0] - REACHES - bellows
+    lowest = scenario.box.size[0] - CUP_HALF_WIDTH - bellows
     assert scenario.slot.depth - lowest > 0.01
 
 

@@ -20,7 +20,7 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, heading, quat
 from scengen.params import with_values
 from scengen.physics import GRAVITY
-from scengen.robots.jaw import PALM_ABOVE, TIP, pinch
+from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW, pinch
 from scengen.sim.world import ROBOT
 from scengen.tasks.cup_extract import AIR, TAPER, CupExtract
 
@@ -66,7 +66,7 @@ def test_the_fingers_end_above_the_block_and_the_palm_on_the_rim():
     w = load(TASK, NOMINAL)
     assert play_shortcut(TASK, NOMINAL, "reach_in", w).reason == "everything came to rest without reaching the goal"
     assert not w.touched(ROBOT, "block")
-    assert NOMINAL.cup.height - NOMINAL.cup.floor - NOMINAL.block.height > PALM_ABOVE + TIP + AIR
+    assert NOMINAL.cup.height - NOMINAL.cup.floor - NOMINAL.block.height > PALM_ABOVE + TIP_BELOW + AIR
 
 
 def test_in_a_shallow_cup_the_fingers_would_take_the_block():

@@ -21,7 +21,7 @@ from scengen import config
 from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.robots import ik
-from scengen.robots.jaw import TIP
+from scengen.robots.jaw import TIP_BELOW
 from scengen.robots.panda import BASE
 from scengen.sim.world import ROBOT
 from scengen.tasks.indirect_push import COASTING, FRONT, INSIDE, ZONE, IndirectPush, Spot
@@ -58,7 +58,7 @@ def test_the_chain_stands_in_contact_between_hand_and_target_when_the_push_ends(
 
 @pytest.mark.parametrize(("beyond", "reached"), [(-0.010, True), (0.004, False)])
 def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do(beyond, reached):
-    top = NOMINAL.at(NOMINAL.stretch - TIP + beyond) + NOMINAL.edge * UP
+    top = NOMINAL.at(NOMINAL.stretch - TIP_BELOW + beyond) + NOMINAL.edge * UP
     assert (ik.reach(top).residual < 0.001) == reached
 
 

@@ -25,7 +25,7 @@ from scengen.errors import BadConfig
 from scengen.export import recording
 from scengen.export.lerobot import DataSet
 from scengen.export.recording import record
-from scengen.orientation import FACED
+from scengen.orientation import VIEW_CENTRE
 from scengen.pool import pool
 from scengen.pool.pool import Pool
 from scengen.runs.generate import row_of
@@ -80,7 +80,7 @@ def test_gymnasium_turns_every_picture_by_half_bit_by_bit_and_nothing_else(pools
     for name in set(POSES) - {"seen_cube_pos"}:
         assert (turned[name] == plain[name]).all()
     assert plain["seen_cube_pos"] == pytest.approx(plain["cube_pos"])
-    assert turned["seen_cube_pos"][:2] == pytest.approx(2 * FACED - plain["cube_pos"][:2])
+    assert turned["seen_cube_pos"][:2] == pytest.approx(2 * VIEW_CENTRE - plain["cube_pos"][:2])
 
 
 @WITH_EYES

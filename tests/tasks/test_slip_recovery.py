@@ -22,7 +22,7 @@ from scengen.assets.ycb import Ycb
 from scengen.control.loop import Loop
 from scengen.episode import Episode
 from scengen.geometry import UP
-from scengen.robots.jaw import PALM_ABOVE, TIP
+from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW
 from scengen.sim.world import ROBOT
 from scengen.skills.grip import extent
 from scengen.skills.motion import go_to
@@ -50,7 +50,7 @@ def history():
     def look(w):
         top = extent(w, "thing", UP)[1]
         held = w.touching(ROBOT, "thing")
-        return w.time, w.memory["slips"], w.com("thing"), held, w.arm.hand[2] - TIP - top, w.memory["jam_ends"]
+        return w.time, w.memory["slips"], w.com("thing"), held, w.arm.hand[2] - TIP_BELOW - top, w.memory["jam_ends"]
 
     return watched(NOMINAL, NOMINAL.oracle, look)
 
@@ -77,7 +77,7 @@ def test_what_slips_falls_freely_and_is_below_the_finger_tips_before_the_shortes
 
 
 def test_carried_means_higher_than_a_jaw_can_hold_a_thing_under_its_top():
-    assert LIFTED > LOWERED > PALM_ABOVE + TIP
+    assert LIFTED > LOWERED > PALM_ABOVE + TIP_BELOW
 
 
 def test_the_thing_flies_on_as_far_as_guesses_reckon(history):
