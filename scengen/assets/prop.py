@@ -147,10 +147,10 @@ def _look(scene: mujoco.MjSpec) -> None:
     """Sky, lights and the cameras of robosuite's TableArena, for pictures only."""
     sky = scene.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64)
     sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
-    sky.rgb1, sky.rgb2 = [0.9, 0.9, 1.0], [0.45, 0.52, 0.62]
+    sky.rgb1, sky.rgb2 = np.array([0.9, 0.9, 1.0]), np.array([0.45, 0.52, 0.62])
     visual = getattr(scene.visual, "global")
     visual.offwidth, visual.offheight = 1280, 960
-    scene.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    scene.visual.headlight.ambient = np.full(3, 0.35, np.float32)
     scene.visual.map.znear = 0.001
     world = scene.worldbody
     world.add_light(pos=[0.6, -0.8, 2.4], dir=[-0.3, 0.4, -1.2], diffuse=[0.6, 0.6, 0.6], castshadow=True)
@@ -182,7 +182,8 @@ def place(
         yaw: about the vertical [rad].
         turn: orientation instead of that (wxyz).
     """
-    frame = scene.worldbody.add_frame(pos=np.asarray(pos), quat=quat("z", yaw) if turn is None else np.asarray(turn))
+    orientation = quat("z", yaw) if turn is None else np.asarray(turn).tolist()
+    frame = scene.worldbody.add_frame(pos=np.asarray(pos).tolist(), quat=orientation)
     body = frame.attach_body(asset.spec().body("body"), f"{name}/", "")
     body.name = name
     if free:

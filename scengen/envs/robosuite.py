@@ -116,21 +116,17 @@ class RobosuiteEnv(ManipulationEnv):
             ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite;
                 pictures that are seen turned by a quarter are not square.
         """
-        check_filter(action_filter)
-        if action_filter and control_freq != round(1 / Loop.PERIOD):
-            raise BadConfig(f"action_filter = {action_filter}; it is defined for control_freq=100, not {control_freq}")
+        _check_filter_rate(action_filter, control_freq)
         if reward_shaping:
             raise BadConfig("reward_shaping = True; the only reward is that of the goal: say reward_shaping=False")
-        self.action_filter, self.reward_scale = action_filter, reward_scale
+        self.action_filter, self.reward_scale, self.use_object_obs = action_filter, reward_scale, use_object_obs
         self.task = config.task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
-        grippers = [GRIPPERS[hand] for hand in all_hands(self.task.embodiment)]
-        if gripper_types != "default" and _listed(gripper_types) != grippers:
-            self._refuse("gripper_types", _listed(gripper_types), grippers)
-        self.use_object_obs, self._seen = use_object_obs, None
+        grippers = self._certified_grippers(gripper_types)
+        self._object_state: NDArray[np.float64] | None = None
         if use_object_obs:
             bodies = bodies_of(self.task, _scenes(self._choice))
-            self.objects = ObjectState(bodies, len(hands(self.task.embodiment)))
+            self.objects = ObjectState(bodies, self._driven)
         super().__init__(
             robots=[ROBOT] * len(grippers) if robots is None else robots,
             gripper_types=grippers,  # type: ignore[arg-type]
@@ -158,7 +154,7 @@ class RobosuiteEnv(ManipulationEnv):
     @property
     def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Least and largest action: of the arms that actions drive. Those of the scene's own get theirs from it."""
-        low, high = super().action_spec
+        low, high = map(np.asarray, super().action_spec)
         return low[: self.action_dim], high[: self.action_dim]
 
     @property
@@ -170,6 +166,17 @@ class RobosuiteEnv(ManipulationEnv):
     def _driven(self) -> int:
         """How many robots actions drive."""
         return len(hands(self.task.embodiment))
+
+    def _certified_grippers(self, gripper_types: str | Sequence[str]) -> list[str]:
+        """robosuite's names of the hands that the task asks for, one for each arm.
+
+        Raises:
+            BadConfig: other hands were given.
+        """
+        grippers = [GRIPPERS[hand] for hand in all_hands(self.task.embodiment)]
+        if gripper_types != "default" and _listed(gripper_types) != grippers:
+            self._refuse("gripper_types", _listed(gripper_types), grippers)
+        return grippers
 
     def _check_success(self) -> bool:
         """Whether the goal has been reached, and nothing forbidden has happened since."""
@@ -262,7 +269,7 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _update_observables(self, force: bool = False) -> None:
         """After every physics step; forced, after a reset."""
-        self._seen = None
+        self._object_state = None
         super()._update_observables(force)
         if not force:
             self._substep = (self._substep + 1) % self.world.loop.substeps
@@ -307,9 +314,9 @@ class RobosuiteEnv(ManipulationEnv):
         def reading(where: slice) -> Callable[[Any], NDArray[np.float64]]:
             @sensor(modality="object")
             def part(_: Any) -> NDArray[np.float64]:
-                if self._seen is None:  # once for all readings of a moment
-                    self._seen = self.objects.read(self.world)
-                return self._seen[where]
+                if self._object_state is None:  # once for all readings of a moment
+                    self._object_state = self.objects.read(self.world)
+                return self._object_state[where]
 
             return part
 
@@ -346,6 +353,13 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
         return known
     about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
     return type(name, (RobosuiteEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
+
+
+def _check_filter_rate(action_filter: str | None, control_freq: int) -> None:
+    """Raise `ScengenError` if there is no such filter, or if it is not defined for this rate."""
+    check_filter(action_filter)
+    if action_filter and control_freq != round(1 / Loop.PERIOD):
+        raise BadConfig(f"action_filter = {action_filter}; it is defined for control_freq=100, not {control_freq}")
 
 
 def _listed(names: str | Sequence[str]) -> list[str]:

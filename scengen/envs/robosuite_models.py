@@ -76,7 +76,7 @@ class SceneTask(ManipulationTask):
             self.root.extend(scene.root.findall(tag))
         for robot in robots:
             for one, other in panda.CONTACT_FREE_LINKS:
-                names = {"body1": robot.correct_naming(one), "body2": robot.correct_naming(other)}
+                names = {"body1": str(robot.correct_naming(one)), "body2": str(robot.correct_naming(other))}
                 self.contact.append(Element("exclude", names))
 
 
