@@ -6,7 +6,8 @@ from rich.table import Table
 
 from ..config import read_task
 from ..errors import UnknownName, at_least
-from ..ood.discover import LEAST, METHODS, Finding, Search, Settings, as_yaml, discover
+from ..ood.discovery.proposal import Finding
+from ..ood.discovery.search import METHODS, MIN_BUDGET, DiscoverSettings, SearchResult, discover
 from ..runs.progress import ProgressBar
 from ..samplers.axis import spell
 from ..work.targets import try_folder
@@ -14,8 +15,8 @@ from . import OK, Arguments, err, out, say, write
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, checks = read_task("discover", arguments, Settings)
-    at_least(settings, budget=LEAST, seed=0, workers=1)
+    settings, task, checks = read_task("discover", arguments, DiscoverSettings)
+    at_least(settings, budget=MIN_BUDGET, seed=0, workers=1)
     if settings.method not in METHODS:
         raise UnknownName("method", settings.method, METHODS)
     folder = Path(settings.to or f"generated/discover/{task.name}")
@@ -27,13 +28,13 @@ def command(arguments: Arguments) -> int:
 
         search = discover(task, checks, settings, folder, progress)
     out.print(_table(task.name, search))
-    say("trials: " + ", ".join(f"{count} {what}" for what, count in (search.stages | search.spent).items()))
-    write(folder / "axes.yaml", as_yaml(task, search))
+    say("trials: " + ", ".join(f"{count} {what}" for what, count in search.spent.items()))
+    write(folder / "axes.yaml", search.as_yaml(task))
     say(f"wrote {folder / 'axes.yaml'}: copy what says something into the task file, and measure it with scengen axis")
     return OK
 
 
-def _table(task: str, search: Search) -> Table:
+def _table(task: str, search: SearchResult) -> Table:
     table = Table(title=f"{task}: {len(search.findings)} axes confirmed", title_justify="left")
     for title in ("axis", "values", "seen", "fails outside", "solved within", "p (Holm)", "in the task file"):
         table.add_column(title)

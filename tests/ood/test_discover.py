@@ -10,9 +10,22 @@ from scipy import stats
 
 from scengen import cli, config
 from scengen.errors import BadConfig
-from scengen.ood import discover as module
-from scengen.ood.discover import BREAKS, HOLDS, INFEASIBLE, Settings, _hypercube, _Trials, as_yaml, discover
-from scengen.ood.regions import located, regions
+from scengen.ood import behaviour
+from scengen.ood.discovery import candidates, confirmation, proposal
+from scengen.ood.discovery.regions import located, regions
+from scengen.ood.discovery.search import DiscoverSettings, discover
+from scengen.ood.discovery.trial import (
+    BREAKS,
+    CONFIRM,
+    HOLDS,
+    INFEASIBLE,
+    Box,
+    Place,
+    Point,
+    Range,
+    Trial,
+    TrialRunner,
+)
 from scengen.samplers.axis import Axis
 from scengen.samplers.dists import Fixed, parse
 from scengen.samplers.support import distance
@@ -40,14 +53,14 @@ def test_every_range_of_places_of_every_region_can_be_an_axis(name):
     task = config.task(name)
     for region in regions(task):
         for low, high in ((0.0, 0.0), (0.0, 1.0), (0.1, 0.6), (0.4, 0.9)):
-            dist = module._dist(region, low, high)
+            dist = proposal.distribution(region, low, high)
             task.prove(Axis("found", "", "", {region.parameter.name: dist}))
-            assert parse("axis", module._plain(dist)) == dist
+            assert parse("axis", proposal.plain(dist)) == dist
 
 
 def test_a_range_through_the_seam_of_a_circle_has_both_its_sides():
     turn = next(r for r in regions(config.task("packing")) if r.name == "spot_1_turn_from_minus_50")
-    there = module._dist(turn, 0.15, 0.9)
+    there = proposal.distribution(turn, 0.15, 0.9)
     assert there.parts[0].high == 180.0 and there.parts[1].low == -180.0
     middle = turn.value(0.6)
     assert any(part.low <= middle <= part.high for part in there.parts)
@@ -63,16 +76,16 @@ def test_regions_lie_between_training_values_and_beyond_them():
 
 def test_a_hypercube_uses_every_region_alike_and_spreads_its_places():
     reaches = {k: (0.0, 1.0) for k in range(len(KNOWN))}
-    points = [point for point, _ in _hypercube(30 * len(KNOWN), reaches, np.random.default_rng(0))]
+    points = candidates.hypercube(30 * len(KNOWN), reaches, np.random.default_rng(0))
     uses = [sum(i == k for point in points for i, _ in point) for k in range(len(KNOWN))]
-    assert max(uses) - min(uses) <= 2 and {len(point) for point in points} == {1, 2}
+    assert max(uses) - min(uses) <= 2 and {len(point.places) for point in points} == {1, 2}
     places = sorted(place for point in points for i, place in point if i == 0)
     assert all(abs(place - (k + 0.5) / len(places)) <= 0.5 / len(places) + 1e-6 for k, place in enumerate(places))
 
 
 def test_a_point_far_out_is_in_the_outer_quarter_of_what_is_feasible_or_in_the_middle_between_training_values():
     reaches = {k: (0.0, 0.5) for k in range(len(KNOWN))}
-    points = dict(point[0] for point, _ in module._far(KNOWN, reaches, np.random.default_rng(0)))
+    points = dict(point.places[0] for point in candidates.far_points(KNOWN, reaches, np.random.default_rng(0)))
     assert points.keys() == reaches.keys()
     for k, place in points.items():
         low, high = (0.375, 0.5) if KNOWN[k].beyond else (0.1875, 0.3125)
@@ -84,22 +97,22 @@ def planted(monkeypatch):
     """A world in which the memory fails where the starter is low but not too low, or both heavy and stout."""
 
     def outcome(self, trained, memory, point):
-        place = {self.known[int(i)].name: p for i, p in point}
+        place = {self.known[i].name: p for i, p in point}
         if 0.8 < place.get("starter_height_low", 0.0):
             return INFEASIBLE
         pair = place.get("starter_mass_high", 0) > 0.2 and place.get("starter_thickness_high", 0) > 0.2
         return BREAKS if place.get("starter_height_low", 0.0) > 0.4 or pair else HOLDS
 
-    monkeypatch.setattr(_Trials, "twin", lambda self, number: (TASK.family(), None))
-    monkeypatch.setattr(_Trials, "outcome", outcome)
-    monkeypatch.setattr(_Trials, "feasible", lambda *args: outcome(args[0], args[1], None, args[2]) != INFEASIBLE)
-    monkeypatch.setattr(module.behaviour, "moved_within", lambda *_: TASK.family())
-    monkeypatch.setattr(module.behaviour, "follows", lambda *_: True)
+    monkeypatch.setattr(TrialRunner, "twin", lambda self, number: (TASK.family(), None))
+    monkeypatch.setattr(TrialRunner, "outcome", outcome)
+    monkeypatch.setattr(TrialRunner, "feasible", lambda *args: outcome(args[0], args[1], None, args[2]) != INFEASIBLE)
+    monkeypatch.setattr(behaviour, "moved_within", lambda *_: TASK.family())
+    monkeypatch.setattr(behaviour, "follows", lambda *_: True)
 
 
 @pytest.mark.slow
 def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
-    search = discover(TASK, QUICK, Settings(budget=400), tmp_path)
+    search = discover(TASK, QUICK, DiscoverSettings(budget=400), tmp_path)
     names = {finding.axis.name for finding in search.findings}
     assert "starter_height_low" in names, "the planted one"
     assert names <= {"starter_height_low", "starter_thickness_high_and_starter_mass_high"}, "and no accident"
@@ -117,14 +130,14 @@ def test_a_planted_axis_is_found_and_nothing_else(planted, tmp_path):
 @pytest.mark.slow
 def test_a_memory_that_is_often_weak_is_judged_by_the_twins_in_which_it_is_not(planted, tmp_path, monkeypatch):
     fails = iter(range(10_000))
-    monkeypatch.setattr(module.behaviour, "follows", lambda *_: next(fails) % 2 == 0)  # in every other control
-    search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
+    monkeypatch.setattr(behaviour, "follows", lambda *_: next(fails) % 2 == 0)  # in every other control
+    search = discover(TASK, QUICK, DiscoverSettings(budget=400, method="hypercube"), tmp_path)
     found = next(f for f in search.findings if f.axis.name == "starter_height_low")
     assert (found.confirmed, found.fresh, found.controls) == (20, 20, 20) and 8 <= found.within <= 12 and found.p < 0.05
 
 
 def test_what_no_twin_allows_costs_no_trial(planted, tmp_path):
-    search = discover(TASK, QUICK, Settings(budget=200, method="hypercube"), tmp_path)
+    search = discover(TASK, QUICK, DiscoverSettings(budget=200, method="hypercube"), tmp_path)
     low = next(k for k, region in enumerate(KNOWN) if region.name == "starter_height_low")
     places = [
         place
@@ -133,35 +146,37 @@ def test_what_no_twin_allows_costs_no_trial(planted, tmp_path):
         if k == low and json.loads(line)["stage"] in ("far", "hypercube")
     ]
     assert places and max(places) <= 0.8125, "the region ends at the step in which the last twin is feasible"
-    assert search.spent.get(INFEASIBLE, 0) <= 3
+    assert search.outcomes.get(INFEASIBLE, 0) <= 3
 
 
 def test_a_point_goes_to_a_twin_in_which_it_is_feasible(planted, tmp_path, monkeypatch):
-    twins = [TASK.family(count=number + 3) for number in range(module.TWINS)]
-    monkeypatch.setattr(_Trials, "twin", lambda self, number: (twins[number % len(twins)], None))
-    monkeypatch.setattr(_Trials, "feasible", lambda self, trained, point: trained is twins[5])
-    discover(TASK, QUICK, Settings(budget=100, method="hypercube"), tmp_path)
+    twins = [TASK.family(count=number + 3) for number in range(confirmation.SEARCH_TWINS)]
+    monkeypatch.setattr(TrialRunner, "twin", lambda self, number: (twins[number % len(twins)], None))
+    monkeypatch.setattr(TrialRunner, "feasible", lambda self, trained, point: trained is twins[5])
+    discover(TASK, QUICK, DiscoverSettings(budget=100, method="hypercube"), tmp_path)
     lines = (tmp_path / "trials.jsonl").read_text().splitlines()[1:]
     assert {json.loads(line)["twin"] for line in lines if json.loads(line)["stage"] == "hypercube"} == {5}
 
 
 def _played(*twins):
-    return [{"outcome": HOLDS if holds else BREAKS, "controls": controls} for holds, controls in twins]
+    return [_confirming(HOLDS if holds else BREAKS, controls) for holds, controls in twins]
+
+
+def _confirming(outcome, controls, reason=""):
+    return Trial(0, CONFIRM, Box((Range(0, 0.0, 1.0),)), 0, outcome, tuple(controls), reason)
 
 
 @pytest.mark.parametrize(("confirmed", "against"), [(0, 0), (3, 0), (8, 1), (5, 5), (1, 4)])
 def test_with_one_control_the_confirmation_is_mcnemars_test(confirmed, against):
     twins = [(False, [True])] * confirmed + [(True, [False])] * against + [(True, [True])] * 3 + [(False, [False])] * 4
     expected = stats.binomtest(against, confirmed + against, 0.5, "less").pvalue if confirmed + against else 1.0
-    assert module._p(_played(*twins)) == pytest.approx(expected)
+    assert confirmation.p_value(_played(*twins)) == pytest.approx(expected)
 
 
 def test_a_memory_that_solves_one_of_three_controls_tells_a_quarter_each_time():
-    assert module._p(_played(*[(False, [True, False, False])] * 6)) == pytest.approx(0.75**6)
-    assert module._p(_played(*[(False, [False] * 3)] * 6)) == 1.0, "it solves nothing anywhere"
-    assert (
-        module._p([{"outcome": INFEASIBLE, "controls": []}, {"outcome": BREAKS, "reason": "", "controls": []}]) == 1.0
-    )
+    assert confirmation.p_value(_played(*[(False, [True, False, False])] * 6)) == pytest.approx(0.75**6)
+    assert confirmation.p_value(_played(*[(False, [False] * 3)] * 6)) == 1.0, "it solves nothing anywhere"
+    assert confirmation.p_value([_confirming(INFEASIBLE, []), _confirming(BREAKS, [])]) == 1.0
 
 
 @pytest.mark.parametrize("correlated", [False, True])
@@ -171,34 +186,34 @@ def test_what_breaks_nothing_is_confirmed_as_rarely_as_promised(correlated):
         ease = random.choice([0.1, 0.9], 20) if correlated else np.full(20, 0.4)
         solved = random.random((20, 4)) < ease[:, None]
         twins = _played(*[(bool(one), list(map(bool, rest))) for one, *rest in solved])
-        found += any(module.LOOKS * module._p(twins[:n]) < 0.05 for n in (5, 10, 15, 20))
+        found += any(confirmation.LOOKS * confirmation.p_value(twins[:n]) < 0.05 for n in (5, 10, 15, 20))
     assert found <= 0.06 * 1000, "whenever one looks"
 
 
 def test_a_memory_that_fails_everywhere_alike_breaks_at_nothing(planted, tmp_path, monkeypatch):
     tried, fails = iter(range(10_000)), iter(range(10_000))
-    monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS if next(tried) % 3 == 0 else BREAKS)
-    monkeypatch.setattr(module.behaviour, "follows", lambda *_: next(fails) % 3 == 0)
-    search = discover(TASK, QUICK, Settings(budget=400, method="hypercube"), tmp_path)
+    monkeypatch.setattr(TrialRunner, "outcome", lambda *_: HOLDS if next(tried) % 3 == 0 else BREAKS)
+    monkeypatch.setattr(behaviour, "follows", lambda *_: next(fails) % 3 == 0)
+    search = discover(TASK, QUICK, DiscoverSettings(budget=400, method="hypercube"), tmp_path)
     assert search.findings == []
 
 
 @pytest.mark.slow
 def test_what_is_written_can_stand_in_a_task_file(planted, tmp_path):
-    search = discover(TASK, QUICK, Settings(budget=300), tmp_path)
-    written = yaml.safe_load(as_yaml(TASK, search))
+    search = discover(TASK, QUICK, DiscoverSettings(budget=300), tmp_path)
+    written = yaml.safe_load(search.as_yaml(TASK))
     assert written["axes"], "something was found"
     again = load(TASK.name, {**TASK.node, "axes": written["axes"]})
     assert set(again.proofs) == {finding.axis.name for finding in search.findings}
 
 
 def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
-    whole = discover(TASK, QUICK, Settings(budget=100), tmp_path)
+    whole = discover(TASK, QUICK, DiscoverSettings(budget=100), tmp_path)
     lines = (tmp_path / "trials.jsonl").read_text().splitlines(keepends=True)
     (tmp_path / "trials.jsonl").write_text("".join(lines[:30]))
-    assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole
-    monkeypatch.setattr(_Trials, "outcome", None)
-    assert discover(TASK, QUICK, Settings(budget=100), tmp_path) == whole, "nothing is tried twice"
+    assert discover(TASK, QUICK, DiscoverSettings(budget=100), tmp_path) == whole
+    monkeypatch.setattr(TrialRunner, "outcome", None)
+    assert discover(TASK, QUICK, DiscoverSettings(budget=100), tmp_path) == whole, "nothing is tried twice"
 
 
 @pytest.mark.slow
@@ -207,33 +222,37 @@ def test_two_workers_try_what_one_does_also_after_a_kill_in_the_middle(planted, 
         return sorted(line.split('"outcome"')[0] for line in (folder / "trials.jsonl").read_text().splitlines()[1:])
 
     one, two = tmp_path / "one", tmp_path / "two"
-    alone = discover(TASK, QUICK, Settings(budget=300), one)
-    assert alone.findings and discover(TASK, QUICK, Settings(budget=300, workers=2), two) == alone
+    alone = discover(TASK, QUICK, DiscoverSettings(budget=300), one)
+    assert alone.findings and discover(TASK, QUICK, DiscoverSettings(budget=300, workers=2), two) == alone
     head, *lines = (two / "trials.jsonl").read_text().splitlines(keepends=True)
     (two / "trials.jsonl").write_text("".join([head, lines[1], lines[0], lines[5], *lines[7:20]]))
-    assert discover(TASK, QUICK, Settings(budget=300, workers=2), two) == alone
+    assert discover(TASK, QUICK, DiscoverSettings(budget=300, workers=2), two) == alone
     assert tried(two) == tried(one), "none is left out, none is made twice"
 
 
 def test_a_search_that_finds_nothing_says_so(planted, tmp_path, monkeypatch):
-    monkeypatch.setattr(_Trials, "outcome", lambda *_: HOLDS)
-    search = discover(TASK, QUICK, Settings(budget=40), tmp_path)
-    assert search.findings == [] and yaml.safe_load(as_yaml(TASK, search)) == {"axes": {}}
+    monkeypatch.setattr(TrialRunner, "outcome", lambda *_: HOLDS)
+    search = discover(TASK, QUICK, DiscoverSettings(budget=40), tmp_path)
+    assert search.findings == [] and yaml.safe_load(search.as_yaml(TASK)) == {"axes": {}}
 
 
 def test_a_task_with_nothing_feasible_outside_training_is_told(planted, tmp_path, monkeypatch):
-    monkeypatch.setattr(_Trials, "feasible", lambda *_: False)
+    monkeypatch.setattr(TrialRunner, "feasible", lambda *_: False)
     with pytest.raises(BadConfig, match="no value outside training is feasible"):
-        discover(TASK, QUICK, Settings(budget=100), tmp_path)
+        discover(TASK, QUICK, DiscoverSettings(budget=100), tmp_path)
 
 
 def test_real_trials_tell_a_memory_that_holds_from_one_that_breaks(tmp_path):
-    trials = _Trials(TASK, QUICK, KNOWN, 0)
+    trials = TrialRunner(TASK, QUICK, KNOWN, 0)
     number = {region.name: k for k, region in enumerate(KNOWN)}
     trained, memory = trials.twin(0)
-    assert trials.outcome(trained, memory, [(number["starter_height_low"], 0.75)]) == BREAKS
-    assert trials.outcome(trained, memory, [(number["tile_mass_high"], 0.2)]) == HOLDS
-    assert trials.outcome(trained, memory, [(number["x_high"], 1.0)]) == INFEASIBLE
+
+    def at(region, place):
+        return Point((Place(number[region], place),))
+
+    assert trials.outcome(trained, memory, at("starter_height_low", 0.75)) == BREAKS
+    assert trials.outcome(trained, memory, at("tile_mass_high", 0.2)) == HOLDS
+    assert trials.outcome(trained, memory, at("x_high", 1.0)) == INFEASIBLE
 
 
 @pytest.mark.parametrize(

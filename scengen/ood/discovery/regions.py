@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..params import Parameter, Value
-from ..samplers.support import Interval, Support
-from ..samplers.task import Task
+from ...params import Parameter, Value
+from ...samplers.support import Interval, Support
+from ...samplers.task import Task
 
 MARGIN = 0.05
 """Share of a region next to training that is left out: an axis needs a gap."""
