@@ -1,15 +1,15 @@
-"""T17 domino-single: knock over a slab you may not touch, by toppling a chain that leads to it.
+"""T17 domino-single: knock over a slab that the robot may not touch, by toppling the chain of tiles that leads to it.
 
     hand ->  | | | | |  []          seen from the side; the chain runs along +u
              0 1 2 3 4  slab
 
-Bottleneck: the push is local, its effect is not. Each falling tile must reach the next one.
+Bottleneck: the robot pushes one tile only, and each falling tile must reach the next one.
 
-The bypass. The paper forbids touching the slab only, and notes (App. on task-specific behaviours) that policies
-then knock over a tile in the middle instead of the first: pushing the last tile solves almost every scene, and
-nothing is left of the causal chain. Here the robot may touch the first tile and no other, and topple it, not carry
-it: else the starter in the jaw knocks over the slab, or the last tile, without any chain. Both are latched failures
-like touching the slab. The paper's canonical plan is unaffected; the shortcuts below show that the bypass is closed.
+Decision: the paper forbids touching the slab and nothing else. It notes (App. on task-specific behaviours) that
+policies then knock over a tile in the middle instead of the first. Pushing the last tile solves almost every scene that
+way, without a causal chain. Here the robot may touch the first tile and no other, and may topple it but not carry it: a
+first tile carried in the jaw could knock over the slab or the last tile. Breaking a rule ends the episode. The paper's
+canonical plan keeps all rules; the shortcuts below verify that each bypass fails.
 """
 
 import math
@@ -31,22 +31,30 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import COARSE, FINE, go_to, push, wait
 
-CARRIED = 0.01
-"""How far the foot of the starter may have moved while the robot still touches it [m]; in a topple less than 1 mm."""
-SLAB_MOVES = 0.05
-"""How far the slab's centre of mass must go, measured along the table [m] (paper, App. B, T17)."""
+PUSH_HEIGHT_SHARE = 0.8
+"""Height at which a piece is pushed, as a share of its own height."""
+APPROACH_HEIGHT = 0.12
+"""Height above the start of a push from which the hand comes down [m]; it passes over every piece."""
+CARRY_TOLERANCE = 0.01
+"""Distance that the first tile's foot may move while the robot touches it [m]; a topple moves it by less than 1 mm."""
+SLAB_DISPLACEMENT = 0.05
+"""Displacement along the table at which the slab counts as knocked over [m] (paper, App. B, T17)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DominoSingle(Scenario):
-    """A straight chain of tiles and a red slab at its end; the first tile, the starter, may differ from the others."""
+    """A straight chain of tiles with a red slab at its end; the first tile, the starter, may differ from the others."""
 
     count: int = param(5, "tiles", 2, 15)
+    """Number of tiles; the slab does not count."""
     gap_ratio: float = param(0.9, "tile widths", 0.2, 2.5)
+    """Free space between neighbouring faces."""
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
+    """Direction of the chain; 0 is away from the robot, 90 to its left."""
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     slab_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
+    """Angle of the slab to the chain."""
     starter: Domino = Domino(rgba=(0.95, 0.70, 0.25, 1.0))
     tile: Domino = Domino()
     slab: Domino = Domino(height=0.12, width=0.06, thickness=0.015, mass=0.06, rgba=(0.78, 0.10, 0.10, 1.0))
@@ -63,40 +71,41 @@ class DominoSingle(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return displaced(world, "slab", self.spot(self.count)) >= SLAB_MOVES
+        return displaced(world, "slab", self.spot(self.count)) >= SLAB_DISPLACEMENT
 
     def failure(self, world: World) -> str | None:
         if world.touched(ROBOT, "slab"):
             return "the robot touched the slab"
         if touched_only(world, "tile_0"):
             return "the robot touched a tile other than the first"
-        if carried(world, "tile_0", self.spot(0), CARRIED):
+        if carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE):
             return "the robot carried the first tile away"
         return None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Go behind the first tile, tip it past its balance point, step back, watch."""
+        """Go behind the first tile, tip it past its balance point, step back and wait until the slab has fallen."""
         yield from self.topple(world, 0)
         yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def topple(self, world: World, i: int) -> Plan:
         """Push tile `i` over along the chain with the closed finger tips, then step back.
 
-        Behind any tile but the first the tips go into the middle of the gap.
+        Behind any tile but the first, the tips go into the middle of the gap.
         """
         tile = self.pieces[i]
-        room = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGER_ACROSS)
-        behind = self.spot(i) + 0.8 * tile.height * UP - (tile.thickness / 2 + FINGER_ACROSS + room) * self.u
+        clearance = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGER_ACROSS)
+        behind = (tile.thickness / 2 + FINGER_ACROSS + clearance) * self.u
+        start = self.spot(i) + PUSH_HEIGHT_SHARE * tile.height * UP - behind
 
-        def falls() -> bool:
-            return self._falling(world, i) or self._falling(world, i + 1)
+        def falls() -> bool:  # a stout tile may strike its neighbour before it is past its own balance point
+            return self._tips(world, i) or self._tips(world, i + 1)
 
-        yield from poke(world.arm, behind, 0.08 * self.u, falls, above=0.12, pace=FINE)
+        yield from poke(world.arm, start, 0.08 * self.u, falls, above=APPROACH_HEIGHT, pace=FINE)
 
-    def _falling(self, world: World, i: int) -> bool:
-        """Whether a piece is past its balance point for good. A stout one may strike its neighbour before that."""
+    def _tips(self, world: World, i: int) -> bool:
+        """Whether piece `i` leans so far past its balance point that it falls by itself."""
         name = f"tile_{i}" if i < self.count else "slab"
         return world.tilt(name) > 1.3 * self.pieces[i].tipping_angle
 
@@ -112,22 +121,22 @@ class DominoSingle(Scenario):
         }
 
     def _push_slab(self, world: World) -> Plan:
-        """Straight to the target: knock the slab over from the side."""
+        """Knock the slab over from the side."""
         side = np.array([-self.u[1], self.u[0], 0.0])
-        beside = self.spot(self.count) + 0.8 * self.slab.height * UP + 0.08 * side
-        yield from poke(world.arm, beside, -0.15 * side, lambda: self.success(world), above=0.12)
+        start = self.spot(self.count) + PUSH_HEIGHT_SHARE * self.slab.height * UP + 0.08 * side
+        yield from poke(world.arm, start, -0.15 * side, lambda: self.success(world), above=APPROACH_HEIGHT)
 
     def _carry(self, world: World, i: int) -> Plan:
-        """Take the starter, which may be touched, over the chain and knock piece `i` over with its foot."""
-        start, hit = self.spot(0), self.spot(i) + 0.8 * self.pieces[i].height * UP
-        yield from pick(world.arm, start + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.16)
+        """Carry the starter, which may be touched, over the chain and knock piece `i` over with its foot."""
         grip = 0.7 * self.starter.height * UP
-        yield from go_to(world.arm, hit + grip + 0.12 * UP - 0.03 * self.u, pace=COARSE)
+        yield from pick(world.arm, self.spot(0) + grip, np.cross(UP, self.u), above=0.06, lift=0.16)
+        hit = self.spot(i) + PUSH_HEIGHT_SHARE * self.pieces[i].height * UP
+        yield from go_to(world.arm, hit + grip + APPROACH_HEIGHT * UP - 0.03 * self.u, pace=COARSE)
         yield from go_to(world.arm, hit + grip - (0.03 if i == self.count else 0.015) * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the chain the first tile falls on nothing; one tile less may still be bridged by the others."""
+        """Remove all tiles but the first; the others might still bridge the place of a single missing tile."""
         scene = self.build()
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{i}"))
@@ -143,7 +152,7 @@ class DominoSingle(Scenario):
         yield within_reach("the first tile", self.spot(0) + self.starter.height * UP)
 
     def features(self) -> Mapping[str, float]:
-        """How far a tile leans when it strikes the next one, what the last one must move, and the first push [rad]."""
+        """How far a tile leans when it strikes the next one, what the last one must move, and how far to push [rad]."""
         return {
             "gap_over_height": self.gap / self.tile.height,
             "slab_over_tile_mass": self.slab.mass / self.tile.mass,
@@ -168,14 +177,14 @@ class DominoSingle(Scenario):
         return [self.starter, *[self.tile] * (self.count - 1), self.slab]
 
     def spot(self, i: int) -> Vec3:
-        """Foot of tile `i` [m]; `spot(count)` is where the slab stands."""
+        """Position of the foot of piece `i` [m]; piece `count` is the slab."""
         return self._spots[i]
 
     @cached_property
     def _spots(self) -> list[Vec3]:
-        """The feet of all pieces [m]; goal and failure ask for them in every control period.
+        """Positions of all feet [m]; cached, because `success` and `failure` need them in every control period.
 
-        (x, y) is the middle of a chain of equal tiles: a stouter starter grows away from the face that is pushed.
+        (x, y) is the middle of a chain of equal tiles. If the starter is stouter, the face that is pushed stays there.
         """
         half = self.count * (self.gap + self.tile.thickness) / 2
         spots, before = [], 0.0

@@ -10,7 +10,7 @@ from scengen import config
 from scengen.certificate import CHECKS
 from scengen.geometry import UP
 from scengen.sim.world import ROBOT, World
-from scengen.tasks.domino_single import SLAB_MOVES, DominoSingle
+from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
 from scengen.validate.certify import certify, lower_bound
 from scengen.validate.rebuilt import world_of
@@ -59,7 +59,7 @@ class SlabAway(DominoSingle):
 
     def build(self):
         scene = super().build()
-        scene.body("slab").pos = [SLAB_MOVES + 0.01, 0, 0]  # in the frame that it was placed with
+        scene.body("slab").pos = [SLAB_DISPLACEMENT + 0.01, 0, 0]  # in the frame that it was placed with
         return scene
 
 
