@@ -12,7 +12,7 @@ from typing import Any
 
 from scengen import cli, config
 from scengen.analysis.distance import Energy
-from scengen.ood.card import NOT_SEARCHED
+from scengen.ood.axis_card import NOT_SEARCHED
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured

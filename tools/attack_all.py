@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scengen import cli, config
-from scengen.attack.evidence import Rate
+from scengen.attack.evidence import TierRate
 
 SCENARIOS, SEED = 10, 4242
 FOLDER = Path("docs/attacks")
@@ -78,7 +78,7 @@ def line(report: Mapping[str, Any]) -> str:
 
 def _counted(rates: Iterable[Mapping[str, Any]]) -> str:
     known = list(rates)
-    total = Rate("", False, sum(rate["rollouts"] for rate in known), sum(rate["hits"] for rate in known))
+    total = TierRate("", False, sum(rate["rollouts"] for rate in known), sum(rate["hits"] for rate in known))
     return f"{total.hits} of {total.rollouts} (< {total.bound:.1%})" if total.rollouts else "-"
 
 

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from scengen import cli, config
-from scengen.attack.evidence import Rate
+from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.pool.pool import MANIFEST
 
@@ -115,7 +115,7 @@ def _row(task: str, count: int, told: list[str]) -> str:
 
 def _bound(told: dict[str, Any]) -> float:
     """One-sided 95 % Clopper-Pearson bound of the share that flips, among those of which something can be said."""
-    return Rate("", False, sum(told[name] for name in OUTCOMES if name != UNKNOWN), told[FLIPPED]).bound
+    return TierRate("", False, sum(told[name] for name in OUTCOMES if name != UNKNOWN), told[FLIPPED]).bound
 
 
 if __name__ == "__main__":  # worker processes import this file again

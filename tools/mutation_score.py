@@ -23,11 +23,11 @@ from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import config
-from scengen.attack.campaign import Settings, Subject, drawn, fitted, player_of
+from scengen.attack.adversary import PRIOR, RANDOM, TIERS, Attack
+from scengen.attack.campaign import AttackSettings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import Causal, Hit
 from scengen.attack.macros import Macro
-from scengen.attack.play import SETTLE, Attempt, Player
-from scengen.attack.search import PRIOR, RANDOM, TIERS, Attack
+from scengen.attack.player import SETTLE, Attempt, Player
 from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
@@ -82,7 +82,7 @@ def compare(budget: str = "60", *tasks: str) -> None:
 
 def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> int:
     """Successes that the sound family refuses, in so many rollouts."""
-    priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
+    priors = fitted(config.task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     hits = 0
     for number, subject in enumerate(subjects):
         player = player_of(subject)
@@ -121,7 +121,7 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
 def guessed(mutant: Mutant) -> dict[str, Any]:
     """What became of a task whose ranges are too narrow: fixed answers, by statics and in rollouts."""
     start = time.process_time()
-    priors = fitted(mutant.asked, Settings())
+    priors = fitted(mutant.asked, AttackSettings())
     above = [p for p in priors if p.fresh is not None and p.fresh > BARS.get(len(p.values), 1.0)]
     hits, used = [], 0
     for number, subject in enumerate(subjects := mutant.subjects(SCENARIOS)):
@@ -162,7 +162,7 @@ def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
 def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> tuple[int, Hit | None]:
     """Attack until a hit that the sound family refuses: how many rollouts that took, and the hit."""
     used = 0
-    priors = fitted(config.task(mutant.task), Settings()) if "prior" in tiers and not mutant.change else ()
+    priors = fitted(config.task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     for number, subject in enumerate(subjects):
         player = player_of(subject)
         player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}

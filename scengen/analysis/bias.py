@@ -23,7 +23,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Cell:
+class Bin:
     """Part of the range of a parameter."""
 
     low: float
@@ -49,7 +49,7 @@ class Marginal:
     pvalue: float
     """Of accepted against rejected values, which share no draw; corrected for the number of marginals (Benjamini and
     Hochberg), and too large rather than too small for parameters with few values."""
-    cells: tuple[Cell, ...]
+    cells: tuple[Bin, ...]
 
     @property
     def effective(self) -> float:
@@ -147,7 +147,7 @@ def _marginal(name: str, column: Numbers, accepted: Flags, pvalue: float) -> Mar
     taken, edges = column[accepted], _edges(column)
     proposed, chosen = np.histogram(column, edges)[0], np.histogram(taken, edges)[0]
     cells = (
-        Cell(float(low), float(high), int(n), int(k))
+        Bin(float(low), float(high), int(n), int(k))
         for low, high, n, k in zip(edges[:-1], edges[1:], proposed, chosen, strict=True)
         if n
     )

@@ -60,7 +60,7 @@ class Energy:
 
 
 @dataclass(frozen=True)
-class Pair:
+class NearDuplicate:
     """Two scenarios that are nearly the same, their symmetries considered."""
 
     one: str
@@ -121,7 +121,9 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: 
     return Energy(math.sqrt(round(max(0.0, float(tested.statistic)), 12)), float(tested.pvalue), by_chance)
 
 
-def near_duplicates(task: Task, batch: Batch, others: Batch | None = None, within: float = CLOSE) -> list[Pair]:
+def near_duplicates(
+    task: Task, batch: Batch, others: Batch | None = None, within: float = CLOSE
+) -> list[NearDuplicate]:
     """Pairs of scenarios that differ by less than `within` in every parameter, nearest first, of `MOST_PAIRS` at most.
 
     Between two pools this is leakage; within one pool (`others` left out) these are repetitions. Every symmetric image
@@ -164,8 +166,8 @@ def _with_a_coordinate(points: Points) -> Points:
     return points if points.shape[1] else np.zeros((len(points), 1))
 
 
-def _nearest_first(least: Mapping[tuple[str, str], float]) -> list[Pair]:
-    return sorted((Pair(*pair, apart) for pair, apart in least.items()), key=lambda p: p.distance)
+def _nearest_first(least: Mapping[tuple[str, str], float]) -> list[NearDuplicate]:
+    return sorted((NearDuplicate(*pair, apart) for pair, apart in least.items()), key=lambda p: p.distance)
 
 
 def per_parameter(task: Task, batch: Batch) -> dict[str, tuple[float, float]]:

@@ -21,7 +21,7 @@ from ..samplers.task import Task
 from ..work.targets import write
 from .bias import Bias, bias
 from .coverage import Evenness, evenness
-from .distance import CLOSE, ENERGY_OF, MOST_PAIRS, Energy, Pair, energy, near_duplicates, per_parameter
+from .distance import CLOSE, ENERGY_OF, MOST_PAIRS, Energy, NearDuplicate, energy, near_duplicates, per_parameter
 from .histogram import Histogram, figure, histogram, label
 from .redraw import batch_of, first_scenarios, redrawn, task_of, told
 from .space import Batch, measured, of_features
@@ -63,7 +63,7 @@ class Contrast:
     one: str
     other: str
     energy: Energy
-    shared: list[Pair]
+    shared: list[NearDuplicate]
     """Near duplicates: leakage, if one is for training and the other for evaluation."""
 
 

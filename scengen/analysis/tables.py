@@ -8,7 +8,7 @@ from rich.table import Table
 
 from ..evaluate.power import PowerAnalysis
 from .bias import AcceptanceMap, Bias
-from .distance import Pair
+from .distance import NearDuplicate
 from .shrink import Shrunk
 
 SHOWN = 20
@@ -47,7 +47,7 @@ def map_table(found: AcceptanceMap) -> Table:
     return table
 
 
-def pairs_table(pairs: list[Pair], one: str, other: str, names: Mapping[str, str]) -> Table:
+def pairs_table(pairs: list[NearDuplicate], one: str, other: str, names: Mapping[str, str]) -> Table:
     """Scenarios that are nearly the same.
 
     Args:

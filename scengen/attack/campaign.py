@@ -20,10 +20,10 @@ from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
-from .evidence import Hit, Rate, rates, unsound
-from .play import Player
-from .priors import Judge, Prior, by_statics, fit, has_statics
-from .search import PRIOR, TIERS, Attack, Result, Untried
+from .adversary import PRIOR, TIERS, Attack, AttackResult, UntriedShortcut
+from .evidence import Hit, TierRate, rates, unsound
+from .player import Player
+from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
 GRAMMAR = 1
 """Version of macros and tiers: reports of different ones are not comparable."""
@@ -38,7 +38,7 @@ FITTED, FRESH = 1_000_003, 2_000_003
 
 
 @dataclass(frozen=True)
-class Settings:
+class AttackSettings:
     """Settings of `scengen attack`; meanings stand in conf/command/attack.yaml."""
 
     pool: str | None = None
@@ -80,15 +80,15 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Report:
+class AttackReport:
     """What an attack came to."""
 
     task: str
     scenarios: tuple[str, ...]
-    rates: tuple[Rate, ...]
+    rates: tuple[TierRate, ...]
     hits: tuple[Hit, ...]
     priors: tuple[Prior, ...]
-    untried: tuple[Untried, ...]
+    untried: tuple[UntriedShortcut, ...]
     lost: tuple[str, ...]
     """Scenarios whose attack crashed or reached a limit, each with the reason: nothing is known of them."""
     folder: Path
@@ -121,7 +121,7 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Job:
+class AttackJob:
     """What the attacks of one report have in common; called with a number, it attacks that scenario."""
 
     subjects: tuple[Subject, ...]
@@ -131,25 +131,25 @@ class Job:
     tiers: tuple[str, ...]
     priors: tuple[Prior, ...]
 
-    def __call__(self, number: int) -> Result:
+    def __call__(self, number: int) -> AttackResult:
         attacked = self.subjects[number]
         player = player_of(attacked)
         player.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
         attack = Attack(player, self.seed, number, len(self.subjects), self.priors)
         return attack.run(self.budget, self.tiers)
 
-    def lost(self, number: int, reason: str) -> Result:
+    def lost(self, number: int, reason: str) -> AttackResult:
         """The result of a scenario whose attack has crashed its process, or has reached a limit."""
-        return Result(self.subjects[number].scenario.id, [], [], 0.0, [], reason)
+        return AttackResult(self.subjects[number].scenario.id, [], [], 0.0, [], reason)
 
 
 def attack(
     task: Task,
     subjects: Sequence[Subject],
-    settings: Settings,
+    settings: AttackSettings,
     folder: Path,
     progress: Callable[[int, int], None],
-) -> Report:
+) -> AttackReport:
     """Attack every subject, continuing what stands in `folder`; hits are stored there.
 
     Args:
@@ -157,7 +157,7 @@ def attack(
     """
     priors = tuple(fitted(task, settings)) if PRIOR in settings.chosen else ()
     budget = max(1, settings.budget // len(subjects))
-    job = Job(tuple(subjects), budget, settings.seed, settings.chosen, priors)
+    job = AttackJob(tuple(subjects), budget, settings.seed, settings.chosen, priors)
     identity = {
         "grammar": GRAMMAR,
         "scenarios": [one.scenario.id for one in subjects],
@@ -207,7 +207,7 @@ def certified(task: Task, rows: Iterable[PoolRow]) -> list[Subject]:
     return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness, r.name) for r in rows]
 
 
-def stored(report: Report, folder: Path) -> dict[str, Any]:
+def stored(report: AttackReport, folder: Path) -> dict[str, Any]:
     """What the manifest of a pool in `folder` says of an attack on it; hits are copied there.
 
     Raises:
@@ -255,7 +255,7 @@ def player_of(subject: Subject) -> Player:
     return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
 
 
-def fitted(task: Task, settings: Settings) -> list[Prior]:
+def fitted(task: Task, settings: AttackSettings) -> list[Prior]:
     """The best fixed answers of a task, fitted on other draws; none if its family does not say what it asks for."""
     answer = task.family().answer()
     if answer is None:
@@ -269,7 +269,7 @@ def fitted(task: Task, settings: Settings) -> list[Prior]:
     return fit(training, by_statics if static else _by_rollouts(task), fresh)
 
 
-def _by_rollouts(task: Task) -> Judge:
+def _by_rollouts(task: Task) -> AnswerJudge:
     def judge(scenario: Scenario) -> Callable[[float], bool]:
         world, answer = world_of(scenario, task.embodiment), scenario.answer()
         assert answer is not None, "asked for once for the family"
@@ -293,7 +293,7 @@ def _draws(task: Task, split: str, seed: int, count: int) -> Iterator[Scenario]:
             continue
 
 
-def _record(result: Result) -> dict[str, Any]:
+def _record(result: AttackResult) -> dict[str, Any]:
     counts = [asdict(rate) for rate in result.rates]
     untried = [asdict(one) for one in result.untried]
     hits = [hit.name for hit in result.hits]
@@ -301,19 +301,19 @@ def _record(result: Result) -> dict[str, Any]:
     return {"scenario": result.scenario, **told}
 
 
-def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> Report:
+def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> AttackReport:
     order = [one.scenario.id for one in subjects]
     records = sorted(log.records, key=lambda record: order.index(record["scenario"]))
-    counts = [Rate(**rate) for record in records for rate in record["rates"]]
+    counts = [TierRate(**rate) for record in records for rate in record["rates"]]
     hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
-    untried = tuple(Untried(**one) for record in records for one in record["untried"])
+    untried = tuple(UntriedShortcut(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
-    return Report(
+    return AttackReport(
         task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, lost, folder, cpu
     )
 
 
-def _sorted(counts: Sequence[Rate]) -> list[Rate]:
+def _sorted(counts: Sequence[TierRate]) -> list[TierRate]:
     """In the order of the tiers."""
     return sorted(counts, key=lambda rate: (TIERS.index(rate.tier.split("_")[0]), rate.tier, rate.raw))

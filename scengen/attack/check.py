@@ -1,10 +1,10 @@
 """The adversary as a check of a certificate: a few rollouts that need nothing but the scenario and its witness."""
 
 from ..validate.certify import Finding, Trial
+from .adversary import RANDOM, SEARCH, Attack
 from .evidence import spelled
-from .play import Player
+from .player import Player
 from .retries import RETRY
-from .search import RANDOM, SEARCH, Attack
 from .variations import WITNESS
 
 TIERS = (RETRY, WITNESS, RANDOM, SEARCH)

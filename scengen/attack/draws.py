@@ -8,7 +8,7 @@ from itertools import accumulate
 from ..samplers.keyed import spread, unit
 from ..sim.world import Arm
 from .macros import Macro
-from .play import Player
+from .player import Player
 from .solids import TABLE, Solid, handles, sides
 
 Key = tuple[str | int, ...]

@@ -22,8 +22,8 @@ from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
 from ..work.targets import refused
-from .play import SETTLE, Attempt, Node, Played, Player
-from .signature import Pair, pairs
+from .player import SETTLE, Attempt, Node, Played, Player
+from .signature import ContactPair, pairs
 
 VARIED = 40
 """Varied runs of the oracle that a causal contact is there in; one that is missing in 5 % of runs passes in 13 %."""
@@ -49,7 +49,7 @@ class Hit:
     """When the goal was reached [s]."""
     digest: str
     """Hash of the final physics state."""
-    lacks: tuple[Pair, ...]
+    lacks: tuple[ContactPair, ...]
     """Causal contacts of the witness that it does without."""
     unmoved: tuple[str, ...]
     """Bodies that the witness moves, and it does not."""
@@ -141,7 +141,7 @@ class Causal:
         self._player, self._left = player, iter(range(varied))
         self._pairs = player.trace.signature.pairs
 
-    def lacking(self, touched: frozenset[Pair]) -> frozenset[Pair]:
+    def lacking(self, touched: frozenset[ContactPair]) -> frozenset[ContactPair]:
         """Which of them are not among the contacts of a hit; every varied run made so far has all of these."""
         for k in self._left if self._pairs - touched else ():
             self._pairs &= self._varied(k)
@@ -149,7 +149,7 @@ class Causal:
                 break
         return self._pairs - touched
 
-    def _varied(self, k: int) -> frozenset[Pair]:
+    def _varied(self, k: int) -> frozenset[ContactPair]:
         """The contacts of a jittered run; all that are known where it fails, or where there is no oracle."""
         player = self._player
         jitter = Jitter.within(Robust(), f"{player.scenario.id}/attack", k)
@@ -188,7 +188,7 @@ def hit(player: Player, attempt: Attempt, raw: bool, played: Played, node: Node 
 
 
 @dataclass(frozen=True)
-class Rate:
+class TierRate:
     """How often one tier reached the goal, filtered or raw."""
 
     tier: str
@@ -210,11 +210,11 @@ class Rate:
         return {**asdict(self), "rate": self.value, "bound": self.bound}
 
 
-def rates(counts: Sequence[Rate]) -> list[Rate]:
+def rates(counts: Sequence[TierRate]) -> list[TierRate]:
     """Counts of the same tier and kind added up, in the order in which they first occur."""
-    total: dict[tuple[str, bool], Rate] = {}
+    total: dict[tuple[str, bool], TierRate] = {}
     for one in counts:
-        sofar = total.get((one.tier, one.raw), Rate(one.tier, one.raw))
+        sofar = total.get((one.tier, one.raw), TierRate(one.tier, one.raw))
         total[one.tier, one.raw] = replace(
             sofar,
             rollouts=sofar.rollouts + one.rollouts,

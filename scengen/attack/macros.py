@@ -69,7 +69,7 @@ class Macro:
 
 
 @dataclass(frozen=True)
-class Field:
+class MacroContext:
     """An arm and the solids of its world: what the plan of a macro looks at."""
 
     arm: Arm
@@ -83,13 +83,13 @@ class Field:
 def plan(world: World, solids: Mapping[str, Solid], macro: Macro) -> Plan:
     """The moves of one macro from wherever the hand is."""
     arm = world.arms[macro.arm]
-    return alone(arm, KINDS[macro.kind](Field(arm, solids), macro))
+    return alone(arm, KINDS[macro.kind](MacroContext(arm, solids), macro))
 
 
 # --- taking and leaving -----------------------------------------------------------------------
 
 
-def _pick(field: Field, macro: Macro) -> Plan:
+def _pick(field: MacroContext, macro: Macro) -> Plan:
     height, skew, which, lift = macro.numbers
     solid, world = field.solids[macro.target], field.world
     centre, up = solid.centre(world), solid.reach(world, UP)
@@ -108,7 +108,7 @@ def _pick(field: Field, macro: Macro) -> Plan:
     yield from retreat(field.arm, lift, FAST)
 
 
-def _suck(field: Field, spot: Vec3, skew: float) -> Plan:
+def _suck(field: MacroContext, spot: Vec3, skew: float) -> Plan:
     arm = field.arm
     rot = closing_along(arm, about_z(skew) @ arm.hand_rot[:, 1])
     yield from _rise(arm, float(spot[2]) + ABOVE)
@@ -116,7 +116,7 @@ def _suck(field: Field, spot: Vec3, skew: float) -> Plan:
     yield from suction.suck(arm, spot, rot, give_up=1.5)
 
 
-def _place(field: Field, macro: Macro) -> Plan:
+def _place(field: MacroContext, macro: Macro) -> Plan:
     u, v, drop, speed = macro.numbers
     yield from _over(field, macro.target, u, v, drop + 0.01)
     if drop <= 0.0:
@@ -125,7 +125,7 @@ def _place(field: Field, macro: Macro) -> Plan:
     yield from retreat(field.arm, ABOVE, FAST)
 
 
-def _press(field: Field, macro: Macro) -> Plan:
+def _press(field: MacroContext, macro: Macro) -> Plan:
     u, v, seconds, speed = macro.numbers
     yield from _over(field, macro.target, u, v, AIR)
     yield from _down(field, macro.target, 0.04, speed)
@@ -133,14 +133,14 @@ def _press(field: Field, macro: Macro) -> Plan:
     yield from retreat(field.arm, ABOVE, FAST)
 
 
-def _release(field: Field, macro: Macro) -> Plan:
+def _release(field: MacroContext, macro: Macro) -> Plan:
     seconds, rise = macro.numbers
     yield from release(field.arm, seconds)
     if rise > 0.0:
         yield from retreat(field.arm, rise, FAST)
 
 
-def _catch(field: Field, macro: Macro) -> Plan:
+def _catch(field: MacroContext, macro: Macro) -> Plan:
     """Keep the hand open until a body that went away is coming back, then close it: fingers need time."""
     (longest,) = macro.numbers
     world, body = field.world, macro.target
@@ -157,7 +157,7 @@ def _catch(field: Field, macro: Macro) -> Plan:
 # --- pushing ----------------------------------------------------------------------------------
 
 
-def _push(field: Field, macro: Macro) -> Plan:
+def _push(field: MacroContext, macro: Macro) -> Plan:
     direction, height, offset, way, speed = macro.numbers
     solid, world, arm = field.solids[macro.target], field.world, field.arm
     u = heading(math.degrees(direction))
@@ -183,21 +183,21 @@ def _push(field: Field, macro: Macro) -> Plan:
 # --- the hand alone -----------------------------------------------------------------------------
 
 
-def _move(field: Field, macro: Macro) -> Plan:
+def _move(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, speed = macro.numbers
     arm, way = field.arm, np.array([x, y, z])
     limit = float(np.linalg.norm(way)) / speed + 0.7
     yield from go_to(arm, arm.hand + way, pace=Pace(speed, 0.002, limit))
 
 
-def _turn(field: Field, macro: Macro) -> Plan:
+def _turn(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, rate = macro.numbers
     arm = field.arm
     goal = rotation(np.array([x, y, z])) @ arm.hand_rot
     yield from turn_to(arm, goal, rate, give_up=0.7 + math.sqrt(x * x + y * y + z * z) / rate)
 
 
-def _shake(field: Field, macro: Macro) -> Plan:
+def _shake(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, spin, period, duration = macro.numbers
     arm, start = field.arm, field.world.time
     while (since := field.world.time - start) < duration:
@@ -205,24 +205,24 @@ def _shake(field: Field, macro: Macro) -> Plan:
         yield np.array([sign * x, sign * y, sign * z, 0.0, 0.0, sign * spin, arm.grip])
 
 
-def _throw(field: Field, macro: Macro) -> Plan:
+def _throw(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, seconds = macro.numbers
     arm, start = field.arm, field.world.time
     while (since := field.world.time - start) < seconds + 0.2:
         yield np.array([x, y, z, 0.0, 0.0, 0.0, OPEN if since > seconds else arm.grip])
 
 
-def _wait(field: Field, macro: Macro) -> Plan:
+def _wait(field: MacroContext, macro: Macro) -> Plan:
     (seconds,) = macro.numbers
     yield from hold(field.arm, seconds)
 
 
-def _go(field: Field, macro: Macro) -> Plan:
+def _go(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, a, b, c, grip = macro.numbers
     yield from go_to(field.arm, [x, y, z], rotation(np.array([a, b, c])), CLOSE, grip)
 
 
-KINDS: Mapping[str, Callable[[Field, Macro], Plan]] = {
+KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "pick": _pick,
     "push": _push,
     "place": _place,
@@ -248,7 +248,7 @@ def _rise(arm: Arm, height: float) -> Plan:
         yield from go_to(arm, [*arm.hand[:2], height], pace=FAST)
 
 
-def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
+def _over(field: MacroContext, target: str, u: float, v: float, above: float) -> Plan:
     """Bring what the hand holds, or its finger tips, over a point of a solid's upper face."""
     solid, world, arm = field.solids[target], field.world, field.arm
     load = held(arm)
@@ -267,7 +267,7 @@ def _over(field: Field, target: str, u: float, v: float, above: float) -> Plan:
     yield from go_to(arm, goal, pace=CLOSE, grip=CLOSED)
 
 
-def _down(field: Field, target: str, farthest: float, speed: float) -> Plan:
+def _down(field: MacroContext, target: str, farthest: float, speed: float) -> Plan:
     """Lower what the hand holds, or closed fingers, until it touches the target's body, by `farthest` [m] at most."""
     arm, world, body = field.arm, field.world, field.solids[target].body
     tool, end = held(arm) or arm.label, world.time + farthest / speed

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..scenario import Answer, Scenario
 from ..validate.certify import lower_bound
 from .macros import Macro
-from .play import Attempt
+from .player import Attempt
 
 GUESSES = (1, 2, 3)
 """How many fixed answers are given one after the other in an episode."""
@@ -36,7 +36,7 @@ class Prior:
         return 1.0 - lower_bound(round((1 - self.fresh) * self.draws), self.draws)
 
 
-Judge = Callable[[Scenario], Callable[[float], bool]]
+AnswerJudge = Callable[[Scenario], Callable[[float], bool]]
 """Whether a value is right in a scenario: by statics, or by a rollout."""
 
 
@@ -47,7 +47,7 @@ def by_statics(scenario: Scenario) -> Callable[[float], bool]:
     return answer.right
 
 
-def fit(training: Sequence[Scenario], judge: Judge = by_statics, fresh: Sequence[Scenario] = ()) -> list[Prior]:
+def fit(training: Sequence[Scenario], judge: AnswerJudge = by_statics, fresh: Sequence[Scenario] = ()) -> list[Prior]:
     """The best one, two and three of the candidates, by exhaustive choice.
 
     Args:
@@ -80,7 +80,7 @@ def guesses(priors: Iterable[Prior]) -> Iterator[Attempt]:
         yield Attempt(f"prior_{len(prior.values)}", moves)
 
 
-def _table(scenarios: Sequence[Scenario], values: Sequence[float], judge: Judge) -> NDArray[np.bool_]:
+def _table(scenarios: Sequence[Scenario], values: Sequence[float], judge: AnswerJudge) -> NDArray[np.bool_]:
     """Which value is right in which scenario, shape (scenarios, values)."""
     rows = [[right(value) for value in values] for right in map(judge, scenarios)]
     return np.array(rows, bool).reshape(len(scenarios), len(values))

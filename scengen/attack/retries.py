@@ -13,7 +13,7 @@ import numpy as np
 from ..geometry import UP, Vec3
 from ..sim.world import Arm
 from .macros import Macro
-from .play import Attempt, Player
+from .player import Attempt, Player
 from .solids import TABLE, Solid, handles, sides
 from .variations import phase
 

@@ -11,7 +11,7 @@ from ..sim.world import ROBOT, World
 MOVES = 0.005
 """How far the centre of mass of a body goes that counts as moved [m]."""
 
-Pair = tuple[str, str]
+ContactPair = tuple[str, str]
 """Names of two bodies in alphabetical order; see `robots` for the robot."""
 
 
@@ -19,7 +19,7 @@ Pair = tuple[str, str]
 class Signature:
     """Contacts since the start, and displacements."""
 
-    pairs: frozenset[Pair]
+    pairs: frozenset[ContactPair]
     """Which bodies of the scene touched each other or the robot. At least one of two is loose: it hangs on a joint."""
     moved: frozenset[str]
     """Free bodies that are `MOVES` away from their start."""
@@ -47,7 +47,7 @@ def signature(world: World, start: Mapping[str, Vec3]) -> Signature:
     return Signature(pairs(world), frozenset(body for body, distance in away.items() if distance > MOVES))
 
 
-def pairs(world: World) -> frozenset[Pair]:
+def pairs(world: World) -> frozenset[ContactPair]:
     """Which bodies have touched since the start; see `Signature.pairs`."""
     touched, found = world.loop.touched, set()
     names = scene_bodies(world)

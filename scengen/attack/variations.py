@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from .macros import Macro
-from .play import Attempt, Player
+from .player import Attempt, Player
 
 WITNESS, FOREIGN = "witness", "foreign"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import config
 from ..analysis.redraw import task_of
-from ..attack.campaign import Report, Settings, Subject, attack, certified, drawn
+from ..attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
 from ..config import read
@@ -22,7 +22,7 @@ from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("attack", arguments, Settings)
+    settings = read("attack", arguments, AttackSettings)
     settings.check()
     try_file(settings.json)
     try_folder(settings.to)
@@ -48,7 +48,7 @@ def command(arguments: Arguments) -> int:
     return FAILED if report.refuting else BAD_INPUT if report.lost else OK
 
 
-def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Subject]]:
+def _chosen(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Sequence[Subject]]:
     """The task that is attacked, and its scenarios.
 
     Raises:
@@ -67,7 +67,7 @@ def _chosen(arguments: Arguments, settings: Settings) -> tuple[Task, Sequence[Su
     return task, subjects
 
 
-def _remarks(report: Report, called: Mapping[str, str]) -> list[str]:
+def _remarks(report: AttackReport, called: Mapping[str, str]) -> list[str]:
     counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
     untried = [
         f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()

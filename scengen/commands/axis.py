@@ -5,15 +5,15 @@ from pathlib import Path
 from rich.table import Table
 
 from ..config import read_task
+from ..ood.axis_card import AxisCard, AxisSettings, make_axis_card
 from ..ood.behaviour import Baseline
-from ..ood.card import Card, Settings, make
 from ..runs.progress import ProgressBar
 from ..work.targets import try_folder
 from . import OK, Arguments, err, out, remark, say
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify_settings = read_task("axis", arguments, Settings)
+    settings, task, certify_settings = read_task("axis", arguments, AxisSettings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     try_folder(folder)
@@ -22,7 +22,7 @@ def command(arguments: Arguments) -> int:
         def progress(what: str, done: int, total: int) -> None:
             progress_bar.of(min(done, total), total, what)
 
-        card, missing = make(task, certify_settings, settings, folder, progress)
+        card, missing = make_axis_card(task, certify_settings, settings, folder, progress)
     out.print(_table(card))
     if missing:
         remark(f"the card has no pictures: {missing}")
@@ -39,7 +39,7 @@ def _tell(memory: Baseline) -> str:
     return f"{memory.finding}: {rates} ({lost})"
 
 
-def _table(card: Card) -> Table:
+def _table(card: AxisCard) -> Table:
     """The card in a few lines."""
     table = Table(title=f"{card.task}: axis {card.axis}", title_justify="left", show_header=False)
     for proof in card.proofs:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.coverage import evenness
-from ..analysis.distance import ENERGY_OF, MOST_PAIRS, Pair, energy, near_duplicates, per_parameter
+from ..analysis.distance import ENERGY_OF, MOST_PAIRS, NearDuplicate, energy, near_duplicates, per_parameter
 from ..analysis.redraw import batch_of, first_scenarios, redrawn, task_of, told
 from ..analysis.space import Batch, of_features
 from ..analysis.tables import SHOWN, pairs_table
@@ -101,6 +101,6 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
     }
 
 
-def _ids(pairs: Sequence[Pair]) -> list[str]:
+def _ids(pairs: Sequence[NearDuplicate]) -> list[str]:
     """Ids of the scenarios that are told."""
     return [id_ for pair in pairs[:SHOWN] for id_ in (pair.one, pair.other)]

@@ -3,7 +3,7 @@
 from rich.table import Table
 
 from ..config import read
-from ..evaluate.rollouts import Settings, cells, evaluate, markdown, plain, table
+from ..evaluate.rollouts import EvaluateSettings, cells, evaluate, markdown, plain, table
 from ..pool.pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
@@ -11,7 +11,7 @@ from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_js
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("evaluate", arguments, Settings)
+    settings = read("evaluate", arguments, EvaluateSettings)
     with ProgressBar(err, f"evaluate {settings.policy}", 1, settings.workers) as progress_bar:
         found = evaluate(settings, progress_bar.of, search_path(arguments))
     lines = table(found.episodes)

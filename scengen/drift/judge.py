@@ -37,7 +37,7 @@ ORACLES = ("shortcuts", "solved", "robust")
 
 
 @dataclass(frozen=True)
-class Again:
+class RepeatedCheck:
     """A check that was made again."""
 
     name: str
@@ -64,7 +64,7 @@ class Judgement:
     """The witness ends in the state that the certificate tells of."""
     scene: str
     """In what the scene that the family builds differs from that of the pool by more than rounding."""
-    checks: tuple[Again, ...] = ()
+    checks: tuple[RepeatedCheck, ...] = ()
     unknown: str = ""
     """Why nothing can be said: a limit was reached, a process died, or the row is none."""
 
@@ -139,13 +139,15 @@ def _made(trial: Trial, name: str) -> Check:
         return Check(name, None, "this machine has no oracle", {}, {})
 
 
-def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[Again, ...]:
+def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[RepeatedCheck, ...]:
     told = []
     for check in found:
         before = stored[check.name]
         flipped = check.passed is not None and check.passed != before.passed
         told.append(
-            Again(check.name, check.passed, check.reason, check.settings, check.numbers, before.numbers, flipped)
+            RepeatedCheck(
+                check.name, check.passed, check.reason, check.settings, check.numbers, before.numbers, flipped
+            )
         )
     return tuple(told)
 

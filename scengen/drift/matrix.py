@@ -137,7 +137,7 @@ def margin(check: Mapping[str, Any]) -> str:
     """What a check measured in the certificate and measures now, with its bars, and why it says otherwise.
 
     Args:
-        check: a `judge.Again` as plain data.
+        check: a `judge.RepeatedCheck` as plain data.
     """
     before, now = dict(leaves(check["stored"])), dict(leaves(check["numbers"]))
     names = [name for name in now if name in before and before[name] != now[name] and _number(now[name])]

@@ -92,7 +92,7 @@ class Oracle:
             return self.sent(self.env.world.idle)
 
 
-class Replay:
+class NearestReplay:
     """Plays the witness of the nearest training scenario other than the one at hand: what pure memory achieves."""
 
     def __init__(self, env: PoolEnv, memory: Library | None):
@@ -147,7 +147,7 @@ def find(name: str, memory: Library | None = None) -> Factory:
         ScengenError: there is no such policy.
     """
     if name == REPLAY:
-        return lambda env: Replay(env, memory)
+        return lambda env: NearestReplay(env, memory)
     if name in BUILT_IN:
         return BUILT_IN[name]
     module, colon, factory = name.partition(":")

@@ -33,7 +33,7 @@ class BadPolicy(ScengenError):
 
 
 @dataclass(frozen=True)
-class Settings:
+class EvaluateSettings:
     """Settings of `scengen evaluate`; meanings stand in conf/command/evaluate.yaml."""
 
     policy: str = ""
@@ -79,7 +79,7 @@ class RolloutId:
 
 
 @dataclass(frozen=True)
-class Line:
+class TableLine:
     """One line of the table: a task or a category, on one OOD split."""
 
     what: str
@@ -103,7 +103,9 @@ class Evaluation:
     """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
-def evaluate(settings: Settings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> Evaluation:
+def evaluate(
+    settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()
+) -> Evaluation:
     """Run every rollout that is still to do and return all episodes.
 
     Episodes are bound to the pools, the settings and the policy (see `policies.identity`): those of a policy that has
@@ -149,7 +151,7 @@ def evaluate(settings: Settings, progress: Callable[[int, int], None], search: S
         return Evaluation(episodes, done, lost)
 
 
-def table(episodes: Sequence[Mapping[str, Any]]) -> list[Line]:
+def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
     """The paper's table: one line for every task and OOD split, for every category, and for all tasks together.
 
     A scenario counts once, whatever the number of its rollouts. Scenario i of an axis is scenario i of training with
@@ -174,7 +176,7 @@ def table(episodes: Sequence[Mapping[str, Any]]) -> list[Line]:
     return [*lines, _mean_line("all", [line for _, line in whole])]
 
 
-def markdown(lines: Sequence[Line], settings: Settings) -> str:
+def markdown(lines: Sequence[TableLine], settings: EvaluateSettings) -> str:
     """The table as Markdown, rates and 95 % intervals in percent."""
     head = (
         f"Policy `{settings.policy}`: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
@@ -183,61 +185,63 @@ def markdown(lines: Sequence[Line], settings: Settings) -> str:
     return head + "".join(f"| {' | '.join(cells(line))} |\n" for line in lines)
 
 
-def cells(line: Line) -> list[str]:
+def cells(line: TableLine) -> list[str]:
     """A line of the table in words."""
     return [line.what, line.split, _spelled(line.id), _spelled(line.ood), _spelled(line.difference, "+")]
 
 
-def plain(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def plain(lines: Sequence[TableLine]) -> list[dict[str, Any]]:
     """The table as plain data."""
     return [asdict(line) for line in lines]
 
 
-Cells = dict[tuple[int, int], list[bool]]
+Outcomes = dict[tuple[int, int], list[bool]]
 """Outcomes of the rollouts of each scenario of a split, by seed and index: twins have the same in all splits."""
 
 
-def _cells(episodes: Iterable[Mapping[str, Any]]) -> dict[str, Cells]:
+def _cells(episodes: Iterable[Mapping[str, Any]]) -> dict[str, Outcomes]:
     """By split."""
-    found: dict[str, Cells] = {}
+    found: dict[str, Outcomes] = {}
     for e in episodes:
         found.setdefault(e["split"], {}).setdefault((e["seed"], e["index"]), []).append(e["success"])
     return found
 
 
-def _line(what: str, split: str, training: Cells, axes: Sequence[Cells]) -> Line:
+def _line(what: str, split: str, training: Outcomes, axes: Sequence[Outcomes]) -> TableLine:
     """One task. Several axes are averaged over the scenarios that all of them have."""
     inside = rate(list(training.values())) if training else None
     shared = [key for key in axes[0] if all(key in axis for axis in axes)] if axes else []
     if not shared:
-        return Line(what, split, inside, None, None)
+        return TableLine(what, split, inside, None, None)
     outcomes = {key: [success for axis in axes for success in _equally(axis[key], axes, key)] for key in shared}
     outside = rate(list(outcomes.values()))
     twins = [key for key in shared if key in training]
     if inside is None:
-        return Line(what, split, None, outside, None)
+        return TableLine(what, split, None, outside, None)
     if 2 * len(twins) >= len(shared) and len(twins) > 1:
         apart = paired([outcomes[key] for key in twins], [training[key] for key in twins])
     else:
         apart = difference(outside, inside)
-    return Line(what, split, inside, outside, apart)
+    return TableLine(what, split, inside, outside, apart)
 
 
-def _equally(outcomes: list[bool], axes: Sequence[Cells], key: tuple[int, int]) -> list[bool]:
+def _equally(outcomes: list[bool], axes: Sequence[Outcomes], key: tuple[int, int]) -> list[bool]:
     """As many rollouts of every axis, so that each has the same weight."""
     return outcomes[: min(len(axis[key]) for axis in axes)]
 
 
-def _mean_line(what: str, lines: Sequence[Line]) -> Line:
+def _mean_line(what: str, lines: Sequence[TableLine]) -> TableLine:
     """The mean of some tasks, over those that have both sides if any has."""
     both = [line for line in lines if line.difference is not None]
     if not both:
         inside = [line.id for line in lines if line.id is not None]
         outside = [line.ood for line in lines if line.ood is not None]
-        return Line(what, "all", mean_rate(inside) if inside else None, mean_rate(outside) if outside else None, None)
+        return TableLine(
+            what, "all", mean_rate(inside) if inside else None, mean_rate(outside) if outside else None, None
+        )
     parts = [(line.id, line.ood, line.difference) for line in both]
     inside, outside, apart = ([part for part in column if part is not None] for column in zip(*parts, strict=True))
-    return Line(what, "all", mean_rate(inside), mean_rate(outside), mean_difference(apart))
+    return TableLine(what, "all", mean_rate(inside), mean_rate(outside), mean_difference(apart))
 
 
 def _distinct(episodes: Sequence[Mapping[str, Any]], name: str) -> list[str]:
@@ -263,15 +267,15 @@ def _chosen(pool: Pool, seeds: int) -> dict[tuple[str, str], dict[str, Any]]:
     return {(str(pool.folder), id_): dict(zip(names, told, strict=True)) for id_, *told in rows}
 
 
-def _identity(settings: Settings, pools: Sequence[Pool]) -> dict[str, Any]:
+def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
     """What the outcome of a rollout depends on. More seeds or rollouts continue the same run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat")
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
-def _elsewhere(settings: Settings) -> Settings:
-    """Settings for workers, which need not be where this process is: their paths are whole."""
+def _elsewhere(settings: EvaluateSettings) -> EvaluateSettings:
+    """EvaluateSettings for workers, which need not be where this process is: their paths are whole."""
     return replace(settings, pool=[str(Path(folder).resolve()) for folder in settings.folders], workers=1)
 
 
@@ -289,7 +293,7 @@ def _move_aside(path: Path) -> None:
 class PolicyPlayer:
     """Plays rollouts: one environment and one policy at a time, kept as long as the task stays the same."""
 
-    def __init__(self, settings: Settings, search: Sequence[str] = ()):
+    def __init__(self, settings: EvaluateSettings, search: Sequence[str] = ()):
         self.settings, self.search = settings, search
         self._running: tuple[PoolEnv, Policy] | None = None
 

@@ -33,7 +33,7 @@ from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
-from .memory import Memory, remember
+from .solution_memory import SolutionMemory, remember
 
 BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")
 """From the weakest memory to the strongest."""
@@ -213,7 +213,7 @@ def _lost(index: int, reason: str) -> dict[str, Any]:
     return {"index": index, "reason": reason}
 
 
-def _outcomes(task: Task, memory: Memory, scenario: Scenario) -> dict[str, bool]:
+def _outcomes(task: Task, memory: SolutionMemory, scenario: Scenario) -> dict[str, bool]:
     return {
         "oracle": solves(task, scenario),
         "replay": replays(task, memory.actions, scenario),
@@ -234,7 +234,7 @@ def moved_within(task: Task, names: Iterable[str], seed: int, index: int, traine
     return None
 
 
-def _nearest(task: Task, seed: int, draw: Draw) -> list[Memory]:
+def _nearest(task: Task, seed: int, draw: Draw) -> list[SolutionMemory]:
     """The library, nearest first: by the quantiles of the parameters that vary in training."""
 
     def away(quantiles: Mapping[str, float]) -> float:
@@ -258,13 +258,13 @@ def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
     return memory and memory.actions
 
 
-def recall(task: Task, seed: int, index: int) -> tuple[Scenario, Memory | None]:
+def recall(task: Task, seed: int, index: int) -> tuple[Scenario, SolutionMemory | None]:
     """A training scenario, and how the oracle solves it."""
     scenario = task.draw(ID, seed, index).scenario
     return scenario, _remembered(scenario, task.horizon, task.embodiment)
 
 
-def _library(task: Task, seed: int) -> Sequence[tuple[Mapping[str, float], Memory]]:
+def _library(task: Task, seed: int) -> Sequence[tuple[Mapping[str, float], SolutionMemory]]:
     """Memories of training with the quantiles of their scenarios."""
     draws = [task.draw(ID, seed + 1, index) for index in range(LIBRARY)]
     known = [(d.quantiles, _remembered(d.scenario, task.horizon, task.embodiment)) for d in draws]
@@ -283,13 +283,13 @@ def _faithful(scenario: Scenario, horizon: float, embodiment: str) -> bool:
 
 
 @cache
-def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> Memory | None:
+def _remembered(scenario: Scenario, horizon: float, embodiment: str) -> SolutionMemory | None:
     world = world_of(scenario, embodiment)
     rollout = run(scenario, world, scenario.oracle, horizon, until_settled=True)
     return remember(scenario, world, rollout.actions) if rollout.solved else None
 
 
-def _follows(memory: Memory, scenario: Scenario, horizon: float, embodiment: str) -> bool:
+def _follows(memory: SolutionMemory, scenario: Scenario, horizon: float, embodiment: str) -> bool:
     world = world_of(scenario, embodiment)
     return run(scenario, world, memory.follow, horizon, until_settled=True, raw=True).solved
 
@@ -306,6 +306,6 @@ def replays(task: Task, actions: Actions, scenario: Scenario) -> bool:
     return replay(scenario, world, actions, task.horizon, until_settled=True).solved
 
 
-def follows(task: Task, memory: Memory, scenario: Scenario) -> bool:
+def follows(task: Task, memory: SolutionMemory, scenario: Scenario) -> bool:
     """Whether an object-centric memory solves a scenario."""
     return _follows(memory, scenario, task.horizon, task.embodiment)

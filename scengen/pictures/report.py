@@ -8,8 +8,8 @@ from typing import Any
 import jinja2
 from rich.table import Table
 
-from ..attack.campaign import Report as AttackReport
-from ..attack.evidence import Rate, spelled
+from ..attack.campaign import AttackReport
+from ..attack.evidence import TierRate, spelled
 from ..certificate import STAGES
 from ..pool.pool import Pool, PoolRow
 from ..runs.generate import Summary
@@ -65,7 +65,7 @@ def attack_table(report: AttackReport) -> Table:
     return table
 
 
-def _cells(rate: Rate) -> list[str]:
+def _cells(rate: TierRate) -> list[str]:
     """One line of the table in words."""
     kind, counts = spelled(rate.raw), (str(rate.rollouts), str(rate.hits))
     return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]

@@ -69,7 +69,7 @@ class Summary:
     """Rejections by "check: reason"."""
     first_draws: int
     """Indices whose very first draw was certified."""
-    attack: attacks.Report | None
+    attack: attacks.AttackReport | None
     """What the adversary has found, if it was asked for."""
     cpu: float
     """Processor time of all indices that count, in this run or earlier ones [s]."""
@@ -278,11 +278,11 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
 
 def _attack(
     job: Job, settings: Settings, records: dict[int, Record], journal: Journal, progress: Progress
-) -> attacks.Report:
+) -> attacks.AttackReport:
     """Attack the scenarios that go into the pool; those that turn out to have a way around do not go into it."""
     chosen = _chosen(records, settings.n)
     subjects = attacks.certified(job.task, journal.rows(chosen))
-    wanted = attacks.Settings(
+    wanted = attacks.AttackSettings(
         split=settings.split,
         budget=settings.attack,
         seed=settings.seed,
@@ -315,7 +315,7 @@ def _finish(
     settings: Settings,
     records: Mapping[int, Record],
     journal: Journal,
-    report: attacks.Report | None,
+    report: attacks.AttackReport | None,
 ) -> Summary:
     """Write the first n certified indices, and count up to the last of them."""
     certified = _chosen(records, settings.n)

@@ -9,12 +9,12 @@ import pytest
 
 from scengen import config
 from scengen.attack import draws
-from scengen.attack.campaign import Settings, attack, drawn, player_of
-from scengen.attack.evidence import Causal, Hit, Rate, hit, rates
+from scengen.attack.adversary import RANDOM, RETRY, Attack
+from scengen.attack.campaign import AttackSettings, attack, drawn, player_of
+from scengen.attack.evidence import Causal, Hit, TierRate, hit, rates
 from scengen.attack.macros import Macro
-from scengen.attack.play import Attempt, Player
+from scengen.attack.player import Attempt, Player
 from scengen.attack.priors import fit
-from scengen.attack.search import RANDOM, RETRY, Attack
 from scengen.attack.solids import handles, sides
 from scengen.attack.variations import perturbed, rest
 from scengen.cli.program import run
@@ -145,7 +145,7 @@ def test_what_does_not_replay_is_no_hit(player):
 
 
 def test_rates_add_up_and_have_bounds():
-    counts = [Rate(RANDOM, False, 20), Rate(RANDOM, False, 39), Rate(RANDOM, True, 10, 10, 2)]
+    counts = [TierRate(RANDOM, False, 20), TierRate(RANDOM, False, 39), TierRate(RANDOM, True, 10, 10, 2)]
     none, every = rates(counts)
     assert none.rollouts == 59 and none.bound == pytest.approx(0.0495, abs=1e-3)
     assert every.value == 1.0 and every.bound == 1.0 and every.refuting == 2
@@ -186,7 +186,7 @@ def test_fixed_answers_are_the_best_ones_together():
 
 @pytest.mark.slow
 def test_an_attack_is_stored_and_continues(tmp_path, subject):
-    settings, said = Settings(n=1, budget=4, tiers=["random"]), []
+    settings, said = AttackSettings(n=1, budget=4, tiers=["random"]), []
     first = attack(TASK, [subject], settings, tmp_path, lambda done, hits: said.append(done))
     again = attack(TASK, [subject], settings, tmp_path, lambda done, hits: said.append(done))
     assert said == [1] and first.plain() == again.plain() and first.rollouts == 4

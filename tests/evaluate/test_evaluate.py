@@ -9,7 +9,7 @@ import helpers
 import pytest
 
 from scengen import cli
-from scengen.evaluate.rollouts import Settings, evaluate, table
+from scengen.evaluate.rollouts import EvaluateSettings, evaluate, table
 from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
@@ -17,7 +17,7 @@ REFERENCE = str(helpers.REFERENCE)
 
 def run(folder, policy, **changes):
     said = {"pool": REFERENCE, "seeds": 3, "rollouts": 1, "to": str(folder), **changes}
-    return evaluate(Settings(policy=policy, **said), lambda *_: None).episodes
+    return evaluate(EvaluateSettings(policy=policy, **said), lambda *_: None).episodes
 
 
 @pytest.fixture

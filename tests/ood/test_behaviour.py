@@ -9,7 +9,7 @@ import pytest
 from scengen import cli, config
 from scengen.ood import behaviour, features
 from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Baseline, measure, verdict
-from scengen.ood.memory import remember
+from scengen.ood.solution_memory import remember
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
 from scengen.validate.rebuilt import world_of

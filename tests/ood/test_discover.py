@@ -19,11 +19,11 @@ from scengen.ood.discovery.trial import (
     CONFIRM,
     HOLDS,
     INFEASIBLE,
-    Box,
     Place,
     Point,
     Range,
-    Trial,
+    RegionBox,
+    SearchTrial,
     TrialRunner,
 )
 from scengen.samplers.axis import Axis
@@ -163,7 +163,7 @@ def _played(*twins):
 
 
 def _confirming(outcome, controls, reason=""):
-    return Trial(0, CONFIRM, Box((Range(0, 0.0, 1.0),)), 0, outcome, tuple(controls), reason)
+    return SearchTrial(0, CONFIRM, RegionBox((Range(0, 0.0, 1.0),)), 0, outcome, tuple(controls), reason)
 
 
 @pytest.mark.parametrize(("confirmed", "against"), [(0, 0), (3, 0), (8, 1), (5, 5), (1, 4)])

@@ -11,11 +11,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import pictures_are_possible
 from pools import QUICKLY, rewritten
+from scengen.pool.schema import Malformed
 
 from scengen import cli, config, conformance
 from scengen.attack.evidence import Causal
 from scengen.attack.macros import Macro
-from scengen.attack.play import Attempt, Player
+from scengen.attack.player import Attempt, Player
 from scengen.attack.retries import retries
 from scengen.attack.variations import rest
 from scengen.control.teleop import Filter
@@ -26,9 +27,8 @@ from scengen.envs.robosuite import env_class
 from scengen.errors import BadConfig, PoolError
 from scengen.evaluate import policies
 from scengen.evaluate.rollouts import BadPolicy, PolicyPlayer, RolloutId
-from scengen.evaluate.rollouts import Settings as Evaluation
+from scengen.evaluate.rollouts import EvaluateSettings as Evaluation
 from scengen.pool.pool import Pool
-from scengen.pool.schema import Malformed
 from scengen.sim.world import World
 from scengen.validate.rollout import Jitter, replay
 

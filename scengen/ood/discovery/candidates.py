@@ -11,7 +11,7 @@ from scipy.stats.qmc import Halton
 from ...errors import BadConfig
 from .boxes import boxes
 from .regions import Region
-from .trial import Place, Point, Trial
+from .trial import Place, Point, SearchTrial
 
 NARROW = "narrow"
 """Stage of the trials in and around the boxes."""
@@ -81,7 +81,7 @@ def forest_class() -> type[Any]:
     return RandomForestClassifier
 
 
-def uncertain_points(trials: Sequence[Trial], reaches: Reaches, random: np.random.Generator) -> list[Point]:
+def uncertain_points(trials: Sequence[SearchTrial], reaches: Reaches, random: np.random.Generator) -> list[Point]:
     """The points at which a forest is least certain whether they break the memory, all in different regions."""
     count = max(reaches) + 1
     table = np.stack([_row(trial.point, count) for trial in trials])
@@ -109,7 +109,7 @@ def _row(point: Point, count: int) -> NDArray[np.float64]:
     return row
 
 
-def single_points(trials: Sequence[Trial]) -> list[tuple[Point, int]]:
+def single_points(trials: Sequence[SearchTrial]) -> list[tuple[Point, int]]:
     """One parameter of each pair that broke a memory, and the pair's twin: one of the two may break it alone."""
     single = {trial.point.regions[0] for trial in trials if trial.breaks and len(trial.point.places) == 1}
     pairs = [trial for trial in trials if trial.breaks and len(trial.point.places) == 2]
@@ -121,7 +121,7 @@ def single_points(trials: Sequence[Trial]) -> list[tuple[Point, int]]:
     ]
 
 
-def surrounding_points(trials: Sequence[Trial]) -> list[Point]:
+def surrounding_points(trials: Sequence[SearchTrial]) -> list[Point]:
     """A point in each of the boxes with most evidence, or a little outside, to find where the box ends.
 
     The points of one box are spread evenly, however many are tried (Halton sequence).

@@ -14,7 +14,7 @@ import numpy as np
 from ...samplers.keyed import unit
 from .. import behaviour
 from .proposal import Finding
-from .trial import BREAKS, HOLDS, INFEASIBLE, Box, Place, PlannedTrial, Point, Trial, TrialRunner
+from .trial import BREAKS, HOLDS, INFEASIBLE, Place, PlannedTrial, Point, RegionBox, SearchTrial, TrialRunner
 
 SEARCH_TWINS = 8
 """Number of training scenarios whose memories are played in the search."""
@@ -36,13 +36,13 @@ CERTAINTY_P = FAMILYWISE_ERROR / 20 / LOOKS
 """P value below which the confirmation of a box ends at a look: it would suffice for one box among twenty."""
 
 
-def confirming_trial(runner: TrialRunner, planned: PlannedTrial) -> Trial:
+def play_confirming_trial(runner: TrialRunner, planned: PlannedTrial) -> SearchTrial:
     """Try a box in one fresh twin, at a random place; controls are moves of the same parameters within training.
 
     A parameter that training does not vary has one control, the scenario that is remembered.
     """
     box, number = planned.where, planned.twin - SEARCH_TWINS
-    assert isinstance(box, Box), "only boxes are confirmed"
+    assert isinstance(box, RegionBox), "only boxes are confirmed"
     trained, memory = runner.twin(planned.twin)
     outcome, task, seed = INFEASIBLE, runner.task, runner.seed
     solved = list[bool]()
@@ -61,7 +61,7 @@ def confirming_trial(runner: TrialRunner, planned: PlannedTrial) -> Trial:
     return planned.ended(outcome, solved)
 
 
-def _drawn_within(box: Box, seed: int, number: int, attempt: int) -> Point:
+def _drawn_within(box: RegionBox, seed: int, number: int, attempt: int) -> Point:
     """A random point of a box, the same for the same seed, twin and attempt."""
     return Point(
         tuple(
@@ -71,7 +71,7 @@ def _drawn_within(box: Box, seed: int, number: int, attempt: int) -> Point:
     )
 
 
-def p_value(trials: Sequence[Trial]) -> float:
+def p_value(trials: Sequence[SearchTrial]) -> float:
     """Probability that at most as many fresh twins are solved if a memory succeeds there as often as in its controls.
 
     Exact, and conditional on how much each twin's memory solves: where that is `k` of `m` controls and the one scenario
@@ -86,12 +86,12 @@ def p_value(trials: Sequence[Trial]) -> float:
     return float(chances[: held + 1].sum())
 
 
-def corrected_p_value(trials: Sequence[Trial]) -> float:
+def corrected_p_value(trials: Sequence[SearchTrial]) -> float:
     """The p value corrected for the number of looks."""
     return min(1.0, LOOKS * p_value(trials))
 
 
-def decided(trials: Sequence[Trial]) -> bool:
+def decided(trials: Sequence[SearchTrial]) -> bool:
     """Whether the confirmation of a box can end: its p value is small enough, or too large."""
     return not CERTAINTY_P <= p_value(trials) <= FUTILITY_P
 

@@ -10,7 +10,7 @@ from ...samplers.axis import Axis, Proof
 from ...samplers.dists import Dist, Fixed, Integer, Mixture, Uniform
 from ...samplers.task import Task
 from .regions import Region, located
-from .trial import BREAKS, INFEASIBLE, Box, Trial
+from .trial import BREAKS, INFEASIBLE, RegionBox, SearchTrial
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,12 @@ class Finding:
 
 
 def finding(
-    task: Task, known: Sequence[Region], box: Box, searched: Sequence[Trial], confirming: Sequence[Trial], p: float
+    task: Task,
+    known: Sequence[Region],
+    box: RegionBox,
+    searched: Sequence[SearchTrial],
+    confirming: Sequence[SearchTrial],
+    p: float,
 ) -> Finding:
     """The axis of a box, with its evidence.
 
@@ -75,7 +80,7 @@ def _reason(confirmed: int, fresh: int, played: Sequence[bool]) -> str:
     )
 
 
-def _axis(known: Sequence[Region], box: Box, why: str) -> Axis:
+def _axis(known: Sequence[Region], box: RegionBox, why: str) -> Axis:
     """The axis that moves the parameters of a box; one continuous parameter gets five severities."""
     moved = {known[i].parameter.name: distribution(known[i], low, high) for i, low, high in box.ranges}
     name = "_and_".join(known[i].name for i in box.regions)

@@ -48,14 +48,24 @@ from .confirmation import (
     FRESH_TWINS,
     SEARCH_TWINS,
     TWINS_PER_LOOK,
-    confirming_trial,
     corrected_by_holm,
     corrected_p_value,
     decided,
+    play_confirming_trial,
 )
 from .proposal import Finding, as_yaml, finding
 from .regions import Region, regions
-from .trial import CONFIRM, TRIAL_LIMITS, Box, Place, PlannedTrial, Point, Trial, TrialRunner, search_trial
+from .trial import (
+    CONFIRM,
+    TRIAL_LIMITS,
+    Place,
+    PlannedTrial,
+    Point,
+    RegionBox,
+    SearchTrial,
+    TrialRunner,
+    play_search_trial,
+)
 
 FOREST = "forest"
 """Method that learns from the trials so far where to look."""
@@ -133,7 +143,7 @@ def discover(
     known = regions(task)
     with _SearchRun(task, checks, settings, known, folder, progress) as run:
         _search(run, known, settings)
-        tested = list[tuple[Box, list[Trial]]]()
+        tested = list[tuple[RegionBox, list[SearchTrial]]]()
         for evidence, box in boxes(run.searched):
             if evidence >= MIN_EVIDENCE and run.spent + FRESH_TWINS <= settings.budget:
                 tested.append((box, run.confirm(len(tested), box)))
@@ -198,14 +208,14 @@ class _SearchRun:
             "controls": CONTROLS_PER_TWIN,
         }
         self.log = Log(folder / "trials.jsonl", identity)
-        self.trials: list[Trial] = []
+        self.trials: list[SearchTrial] = []
         """Trials in the order in which they ended: with several workers any order."""
         self.spent = 0
         """Number of trials that the search has asked for."""
 
     def __enter__(self) -> "_SearchRun":
         self.log.__enter__()
-        self.trials = [Trial.read(record) for record in self.log.records]
+        self.trials = [SearchTrial.read(record) for record in self.log.records]
         return self
 
     def __exit__(
@@ -214,7 +224,7 @@ class _SearchRun:
         self.log.__exit__(kind, error, trace)
 
     @property
-    def searched(self) -> list[Trial]:
+    def searched(self) -> list[SearchTrial]:
         """The trials of the search itself, without those that confirm."""
         return [trial for trial in self._from(0) if trial.stage != CONFIRM]
 
@@ -246,19 +256,19 @@ class _SearchRun:
             turns = [(number + shift) % SEARCH_TWINS for shift in range(SEARCH_TWINS)] if twins is None else [twins[k]]
             feasible = self._feasible(point, turns)
             planned.append(PlannedTrial(number, stage, point, turns[0] if feasible is None else feasible))
-        self._make(search_trial, planned)
+        self._make(play_search_trial, planned)
 
-    def confirm(self, number: int, box: Box) -> list[Trial]:
+    def confirm(self, number: int, box: RegionBox) -> list[SearchTrial]:
         """Try a box in fresh twins, some at a time, until all are tried or the p value decides.
 
         Args:
             number: number of the box among those that are confirmed.
         """
-        begin, trials = self.spent, list[Trial]()
+        begin, trials = self.spent, list[SearchTrial]()
         for first in range(0, FRESH_TWINS, TWINS_PER_LOOK):
             numbers = range(first, first + TWINS_PER_LOOK)
             twins = SEARCH_TWINS + number * FRESH_TWINS
-            self._make(confirming_trial, [PlannedTrial(begin + k, CONFIRM, box, twins + k) for k in numbers])
+            self._make(play_confirming_trial, [PlannedTrial(begin + k, CONFIRM, box, twins + k) for k in numbers])
             trials = self._from(begin)
             if decided(trials):
                 break
@@ -268,7 +278,7 @@ class _SearchRun:
         """The first of some twins in which a point is feasible."""
         return next((k for k in twins if self.runner.feasible(self.trained[k], point)), None)
 
-    def _make(self, work: Callable[[TrialRunner, PlannedTrial], Trial], planned: Sequence[PlannedTrial]) -> None:
+    def _make(self, work: Callable[[TrialRunner, PlannedTrial], SearchTrial], planned: Sequence[PlannedTrial]) -> None:
         """Make the trials that the log does not hold."""
         made = {trial.number for trial in self.trials}
         todo = [one for one in planned if one.number not in made]
@@ -278,7 +288,7 @@ class _SearchRun:
             self.progress(trial.stage, len(self.trials), self.settings.budget)
         self.spent += len(planned)
 
-    def _from(self, begin: int) -> list[Trial]:
+    def _from(self, begin: int) -> list[SearchTrial]:
         """The trials from number `begin` on that the search has asked for, by number."""
         asked = (trial for trial in self.trials if begin <= trial.number < self.spent)
         return sorted(asked, key=lambda trial: trial.number)

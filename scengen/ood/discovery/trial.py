@@ -69,7 +69,7 @@ class Range(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Box:
+class RegionBox:
     """A range of places in each of one or two regions."""
 
     ranges: tuple[Range, ...]
@@ -95,22 +95,22 @@ class PlannedTrial:
     """Number of the trial in the search."""
     stage: str
     """Stage of the search that asks for the trial."""
-    where: Point | Box
+    where: Point | RegionBox
     """Point that is tried; the box if it is to be confirmed."""
     twin: int
     """Number of the twin whose memory is played."""
 
-    def ended(self, outcome: str, controls: Sequence[bool] = (), reason: str = "") -> "Trial":
+    def ended(self, outcome: str, controls: Sequence[bool] = (), reason: str = "") -> "SearchTrial":
         """The trial with its outcome."""
-        return Trial(self.number, self.stage, self.where, self.twin, outcome, tuple(controls), reason)
+        return SearchTrial(self.number, self.stage, self.where, self.twin, outcome, tuple(controls), reason)
 
-    def lost(self, reason: str) -> "Trial":
+    def lost(self, reason: str) -> "SearchTrial":
         """The trial if its process crashed or reached a limit: unsolved, with the reason."""
         return self.ended(UNSOLVED, reason=reason)
 
 
 @dataclass(frozen=True)
-class Trial(PlannedTrial):
+class SearchTrial(PlannedTrial):
     """A trial that was made."""
 
     outcome: str
@@ -143,11 +143,11 @@ class Trial(PlannedTrial):
         return record
 
     @classmethod
-    def read(cls, record: Mapping[str, Any]) -> "Trial":
+    def read(cls, record: Mapping[str, Any]) -> "SearchTrial":
         """A record of the log as a trial."""
         parts = record["point"]
         where = (
-            Box(tuple(Range(*p) for p in parts))
+            RegionBox(tuple(Range(*p) for p in parts))
             if record["stage"] == CONFIRM
             else Point(tuple(Place(*p) for p in parts))
         )
@@ -166,7 +166,7 @@ class TrialRunner:
     """Regions outside training, by number."""
     seed: int
 
-    def twin(self, number: int) -> tuple[Scenario, behaviour.Memory]:
+    def twin(self, number: int) -> tuple[Scenario, behaviour.SolutionMemory]:
         """Training scenario `number`, or another one if its memory does not solve it again.
 
         Raises:
@@ -185,7 +185,7 @@ class TrialRunner:
         except (ScengenError, ValueError):
             return False
 
-    def outcome(self, trained: Scenario, memory: behaviour.Memory, point: Point) -> str:
+    def outcome(self, trained: Scenario, memory: behaviour.SolutionMemory, point: Point) -> str:
         """Outcome of a memory in its own scenario, some parameters of which are moved outside training."""
         try:
             scenario = self._moved(trained, point)
@@ -204,7 +204,7 @@ class TrialRunner:
         return with_values(trained, spelled({self.known[place.region]: place.at for place in point}))
 
 
-def search_trial(runner: TrialRunner, planned: PlannedTrial) -> Trial:
+def play_search_trial(runner: TrialRunner, planned: PlannedTrial) -> SearchTrial:
     """Make one trial of the search."""
     assert isinstance(planned.where, Point), "a box is confirmed, not searched"
     return planned.ended(runner.outcome(*runner.twin(planned.twin), planned.where))

@@ -36,7 +36,7 @@ SHOWN = 4
 
 
 @dataclass(frozen=True)
-class Settings:
+class AxisSettings:
     """Settings of `scengen axis`; meanings stand in conf/command/axis.yaml."""
 
     axis: str = ""
@@ -64,7 +64,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Card:
+class AxisCard:
     """The evidence about one axis."""
 
     task: str
@@ -104,13 +104,13 @@ class Card:
         return told
 
 
-def make(
+def make_axis_card(
     task: Task,
     certify_settings: CertifySettings,
-    settings: Settings,
+    settings: AxisSettings,
     folder: Path,
     progress: Callable[[str, int, int], None],
-) -> tuple[Card, str]:
+) -> tuple[AxisCard, str]:
     """Gather all evidence and write `card.html` and `card.json`, continuing what stands in `folder`.
 
     Args:
@@ -134,7 +134,7 @@ def make(
         tuple(c for c in of_parameters(task, [*training, *here]).columns if c.name in task.axes[name].replace)
     )
     axis = task.axes[name]
-    card = Card(
+    card = AxisCard(
         task.name,
         name,
         axis.why,
@@ -161,7 +161,7 @@ def make(
 def _certified(
     task: Task,
     certify_settings: CertifySettings,
-    settings: Settings,
+    settings: AxisSettings,
     n: int,
     folder: Path,
     progress: Callable[[str, int, int], None],
@@ -196,7 +196,7 @@ def _boundaries(
 # --- the page -----------------------------------------------------------------------------------
 
 
-def _page(task: Task, card: Card, pool: Pool | None, seed: int, path: Path) -> str:
+def _page(task: Task, card: AxisCard, pool: Pool | None, seed: int, path: Path) -> str:
     """Write the page, with pictures where they are possible. Returns why they are not, or nothing."""
     remark, pairs, strips = "", [], []
     try:
@@ -239,7 +239,7 @@ def _strips(task: Task, row: PoolRow) -> list[tuple[str, str]]:
     return [(title, render.address(render.encode(film.strip(take)), "webp")) for title, take in takes]
 
 
-def _supports(task: Task, card: Card) -> Figure:
+def _supports(task: Task, card: AxisCard) -> Figure:
     """Both supports of every parameter that moves, each in its own range."""
     shifts = task.axes[card.axis].replace
     figure = Figure(figsize=(7.5, 0.5 + 0.55 * len(shifts)))
@@ -263,7 +263,7 @@ def _draw(plot: Any, support: Support, y: float, colour: str) -> None:
             plot.plot([part.low, part.high], [y, y], color=colour, linewidth=7, solid_capstyle="butt")
 
 
-def _path(card: Card) -> Figure:
+def _path(card: AxisCard) -> Figure:
     """Where replay and oracle fail on the path of the axis: interval and guess; lines are where they hold."""
     figure = Figure(figsize=(7.5, 1.5))
     plot = figure.subplots()

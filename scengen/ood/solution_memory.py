@@ -33,7 +33,7 @@ GROUND = {"world", "table"}
 
 
 @dataclass(frozen=True)
-class Part:
+class PathPart:
     """A stretch of a hand's path that belongs to one body."""
 
     first: int
@@ -47,7 +47,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Path:
+class HandPath:
     """What one arm did."""
 
     actions: Actions
@@ -56,7 +56,7 @@ class Path:
     """Where the hand was before each action [m], shape (n, 3)."""
     rots: NDArray[np.float64]
     """Its orientation then, shape (n, 3, 3)."""
-    parts: tuple[Part, ...]
+    parts: tuple[PathPart, ...]
 
     def follow(self, arm: Arm) -> Plan:
         """The path again, each part relative to its body as it now is; one whose body is not there, where it was."""
@@ -84,12 +84,12 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Memory:
+class SolutionMemory:
     """What is kept of a rollout that reached its goal."""
 
     actions: Actions
     """As the controller received them."""
-    paths: tuple[Path, ...]
+    paths: tuple[HandPath, ...]
     """Of every arm."""
 
     def follow(self, world: World) -> Plan:
@@ -97,7 +97,7 @@ class Memory:
         yield from together(world, *(path.follow(arm) for path, arm in zip(self.paths, world.arms, strict=True)))
 
 
-def remember(scenario: Scenario, world: World, actions: Actions) -> Memory:
+def remember(scenario: Scenario, world: World, actions: Actions) -> SolutionMemory:
     """Play a solution again in its own world, events included, and keep what an object-centric memory keeps."""
     world.reset()
     episode = Episode(scenario, world)
@@ -109,17 +109,17 @@ def remember(scenario: Scenario, world: World, actions: Actions) -> Memory:
         episode.step(action)
         for aims in every:
             aims.look()
-    paths = list[Path]()
+    paths = list[HandPath]()
     for number, aims in enumerate(every):
-        parts = list[Part]()
+        parts = list[PathPart]()
         for row, body in enumerate(_next(aims.touched)):
             if not parts or parts[-1].body != body:
                 pos, rot = poses[row][body] if body else (np.zeros(3), np.eye(3))
-                parts.append(Part(row, body, pos, rot))
+                parts.append(PathPart(row, body, pos, rot))
         own = actions[:, ACTION * number : ACTION * (number + 1)]
         where, rots = (np.array(of_all) for of_all in zip(*(row[number] for row in hands), strict=True))
-        paths.append(Path(own, where, rots, tuple(parts)))
-    return Memory(actions, tuple(paths))
+        paths.append(HandPath(own, where, rots, tuple(parts)))
+    return SolutionMemory(actions, tuple(paths))
 
 
 class _Aims:

@@ -8,9 +8,9 @@ from itertools import islice
 
 from ..samplers.keyed import unit
 from . import draws
-from .evidence import Causal, Hit, Rate, hit, rates
+from .evidence import Causal, Hit, TierRate, hit, rates
 from .macros import Macro
-from .play import Attempt, Node, Played, Player
+from .player import Attempt, Node, Played, Player
 from .priors import Prior, guesses
 from .retries import RETRY, retries
 from .signature import Signature
@@ -28,7 +28,7 @@ LEFT = 2.0
 
 
 @dataclass(frozen=True)
-class Untried:
+class UntriedShortcut:
     """A shortcut that was not carried out: a move of it gave up, so that nothing is known about it."""
 
     name: str
@@ -37,21 +37,21 @@ class Untried:
 
 
 @dataclass
-class Result:
+class AttackResult:
     """What came of the attack on one scenario."""
 
     scenario: str
-    rates: list[Rate]
+    rates: list[TierRate]
     hits: list[Hit]
     cpu: float
     """Processor time of the rollouts of the adversary [s]."""
-    untried: list[Untried]
+    untried: list[UntriedShortcut]
     lost: str = ""
     """Why the attack did not come to its end: the process crashed, or reached a limit."""
 
 
 @dataclass(frozen=True)
-class Cell:
+class ArchivedState:
     """A state of the archive."""
 
     node: Node
@@ -63,18 +63,18 @@ class Cell:
 class Archive:
     """What has been reached, by contacts and displacements: successes first, else what is rare."""
 
-    cells: dict[tuple[bool, Signature], list[Cell]] = field(default_factory=dict)
+    cells: dict[tuple[bool, Signature], list[ArchivedState]] = field(default_factory=dict)
     visits: Counter[tuple[bool, Signature]] = field(default_factory=Counter)
     successes: list[tuple[Hit, Node | None, tuple[Macro, ...]]] = field(default_factory=list)
     """Each with where it began, and its macros."""
 
-    def add(self, cell: Cell) -> None:
+    def add(self, cell: ArchivedState) -> None:
         """Keep a state; of many alike the latest ones."""
         key = (cell.raw, cell.signature)
         self.visits[key] += 1
         self.cells[key] = [*self.cells.get(key, []), cell][-4:]
 
-    def rarest(self, raw: bool, number: float) -> Cell | None:
+    def rarest(self, raw: bool, number: float) -> ArchivedState | None:
         """A state of the cell that was visited least, on the way of raw or of filtered actions."""
         keys = [key for key in self.cells if key[0] == raw]
         if not keys:
@@ -107,15 +107,15 @@ class Attack:
         self.player, self.seed, self.number, self.of, self.priors, self.until = player, seed, number, of, priors, until
         self.causal = Causal(player)
         self.archive, self.fatal = Archive(), Counter[tuple[int | None, str, str]]()
-        self.counts: list[Rate] = []
+        self.counts: list[TierRate] = []
         self.hits: list[Hit] = []
-        self.untried: list[Untried] = []
+        self.untried: list[UntriedShortcut] = []
         self.cpu, self.done = 0.0, False
         for k, stage in enumerate(player.trace.stages[: player.phases]):
             for raw in (False, True):
-                self.archive.add(Cell(player.stage(k), raw, stage.signature))
+                self.archive.add(ArchivedState(player.stage(k), raw, stage.signature))
 
-    def run(self, budget: int, tiers: Sequence[str] = TIERS) -> Result:
+    def run(self, budget: int, tiers: Sequence[str] = TIERS) -> AttackResult:
         """Spend `budget` rollouts on some tiers."""
         total = sum(SHARES[tier] for tier in tiers)
         owed = 0.0
@@ -124,7 +124,7 @@ class Attack:
             owed -= self._tier(tier, 2 * round(owed / 2))
         if round(owed) > 0 and not self.done and {RANDOM, SEARCH} & {*tiers}:
             self._tier(SEARCH if SEARCH in tiers else RANDOM, 2 * round(owed / 2))
-        return Result(self.player.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
+        return AttackResult(self.player.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
 
     def _tier(self, tier: str, rollouts: int) -> int:
         """Play attempts of one tier; returns how many rollouts that took."""
@@ -183,18 +183,18 @@ class Attack:
         self.cpu += time.process_time() - start
         found = hit(self.player, attempt, raw, played, node, self.causal) if played.solved else None
         refuting = int(found is not None and found.refutes)
-        self.counts.append(Rate(attempt.tier, raw, 1, int(found is not None), refuting))
+        self.counts.append(TierRate(attempt.tier, raw, 1, int(found is not None), refuting))
         if found:
             self.hits.append(found)
             self.archive.successes.append((found, node, attempt.macros))
             self.done = self.done or self.until(found)
         if attempt.tier == SHORTCUT and len(attempt.macros) == 1 and played.outcome == "timeout" and played.notes:
-            self.untried.append(Untried(attempt.macros[0].target, raw, played.notes[0]))
+            self.untried.append(UntriedShortcut(attempt.macros[0].target, raw, played.notes[0]))
         if played.outcome == "failure" and not played.nodes:
             self.fatal[_first(attempt)] += 1
         for one in played.nodes:
             if one.seconds < self.player.horizon - LEFT:
-                self.archive.add(Cell(one, raw, one.signature))
+                self.archive.add(ArchivedState(one, raw, one.signature))
         return played
 
 

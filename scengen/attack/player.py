@@ -16,9 +16,9 @@ from ..sim.world import World
 from ..validate.rollout import Stillness
 from . import macros
 from .macros import Macro
+from .phases import again, follow, trace
 from .signature import Signature, signature, starts
 from .solids import Solid, solids
-from .witness import again, follow, trace
 
 SETTLE = 1.0
 """How long a reached goal has to last without action [s], as in a certificate."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scengen.assets.prop import table
-from scengen.ood.memory import Part, Path
+from scengen.ood.solution_memory import HandPath, PathPart
 from scengen.sim import scene_text
 from scengen.sim.world import World
 
@@ -13,8 +13,8 @@ def test_a_path_to_a_body_that_is_not_there_stays_where_it_was():
     world = World.load(scene_text.emit(table())[0])
     arm, rows = world.arm, 60
     aim = arm.hand + np.array([0.05, 0.0, -0.05])
-    part = Part(0, "a body of another scene", np.array([0.3, 0.2, 0.8]), np.eye(3))
-    path = Path(np.zeros((rows, 7)), np.tile(aim, (rows, 1)), np.tile(arm.hand_rot, (rows, 1, 1)), (part,))
+    part = PathPart(0, "a body of another scene", np.array([0.3, 0.2, 0.8]), np.eye(3))
+    path = HandPath(np.zeros((rows, 7)), np.tile(aim, (rows, 1)), np.tile(arm.hand_rot, (rows, 1, 1)), (part,))
     for action in path.follow(arm):
         world.step(action)
     assert np.linalg.norm(arm.hand - aim) < 0.015

@@ -14,7 +14,7 @@ from ..scenario import Plan, Scenario
 from ..sim.world import ROBOT, World
 from ..skills.motion import STEP, STIFFNESS, go_to, together
 from .macros import CLOSE, Macro
-from .signature import Pair, Signature, pairs, robots, signature, starts
+from .signature import ContactPair, Signature, pairs, robots, signature, starts
 from .solids import held
 
 SHORTEST = 0.20
@@ -55,7 +55,7 @@ class Trace:
     """Beginnings of phases in order, and the end: phase k goes from stage k to stage k + 1."""
     signature: Signature
     """When the goal was reached."""
-    events: tuple[tuple[int, Pair], ...]
+    events: tuple[tuple[int, ContactPair], ...]
     """Contacts that there were none of at the start: the row of the first one of each, in order."""
     _robots: frozenset[str]
     """What stands for the robot in them."""
@@ -89,7 +89,7 @@ def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
     """Replay a witness and take it apart; None if it does not reach the goal."""
     world.reset()
     start, episode = starts(world), Episode(scenario, world)
-    poses, marks, events = [_poses(world)], [_Mark.of(world)], list[tuple[int, Pair]]()
+    poses, marks, events = [_poses(world)], [_Mark.of(world)], list[tuple[int, ContactPair]]()
     states = [(world.state(), 0.0, signature(world, start))]
     for action in actions:
         outcome = episode.step(action)
@@ -118,7 +118,7 @@ class _Mark:
 
     closed: tuple[bool, ...]
     """Whether each gripper is told to close."""
-    touched: tuple[bool, frozenset[Pair]]
+    touched: tuple[bool, frozenset[ContactPair]]
     """Whether the robot touches a free body, and all contacts since the start."""
     holds: tuple[str | None, ...]
 
