@@ -1,6 +1,6 @@
 """Attack every task, and docs/attacks.md with a line for each. `python tools/attack_all.py 500 [task ...]`
 
-Reports stand in docs/attacks, hits in generated/attack; a repeated call continues. Tasks that were never attacked have
+Reports stand in records/attacks, hits in generated/attack; a repeated call continues. Tasks that were never attacked have
 no line.
 """
 
@@ -14,7 +14,7 @@ from scengen import cli, config
 from scengen.attack.evidence import TierRate
 
 SCENARIOS, SEED = 10, 4242
-FOLDER = Path("docs/attacks")
+FOLDER = Path("records/attacks")
 PAGE = Path("docs/attacks.md")
 HEAD = f"""# Every task, attacked
 

@@ -1,6 +1,6 @@
 """Every task under other versions of MuJoCo, and docs/drift.md. `python tools/drift_all.py 10 POOLS [task ...]`
 
-Pools lie in POOLS/<task>; one that is missing is generated there. Results stand in docs/drift; tasks that were never
+Pools lie in POOLS/<task>; one that is missing is generated there. Results stand in records/drift; tasks that were never
 compared have no line.
 """
 
@@ -13,11 +13,11 @@ from typing import Any
 from scengen import cli, config
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
-from scengen.pool.pool import MANIFEST
+from scengen.pool.manifest import MANIFEST
 
 VERSIONS = ("3.3.7", "3.4.0", "3.5.0")
 LEVEL = "recheck"
-FOLDER = Path("docs/drift")
+FOLDER = Path("records/drift")
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
