@@ -1,4 +1,4 @@
-"""docs/certified.md: what certification came to, by task and split, from conf/certified.yaml. `make docs`"""
+"""Writes docs/certified.md, the results of certification by task and split, from conf/certified.yaml. `make docs`"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,14 +10,13 @@ from scengen.validate.certify import lower_bound
 PAGE = Path(__file__).parent.parent / "docs" / "certified.md"
 HEAD = """# Every split, certified
 
-Written by `make docs` from conf/certified.yaml, where `tools/certified.py` puts what it measures.
+Written by `make docs` from conf/certified.yaml, which holds the measurements of `tools/certified.py`.
 
-* **certified**: at level `quick`, of the first draws. What became of the others stands below the table.
-* **oracle**: other draws that the oracle solves without any disturbance, and the one-sided 95 % Clopper-Pearson bound
-  of its rate.
-* **robosuite**: witnesses with the same verdict in robosuite, of those played there.
-* **CPU s**: processor time of each scenario that was certified, and of those lost on its way, with every core of the
-  machine at work. Rows without an oracle are older: one core of an idle machine, and conjugate gradients.
+* **certified**: scenarios certified at level `quick`, of the first draws. The rejected ones are listed below the table.
+* **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its success rate.
+* **robosuite**: witnesses with the same verdict in robosuite, of those replayed there.
+* **CPU s**: CPU time per certified scenario, rejected draws included, with all cores of the machine busy. Rows without an oracle figure are older: they
+  were measured on one core of an idle machine, with the conjugate-gradient solver.
 
 | task | split | certified | oracle | robosuite | CPU s |
 |---|---|---|---|---|---|
@@ -25,14 +24,14 @@ Written by `make docs` from conf/certified.yaml, where `tools/certified.py` puts
 
 
 def page() -> str:
-    """The page as it has to be: Markdown."""
+    """The page as Markdown."""
     told, lost = task_files.certified(), []
     lines = []
     for name in config.tasks():
         for split, found in told.get(name, {}).items():
             lines.append(_line(f"[{name}](tasks/{name}.md)", split, found))
             lost += [f"* {name}, {split}: {times} {reason}" for reason, times in found.get("lost", {}).items()]
-    return HEAD + "\n".join(lines) + "\n\n## What was lost\n\n" + "\n".join(lost) + "\n"
+    return HEAD + "\n".join(lines) + "\n\n## Rejected draws\n\n" + "\n".join(lost) + "\n"
 
 
 def _line(task: str, split: str, found: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The table of costs in docs/cluster.md, from conf/certified.yaml. `make docs`"""
+"""Writes the table of costs in docs/cluster.md from conf/certified.yaml. `make docs`"""
 
 import re
 from pathlib import Path
@@ -11,18 +11,18 @@ HOUR, DAY = 3600.0, 86_400.0
 
 
 def page() -> str:
-    """The page, with the table as it has to be."""
+    """The page with its table up to date."""
     return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}{table()}{END}", PAGE.read_text(), flags=re.S)
 
 
 def table() -> str:
-    """What pools of the training split cost, by task: Markdown."""
+    """Costs of pools of the training split, by task, as Markdown."""
     each = {task: splits[task_files.ID]["cpu"] for task, splits in task_files.certified().items()}
     lines = [
         "| task | one [core s] | 10 thousand [core hours] | 1 million [core days] | 10 million [core days] |",
         "|---|---|---|---|---|",
         *(_line(f"[{task}](tasks/{task}.md)", cpu) for task, cpu in sorted(each.items(), key=lambda x: x[1])),
-        _line("as many of every task", sum(each.values()) / len(each)),
+        _line("mean over tasks", sum(each.values()) / len(each)),
     ]
     return "".join(f"{line}\n" for line in lines)
 

@@ -1,6 +1,6 @@
-"""docs/paper.md: what every task decides where the paper is silent, and where it differs from it. `make docs`
+"""Writes docs/paper.md: the decisions of each task where the paper is silent, and its differences. `make docs`
 
-It is taken from the docstrings of the families: all that follows the paragraph about the bottleneck.
+The text is taken from the docstrings of the families: everything after the paragraph that begins with "Bottleneck".
 """
 
 import ast
@@ -13,22 +13,21 @@ from scengen import config
 from scengen.samplers.task import Task
 
 PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
-HEAD = """# Where the tasks differ from the paper
+HEAD = """# Differences from the paper
 
-The paper ([sources](../CONTRIBUTING.md#sources)) tells most tasks in a few sentences, gives few numbers, and
-contradicts itself in places. What each task decides there, and where it leaves the paper, is written at the head of
-its family, and gathered here by `tools/paper_page.py`.
+The paper ([sources](../CONTRIBUTING.md#sources)) describes most tasks in a few sentences, gives few numbers, and contradicts itself in places.
+Each task states its decisions, and its differences from the paper, in the docstring of its family. `tools/paper_page.py` collects them here.
 
-What holds for all of them:
+Decisions that hold for all tasks:
 
-* Tasks that the paper lists with two arms of which one is frozen have one arm here: the other would add numbers that do
-  nothing.
-* Goals that the paper describes in words have numbers here, and what is reached must last: `HOLD` of the family.
-* A way around what the paper says a task is about is closed, by physics where that is possible, else by a rule that
-  loses the episode; the paper has few such rules.
-* The eight OOD conditions of the paper (App. I) are axes of their tasks: `scengen tasks axes=paper`. All other axes are
-  ours, or take up what the paper says elsewhere, and say so.
-* MuJoCo is 3.5 and robosuite 1.5.2 (the paper: 3.1.2 and 1.5); certificates name the versions that they hold for.
+* Some tasks of the paper list two arms of which one is frozen. These tasks have one arm here, because the frozen arm would only add unused
+  dimensions.
+* Goals that the paper describes in words have numbers here, and a goal must hold for some time: `HOLD` of the family.
+* If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise by a rule that ends the
+  episode. The paper has few such rules.
+* The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are ours or follow another
+  statement of the paper; each names its source.
+* MuJoCo is 3.5 and robosuite is 1.5.2 (the paper: 3.1.2 and 1.5). Certificates name the versions for which they hold.
 """
 
 
@@ -46,7 +45,7 @@ def page() -> str:
 
 
 def decisions(task: Task) -> str:
-    """What follows the bottleneck in the docstring of a family, as Markdown."""
+    """Text after the bottleneck in the docstring of a family, as Markdown."""
     text = ast.get_docstring(ast.parse(Path(inspect.getfile(task.family)).read_text())) or ""
     found = re.search(r"^Bottleneck.*?\n\n", text, re.M | re.S)
     if found is None or not text[found.end() :].strip():
