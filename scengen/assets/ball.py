@@ -8,7 +8,7 @@ import mujoco
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-STEEL = 7850.0
+STEEL_DENSITY = 7850.0
 """Density of carbon steel [kg/m^3]."""
 
 
@@ -20,7 +20,7 @@ class Ball(Prop):
     """
 
     radius: float = param(0.018, "m", 0.008, 0.035)
-    density: float = param(STEEL, "kg/m^3", 200.0, 12000.0)
+    density: float = param(STEEL_DENSITY, "kg/m^3", 200.0, 12000.0)
     friction: float = param(0.4, "1", 0.05, 1.5)
     rolling: float | None = None
     """Resistance to rolling, as a share of the load; None: as little as MuJoCo has by default. Tasks in which it counts

@@ -7,7 +7,7 @@ import mujoco
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-PLASTIC = 1000.0
+PLASTIC_DENSITY = 1000.0
 """Density [kg/m^3]; without effect while the bin is fixed."""
 
 
@@ -47,7 +47,7 @@ class Bin(Prop):
             "far": ((thick, half_y, rim), (half_x + thick, 0.0, rim)),
         }
         for name, (size, pos) in parts.items():
-            mass = PLASTIC * 8 * size[0] * size[1] * size[2]
+            mass = PLASTIC_DENSITY * 8 * size[0] * size[1] * size[2]
             solid(body, name, size, pos, mass=mass, friction=self.friction, rgba=self.rgba)
 
 

@@ -18,9 +18,9 @@ from ..geometry import Vec3
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-STRIP = 0.020
+STRIP_WIDTH = 0.020
 """Width of the strip [m]."""
-STEEL: Rgba = (0.30, 0.32, 0.36, 1.0)
+STRIP_COLOUR: Rgba = (0.30, 0.32, 0.36, 1.0)
 """Colour of a strip that is heavier than the rest."""
 
 
@@ -51,7 +51,7 @@ class Board(Prop):
     @property
     def strip_mass(self) -> float:
         """Of the strip [kg], such that the centre of mass is where it is said to be."""
-        return self.mass * (2 * self.off_centre + STRIP) / self.width
+        return self.mass * (2 * self.off_centre + STRIP_WIDTH) / self.width
 
     @property
     def tipping_overhang(self) -> float:
@@ -61,8 +61,14 @@ class Board(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         x, y, z = self.size / 2
         parts = (
-            ("board", y - STRIP / 2, -STRIP / 2, self.mass - self.strip_mass, self.rgba),
-            ("strip", STRIP / 2, y - STRIP / 2, self.strip_mass, STEEL if self.off_centre > 0.0 else self.rgba),
+            ("board", y - STRIP_WIDTH / 2, -STRIP_WIDTH / 2, self.mass - self.strip_mass, self.rgba),
+            (
+                "strip",
+                STRIP_WIDTH / 2,
+                y - STRIP_WIDTH / 2,
+                self.strip_mass,
+                STRIP_COLOUR if self.off_centre > 0.0 else self.rgba,
+            ),
         )
         for name, half, at, mass, rgba in parts:
             solid(body, name, [x, half, z], [0.0, at, z], mass=mass, friction=self.friction, rgba=rgba)

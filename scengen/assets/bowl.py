@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from ..params import param
 from .prop import Rgba, show
-from .turned import PROUD, SHORTEST, Section, Turned
+from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
-BANDS = 6
+SHELL_BANDS = 6
 """Cones that stand for the shell. Tangents of the inner sphere, chords of the outer one: 0.25 mm of 3 mm get lost."""
-BEAD = 0.012
+BEAD_HEIGHT = 0.012
 """Height of the bead [m]."""
 
 
@@ -46,12 +46,12 @@ class Bowl(Turned):
     @property
     def centre(self) -> float:
         """Height of the centre of both spheres [m]: as far from the edge of the foot as from the rim."""
-        return ((self.radius**2 - self.foot**2) / (self.depth - PROUD) + self.depth + PROUD) / 2
+        return ((self.radius**2 - self.foot**2) / (self.depth - FOOT_PROTRUSION) + self.depth + FOOT_PROTRUSION) / 2
 
     @property
     def outer(self) -> float:
         """Radius of the outer sphere [m]."""
-        return math.hypot(self.foot, self.centre - PROUD)
+        return math.hypot(self.foot, self.centre - FOOT_PROTRUSION)
 
     @property
     def inner(self) -> float:
@@ -69,12 +69,12 @@ class Bowl(Turned):
 
     @property
     def sections(self) -> list[Section]:
-        angles = [self._first + i * self._step for i in range(BANDS + 1)]
+        angles = [self._first + i * self._step for i in range(SHELL_BANDS + 1)]
         outside = [self._corner(self.outer, a) for a in angles]
         inside = [self._corner(self.inner / math.cos(self._step / 2), a) for a in angles]
-        hole = min(self.hole, 0.8 * self.foot) if self.hole >= SHORTEST else 0.0
-        bottom = [(hole, PROUD), outside[0], inside[0], (hole, inside[0][1])]
-        shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(BANDS)]
+        hole = min(self.hole, 0.8 * self.foot) if self.hole >= MIN_DETAIL else 0.0
+        bottom = [(hole, FOOT_PROTRUSION), outside[0], inside[0], (hole, inside[0][1])]
+        shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(SHELL_BANDS)]
         edge = [(self.radius, self.depth), (self.radius - self.bead, self.depth)]
         bead = [outside[-1], *edge, self._corner(self.outer - self.bead, angles[-1])]
         walls = [Section(f"shell_{i}", corners, leaky=True) for i, corners in enumerate(shell)]
@@ -83,12 +83,12 @@ class Bowl(Turned):
     @property
     def _first(self) -> float:
         """Angle at the spheres' centre between the axis and the edge of the foot [rad]."""
-        return math.atan2(self.foot, self.centre - PROUD)
+        return math.atan2(self.foot, self.centre - FOOT_PROTRUSION)
 
     @property
     def _step(self) -> float:
         """Angle of one band [rad]: from the edge of the foot to the lower end of the bead they share the shell."""
-        return (math.acos((self.centre - self.depth + BEAD) / self.outer) - self._first) / BANDS
+        return (math.acos((self.centre - self.depth + BEAD_HEIGHT) / self.outer) - self._first) / SHELL_BANDS
 
     def _corner(self, distance: float, angle: float) -> tuple[float, float]:
         """The point at that distance from the spheres' centre, at that angle from straight down."""

@@ -11,7 +11,7 @@ from ..geometry import Vec3
 from ..params import param
 from .prop import Prop, Rgba, show, shown, solid
 
-DARK = (0.16, 0.10, 0.10, 1.0)
+DARK_COLOUR = (0.16, 0.10, 0.10, 1.0)
 """Paint on the loaded side of a cube."""
 
 
@@ -94,9 +94,9 @@ class Cube(Box):
         return np.array([self.edge] * 3)
 
 
-LEAD = 11340.0
+LEAD_DENSITY = 11340.0
 """Density [kg/m^3]."""
-SLUG = 0.9
+SLUG_SHARE = 0.9
 """Share of a loaded cube's mass that is in its slug; the rest is foam, 35 kg/m^3 at 52 mm and 0.05 kg."""
 
 
@@ -126,19 +126,19 @@ class LoadedCube(Box):
     @property
     def slug(self) -> float:
         """Edge of the slug, a cube [m]."""
-        return (SLUG * self.mass / LEAD) ** (1 / 3)
+        return (SLUG_SHARE * self.mass / LEAD_DENSITY) ** (1 / 3)
 
     @property
     def steepest(self) -> float:
         """The lean at which the slug touches the side from within."""
-        return SLUG * (self.edge - self.slug) / (2 * self.edge)
+        return SLUG_SHARE * (self.edge - self.slug) / (2 * self.edge)
 
     @property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
-        foam, slug = (1 - SLUG) * self.mass, SLUG * self.mass
+        foam, slug = (1 - SLUG_SHARE) * self.mass, SLUG_SHARE * self.mass
         own = (foam * self.edge**2 + slug * self.slug**2) / 6
-        across = own + foam * self.com**2 + slug * (self.com / SLUG - self.com) ** 2
+        across = own + foam * self.com**2 + slug * (self.com / SLUG_SHARE - self.com) ** 2
         return np.array([own, across, across])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -147,7 +147,7 @@ class LoadedCube(Box):
         if not self.lean:
             return
         half, skin = self.edge / 2, 0.0002
-        shown(body, "dark_side", DARK, size=[skin, 0.9 * half, 0.9 * half], pos=[half, 0, half])
+        shown(body, "dark_side", DARK_COLOUR, size=[skin, 0.9 * half, 0.9 * half], pos=[half, 0, half])
         body.explicitinertial = True
         body.mass, body.inertia = self.mass, self.inertia
         body.ipos = np.array([self.com, 0.0, half])

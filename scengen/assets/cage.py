@@ -33,10 +33,10 @@ WEDGES = 20
 SEGMENTS = 64
 """Sides of the circle in the picture; 0.02 mm from the true one at the nominal radius."""
 
-SHORTEST = 1e-6
+MIN_SIZE = 1e-6
 """Sills lower and strips of plate narrower than this are left out [m]: MuJoCo refuses boxes without extent."""
 
-TRAP: Rgba = (0.30, 0.12, 0.45, 0.45)
+TRAP_COLOUR: Rgba = (0.30, 0.12, 0.45, 0.45)
 """Colour of the trap: violet, which nothing else is."""
 
 BOTTOM, END, SIDE, TOP = range(4)
@@ -229,7 +229,7 @@ class HoledCage(Prop):
         return [
             (np.array([x, 0, self.wall + height / 2]), np.array([self.wall, self.cavity[1], height]))
             for x, height in bars
-            if height >= SHORTEST
+            if height >= MIN_SIZE
         ]
 
     def _trap(self) -> tuple[Box, Box]:
@@ -269,7 +269,7 @@ class HoledCage(Prop):
         start, stop, _ = self._patch()
         (first, last), boxes = self._ends(), []
         for low, high in ((first - self.offset, start), (stop, last - self.offset)):
-            if high - low > SHORTEST:
+            if high - low > MIN_SIZE:
                 centre, size = self.hole_centre.copy(), self.size.copy()
                 centre[along] += (low + high) / 2
                 size[axis], size[along] = self.wall, high - low
@@ -322,7 +322,7 @@ class HoledCage(Prop):
             spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
             self._touchable(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
         above, below = self.manifold().split_by_plane(UP.tolist(), 0.0)
-        for name, part, rgba in (("look", above, self.rgba), ("trap", below, TRAP)):
+        for name, part, rgba in (("look", above, self.rgba), ("trap", below, TRAP_COLOUR)):
             look = part.to_mesh()
             spec.add_mesh(
                 name=name,

@@ -9,15 +9,15 @@ from ..geometry import UP, Vec3
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-TAKEN = 0.010
+GRASP_DEPTH = 0.010
 """How far below the top of the handle it is taken hold of [m]: the palm, 31 mm above that, stays over the rim."""
 
 
-PLASTIC, HOLLOW = 1000.0, 500.0
+PLASTIC_DENSITY, HANDLE_DENSITY = 1000.0, 500.0
 """Density of the bin, and of the handle [kg/m^3]."""
-CLEAR = 0.03
+HANDLE_HEIGHT = 0.03
 """From the ground to the handle [m]."""
-RUBBER = 1.0
+HANDLE_FRICTION = 1.0
 """Friction of the handle."""
 
 
@@ -55,10 +55,10 @@ class CatchBin(Prop):
             "far": ((thick, half_y, deep), (half_x + thick, 0.0, middle)),
         }
         for name, (size, pos) in parts.items():
-            solid(body, name, size, pos, density=PLASTIC, friction=self.friction, condim=3, rgba=self.rgba)
-        size = np.array([self.reach, self.grip, self.rim - CLEAR])
-        pos = [-outer_x - self.reach / 2, 0.0, (self.rim + CLEAR) / 2]
-        solid(body, "handle", size / 2, pos, density=HOLLOW, friction=RUBBER, rgba=self.rgba)
+            solid(body, name, size, pos, density=PLASTIC_DENSITY, friction=self.friction, condim=3, rgba=self.rgba)
+        size = np.array([self.reach, self.grip, self.rim - HANDLE_HEIGHT])
+        pos = [-outer_x - self.reach / 2, 0.0, (self.rim + HANDLE_HEIGHT) / 2]
+        solid(body, "handle", size / 2, pos, density=HANDLE_DENSITY, friction=HANDLE_FRICTION, rgba=self.rgba)
 
     @property
     def outer(self) -> tuple[float, float]:
@@ -73,7 +73,7 @@ class CatchBin(Prop):
     @property
     def handle(self) -> Vec3:
         """Where the handle is taken hold of, in the bin's axes [m]."""
-        return np.array([-self.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - TAKEN) * UP
+        return np.array([-self.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - GRASP_DEPTH) * UP
 
 
 if __name__ == "__main__":

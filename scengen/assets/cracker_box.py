@@ -10,9 +10,9 @@ from .bin import Bin
 from .box import Box
 from .prop import Rgba, show
 
-EDGES = (0.0717, 0.1636, 0.2138)
+REAL_EDGES = (0.0717, 0.1636, 0.2138)
 """Of the real box [m], measured on the scan of number 003 of the YCB set."""
-MASS = 0.411
+REAL_MASS = 0.411
 """Of the real box [kg]: object list of the YCB set."""
 
 
@@ -32,14 +32,14 @@ class CrackerBox(Box):
     @property
     def mass(self) -> float:  # type: ignore[override]  # follows from the size, as the filling is always the same
         """As much of the same filling as fits [kg]."""
-        return MASS * self.scale**3
+        return REAL_MASS * self.scale**3
 
     @property
     def size(self) -> Vec3:
-        return self.scale * np.array(EDGES)
+        return self.scale * np.array(REAL_EDGES)
 
 
-RIM = 0.8
+SLOT_DEPTH = 0.8
 """Depth of the slot that a box lies in, by the thickness of the box."""
 
 
@@ -49,7 +49,7 @@ def slot_for(box: CrackerBox, clearance: float) -> Bin:
     The paper says "a horizontal slot fixture" (App. B, T08) with a "tight slot outline" (T09), and gives no numbers.
     """
     thickness, width, height = box.size
-    return Bin(width=width + 2 * clearance, length=height + 2 * clearance, depth=RIM * thickness)
+    return Bin(width=width + 2 * clearance, length=height + 2 * clearance, depth=SLOT_DEPTH * thickness)
 
 
 if __name__ == "__main__":

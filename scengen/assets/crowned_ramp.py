@@ -19,15 +19,15 @@ from ..geometry import Mat3, Vec3
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-BOARD = 0.010
+BOARD_THICKNESS = 0.010
 """Thickness of the two slabs, the rails and the divider [m]."""
-RAIL = 0.025
+RAIL_HEIGHT = 0.025
 """How high rails and divider stand above the slabs [m]: more than the radius of what rolls here."""
-DIVIDED = 0.06
+DIVIDER_LENGTH = 0.06
 """How long the divider at the low end is [m]."""
 SIDES = {"left": 1, "right": -1}
 """The two slabs, and on which side of the ridge they lie along y."""
-OWN = 3
+CONTACT_PRIORITY = 3
 """Contact priority, above that of other props: the ramp's friction counts whatever rolls on it."""
 
 
@@ -90,10 +90,13 @@ class CrownedRamp(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         for name, side in SIDES.items():
             self._slab(body, name, side)
-        start, end = self.surface(self.length / 2 - DIVIDED, self.ridge), self.surface(self.length / 2, self.ridge)
-        half = [float(np.linalg.norm(end - start)) / 2, BOARD / 4, RAIL / 2]
+        start, end = (
+            self.surface(self.length / 2 - DIVIDER_LENGTH, self.ridge),
+            self.surface(self.length / 2, self.ridge),
+        )
+        half = [float(np.linalg.norm(end - start)) / 2, BOARD_THICKNESS / 4, RAIL_HEIGHT / 2]
         upright = np.stack([self.axes(1)[:, 0], [0.0, 1.0, 0.0], np.cross(self.axes(1)[:, 0], [0.0, 1.0, 0.0])], axis=1)
-        self._board(body, "divider", (start + end) / 2 + RAIL / 2 * upright[:, 2], half, upright)
+        self._board(body, "divider", (start + end) / 2 + RAIL_HEIGHT / 2 * upright[:, 2], half, upright)
 
     def _slab(self, body: mujoco.MjsBody, name: str, side: int) -> None:
         """A slab from the ridge to its rail, the rail on it, and a post under its high end."""
@@ -103,18 +106,26 @@ class CrownedRamp(Prop):
         long = self.length * math.hypot(1.0, self.fall) / 2
         wide = float(abs((rim - ridge) @ axes[:, 1])) / 2
         middle = ridge + side * wide * axes[:, 1]
-        self._board(body, name, middle - BOARD / 2 * axes[:, 2], [long, wide, BOARD / 2], axes)
-        above = middle + side * (wide + BOARD / 2) * axes[:, 1] + (RAIL - BOARD) / 2 * axes[:, 2]
-        self._board(body, f"{name}_rail", above, [long, BOARD / 2, (RAIL + BOARD) / 2], axes)
-        for end, x in (("high", -self.length / 2 + BOARD), ("low", self.length / 2 - BOARD)):
-            foot = self.surface(x, outside - side * BOARD)
-            tall = (foot[2] - BOARD) / 2
-            self._board(body, f"{name}_{end}", [foot[0], foot[1], tall], [BOARD / 2, BOARD / 2, tall], np.eye(3))
+        self._board(body, name, middle - BOARD_THICKNESS / 2 * axes[:, 2], [long, wide, BOARD_THICKNESS / 2], axes)
+        above = (
+            middle + side * (wide + BOARD_THICKNESS / 2) * axes[:, 1] + (RAIL_HEIGHT - BOARD_THICKNESS) / 2 * axes[:, 2]
+        )
+        self._board(body, f"{name}_rail", above, [long, BOARD_THICKNESS / 2, (RAIL_HEIGHT + BOARD_THICKNESS) / 2], axes)
+        for end, x in (("high", -self.length / 2 + BOARD_THICKNESS), ("low", self.length / 2 - BOARD_THICKNESS)):
+            foot = self.surface(x, outside - side * BOARD_THICKNESS)
+            tall = (foot[2] - BOARD_THICKNESS) / 2
+            self._board(
+                body,
+                f"{name}_{end}",
+                [foot[0], foot[1], tall],
+                [BOARD_THICKNESS / 2, BOARD_THICKNESS / 2, tall],
+                np.eye(3),
+            )
 
     def _board(self, body: mujoco.MjsBody, name: str, pos: ArrayLike, size: ArrayLike, axes: Mat3) -> None:
         turn = np.empty(4)
         mujoco.mju_mat2Quat(turn, axes.ravel())
-        solid(body, name, size, pos, quat=turn, friction=self.friction, rgba=self.rgba, priority=OWN)
+        solid(body, name, size, pos, quat=turn, friction=self.friction, rgba=self.rgba, priority=CONTACT_PRIORITY)
 
 
 if __name__ == "__main__":

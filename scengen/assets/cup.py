@@ -10,19 +10,19 @@ import numpy as np
 from ..geometry import Mat3, Vec3, quat
 from ..params import param
 from .prop import BOX, PRIORITY, Rgba, show, solid
-from .turned import PROUD, SHORTEST, Section, Turned
+from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
 CAPSULE, CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
 
-BEAD = 0.012
+BEAD_HEIGHT = 0.012
 """Height of the bead [m]."""
-RIM = 0.001
+RIM_HEIGHT = 0.001
 """Height of the uppermost part of the wall [m], whose end face a cup upside down stands on."""
-SHORTEST_HANDLE = 0.020
+MIN_HANDLE = 0.020
 """A handle that stands out less is none [m]."""
-LOWEST, HIGHEST = 0.26, 0.84
+HANDLE_BOTTOM, HANDLE_TOP = 0.26, 0.84
 """Where the handle's outer faces are, as shares of the height."""
-ARC = 4
+BEND_PARTS = 4
 """Straight parts of a quarter of a bend."""
 
 
@@ -72,12 +72,12 @@ class Cup(Turned):
 
     @property
     def sections(self) -> list[Section]:
-        top, end = self.height - RIM, self.height
-        flat = self.floor - PROUD
-        below = top if self.bead <= self.wall + SHORTEST else end - BEAD
+        top, end = self.height - RIM_HEIGHT, self.height
+        flat = self.floor - FOOT_PROTRUSION
+        below = top if self.bead <= self.wall + MIN_DETAIL else end - BEAD_HEIGHT
         edge = max(self.wall, self.bead)
         parts = [
-            self._ring("bottom", PROUD, flat, None, self.friction, PRIORITY),
+            self._ring("bottom", FOOT_PROTRUSION, flat, None, self.friction, PRIORITY),
             self._ring("wall", flat, below, self.wall, self.friction, PRIORITY + 1),
             self._ring("rim", top, end, edge, self.rim_friction, PRIORITY),
         ]
@@ -96,23 +96,23 @@ class Cup(Turned):
 
     @property
     def has_handle(self) -> bool:
-        return self.handle >= SHORTEST_HANDLE
+        return self.handle >= MIN_HANDLE
 
     @property
     def grip(self) -> Vec3:
         """Middle of the handle's upright [m], in the cup's axes."""
-        return np.array([self._reach, 0.0, (LOWEST + HIGHEST) / 2 * self.height])
+        return np.array([self._reach, 0.0, (HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height])
 
     @property
     def _reach(self) -> float:
         """Distance of the upright's middle line from the cup's axis [m]."""
-        return self.outer((LOWEST + HIGHEST) / 2 * self.height) + self.handle - self.bar / 2
+        return self.outer((HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height) + self.handle - self.bar / 2
 
     def _bars(self) -> list[tuple[mujoco.mjtGeom, Vec3, Vec3]]:
         """The handle: kind of geom and both ends of its middle line for each straight part [m]."""
         if not self.has_handle:
             return []
-        low, high = LOWEST * self.height + self.bar / 2, HIGHEST * self.height - self.bar / 2
+        low, high = HANDLE_BOTTOM * self.height + self.bar / 2, HANDLE_TOP * self.height - self.bar / 2
         bend = self.curve * min((high - low) / 2, self.handle - self.bar)
         parts = []
         path = []
@@ -121,14 +121,14 @@ class Cup(Turned):
             widest = max(self.outer(z - self.bar / 2), self.outer(z + self.bar / 2))
             wall = np.array([widest - self.wall / 2, 0.0, z])
             centre = np.array([self._reach - bend, 0.0, z + side * bend])
-            turns = [math.pi / 2 * i / ARC for i in range(ARC + 1)] if bend >= SHORTEST else [0.0]
+            turns = [math.pi / 2 * i / BEND_PARTS for i in range(BEND_PARTS + 1)] if bend >= MIN_DETAIL else [0.0]
             arc = [centre + bend * np.array([math.sin(a), 0.0, -side * math.cos(a)]) for a in turns]
             parts.append((CYLINDER, wall, arc[0]))
             parts += [(CAPSULE, start, end) for start, end in itertools.pairwise(arc)]
             path.append(arc[-1])
         lower, upper = path
         more = np.array([0.0, 0.0, max(0.0, self.bar / 2 - bend)])
-        if upper[2] - lower[2] > SHORTEST:
+        if upper[2] - lower[2] > MIN_DETAIL:
             parts.append((BOX, lower - more, upper + more))
         return parts
 
@@ -152,7 +152,7 @@ class Cup(Turned):
         super().fill(body, spec)
         # On the mesh of the floor a box would stand on one point and rock; MuJoCo gives two boxes four. This one's top
         # is the floor, and the mesh lies a little lower. It is not shown: underneath, both lie in one plane.
-        flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - PROUD) / 2
+        flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - FOOT_PROTRUSION) / 2
         size, pos = [flat, flat, half], [0.0, 0.0, self.floor - half]
         solid(body, "floor", size, pos, friction=self.friction, mass=0.0, group=3)
         for i, (kind, start, end) in enumerate(self._bars()):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..params import param
 from .prop import Rgba, show
-from .turned import PROUD, Section, Turned
+from .turned import FOOT_PROTRUSION, Section, Turned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,8 +66,8 @@ class Dish(Turned):
     @property
     def sections(self) -> list[Section]:
         r, f, t = self.radius, self.foot, self.thickness
-        bottom = ((0.0, PROUD), (f, PROUD), (f, t), (0.0, t))
-        rim = ((f, PROUD), (r, self.rise + PROUD), (r, self.height), (f, t))
+        bottom = ((0.0, FOOT_PROTRUSION), (f, FOOT_PROTRUSION), (f, t), (0.0, t))
+        rim = ((f, FOOT_PROTRUSION), (r, self.rise + FOOT_PROTRUSION), (r, self.height), (f, t))
         return [Section("bottom", bottom), Section("rim", rim)]
 
 

@@ -12,12 +12,12 @@ from ..params import param
 from ..physics import contact, reflected
 from .prop import PRIORITY, Prop, Rgba, show, solid
 
-STIFFNESS = 2e4
+WALL_STIFFNESS = 2e4
 """Of the walls [1/s^2]: a bounce takes 22 ms, 11 steps of the simulation, and a ball that comes with 0.5 m/s goes
 3.5 mm into the wall. Stiffer walls return shares of the speed that depend on the time step."""
-LASTS = math.pi / math.sqrt(STIFFNESS)
+BOUNCE_TIME = math.pi / math.sqrt(WALL_STIFFNESS)
 """How long a bounce takes [s]."""
-MOST = 10
+MAX_WAYS = 10
 """How many ways are foreseen."""
 
 
@@ -42,7 +42,7 @@ class Enclosure(Prop):
             "left": ([self.depth / 2, out, half], [self.depth / 2, self.width / 2 + out, half]),
             "right": ([self.depth / 2, out, half], [self.depth / 2, -self.width / 2 - out, half]),
         }
-        bouncy = contact(self.restitution, STIFFNESS)
+        bouncy = contact(self.restitution, WALL_STIFFNESS)
         for name, (size, pos) in walls.items():
             wall = {"friction": 0.0, "condim": 1, "solref": bouncy, "priority": PRIORITY + 1, "rgba": self.rgba}
             solid(body, name, size, pos, **wall)
@@ -64,7 +64,7 @@ class Enclosure(Prop):
             restitution: of the walls, if they had another one: 1 for mirror images.
         """
         found, seconds = [], 0.0
-        while len(found) < MOST:
+        while len(found) < MAX_WAYS:
             found.append(Way(seconds, at, velocity))
             if (hit := self._hit(at, velocity, radius)) is None:
                 break

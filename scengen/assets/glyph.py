@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..geometry import Vec3
 from .prop import Rgba, shown
 
-WIDTH, HEIGHT = 4, 6
+GRID_WIDTH, GRID_HEIGHT = 4, 6
 """Extent of the grid on which the strokes are drawn, from its lower left corner (0, 0)."""
 STROKES = {
     "A": "00 04 26 44 40,03 43",
@@ -41,7 +41,7 @@ STROKES = {
     "Z": "06 46 00 40",
 }
 """Polylines of every letter: points as two digits, column and row, from which strokes lead to the next."""
-THICK = 0.0008
+PRINT_THICKNESS = 0.0008
 """How far a letter stands out of the face on which it is written [m]: flat as print, drawn before the face."""
 
 
@@ -54,7 +54,9 @@ def lines(letter: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     if letter not in STROKES:
         raise ValueError(f"no strokes for {letter!r}; known: {''.join(STROKES)}")
     for line in STROKES[letter].split(","):
-        points = [(np.array([int(c), int(r)]) - [WIDTH / 2, HEIGHT / 2]) / HEIGHT for c, r in line.split()]
+        points = [
+            (np.array([int(c), int(r)]) - [GRID_WIDTH / 2, GRID_HEIGHT / 2]) / GRID_HEIGHT for c, r in line.split()
+        ]
         yield from pairwise(points)
 
 
@@ -75,7 +77,7 @@ def write(
         along = there - here
         half = float(np.linalg.norm(along)) / 2
         angle = float(np.arctan2(along[1], along[0])) / 2
-        turn, size = [np.cos(angle), 0.0, 0.0, np.sin(angle)], [half + weight, weight, THICK]
+        turn, size = [np.cos(angle), 0.0, 0.0, np.sin(angle)], [half + weight, weight, PRINT_THICKNESS]
         shown(body, f"{name}_{number}", rgba, size=size, pos=(here + there) / 2, quat=turn)
 
 

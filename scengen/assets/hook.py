@@ -28,7 +28,7 @@ Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
 BEND_PARTS = 16
 """Bars of a half circle: its outside then overshoots the circle by at most 1 / cos(5.6 deg) - 1 = 0.5 % of the outer
 radius, 0.46 mm for the widest bend."""
-SHORTEST = 1e-6
+MIN_SIZE = 1e-6
 """A barb shorter than this is none [m]: MuJoCo refuses boxes without extent."""
 
 
@@ -183,7 +183,7 @@ class JHook(Hook):
         start = self.length / 2
         straight = [(_point(-start, 0), _point(start, 0), 0.0)]
         back = self.side * 2 * self.radius
-        barb = [(_point(start, back), _point(start - self.barb, back), 0.0)] if self.barb > SHORTEST else []
+        barb = [(_point(start, back), _point(start - self.barb, back), 0.0)] if self.barb > MIN_SIZE else []
         return straight + self._bend() + barb
 
     def _bend(self) -> list[Bar]:

@@ -16,16 +16,16 @@ from ..geometry import UP, Mat3, Vec3, about_y, quat
 from ..params import param
 from .prop import Prop, Rgba, servo, show, shown, solid
 
-POST, AIR = 0.016, 0.004
+POST_WIDTH, POST_GAP = 0.016, 0.004
 """Width of the posts, and room between them and the slab [m]."""
-THICK = 0.010
+SLAB_THICKNESS = 0.010
 """Of the slab [m]."""
 STIFFNESS, DAMPING, ARMATURE = 1000.0, 20.0, 0.05
 """Of the servo [N m/rad], of the hinge [N m s/rad], and of the servo's rotor [kg m^2]: 20 N at the far end turn it by
 0.2 degrees, and it follows its goal 20 ms late."""
-SMOOTH = 0.05
+SLAB_FRICTION = 0.05
 """Friction of the slab, less than of anything that lies on it: of two frictions MuJoCo takes the larger one."""
-GREY: Rgba = (0.35, 0.37, 0.40, 1.0)
+FRAME_COLOUR: Rgba = (0.35, 0.37, 0.40, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +60,16 @@ class Incline(Prop):
         return self.lip * UP + self.axes(turned) @ np.array([away, along, 0.0])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        beside = self.width / 2 + AIR + POST / 2
+        beside = self.width / 2 + POST_GAP + POST_WIDTH / 2
         for y in (-beside, beside):
-            solid(body, "", [POST / 2, POST / 2, self.lip / 2], [0, y, self.lip / 2], condim=3, rgba=GREY)
+            solid(
+                body,
+                "",
+                [POST_WIDTH / 2, POST_WIDTH / 2, self.lip / 2],
+                [0, y, self.lip / 2],
+                condim=3,
+                rgba=FRAME_COLOUR,
+            )
         slab = body.add_body(name="slab", pos=[0, 0, self.lip], quat=quat("y", -math.radians(self.least)))
         slab.add_joint(
             name="hinge",
@@ -73,11 +80,11 @@ class Incline(Prop):
             range=[-0.01, self.turns + 0.01],
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
         )
-        half = np.array([self.length, self.width, THICK]) / 2
-        solid(slab, "slab", half, [half[0], 0, -half[2]], mass=self.mass, friction=SMOOTH, rgba=self.rgba)
+        half = np.array([self.length, self.width, SLAB_THICKNESS]) / 2
+        solid(slab, "slab", half, [half[0], 0, -half[2]], mass=self.mass, friction=SLAB_FRICTION, rgba=self.rgba)
         axle = mujoco.mjtGeom.mjGEOM_CYLINDER
-        pos, turn = [0, 0, -THICK / 2], quat("x", math.pi / 2)
-        shown(slab, "", GREY, type=axle, size=[THICK / 2, beside, 0], pos=pos, quat=turn)
+        pos, turn = [0, 0, -SLAB_THICKNESS / 2], quat("x", math.pi / 2)
+        shown(slab, "", FRAME_COLOUR, type=axle, size=[SLAB_THICKNESS / 2, beside, 0], pos=pos, quat=turn)
 
 
 def driven(scene: mujoco.MjSpec, name: str) -> str:

@@ -15,13 +15,13 @@ ROWS = ("QWERTYUIOP", "ASDFGHJKL", "ZXCVBNM")
 LETTERS = "".join(ROWS)
 STAGGER = 0.5
 """By how much each row is shifted against the one behind it, as a share of the pitch."""
-PLATE = 0.004
+PLATE_THICKNESS = 0.004
 """Thickness of the plate that carries the caps [m]."""
-KEY = 0.01
+CAP_MASS = 0.01
 """Mass of a cap [kg]."""
-PRINT, FAINT = 0.55, 0.0007
+PRINT_SIZE, STROKE_HALF_WIDTH = 0.55, 0.0007
 """Height of the letters as a share of a cap, and half the width of their strokes [m]."""
-GREY: Rgba = (0.62, 0.62, 0.62, 1.0)
+LETTER_COLOUR: Rgba = (0.62, 0.62, 0.62, 1.0)
 """Colour of the letters."""
 
 
@@ -64,14 +64,16 @@ class Keyboard(Prop):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         x, y, _ = self.size / 2
-        thick, rise = PLATE / 2, (self.height - PLATE) / 2
+        thick, rise = PLATE_THICKNESS / 2, (self.height - PLATE_THICKNESS) / 2
         below: Rgba = (0.2, 0.2, 0.22, 1.0)
         solid(body, "plate", [x, y, thick], [0, 0, thick], friction=self.friction, mass=self.mass, rgba=below)
         for letter in LETTERS:
             key = body.add_body(name=f"key_{letter}", pos=self.at(letter).tolist())
             size, pos = [self.cap / 2, self.cap / 2, rise], [0, 0, -rise]
-            solid(key, f"cap_{letter}", size, pos, friction=self.friction, mass=KEY, rgba=self.rgba)
-            write(key, letter, [0.0, 0.0, 0.0], PRINT * self.cap, FAINT, GREY, f"print_{letter}")
+            solid(key, f"cap_{letter}", size, pos, friction=self.friction, mass=CAP_MASS, rgba=self.rgba)
+            write(
+                key, letter, [0.0, 0.0, 0.0], PRINT_SIZE * self.cap, STROKE_HALF_WIDTH, LETTER_COLOUR, f"print_{letter}"
+            )
 
 
 if __name__ == "__main__":

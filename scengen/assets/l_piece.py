@@ -14,7 +14,7 @@ from .prop import Prop, Rgba, show, solid
 CORNER_RELIEF = 0.0002
 """How far the five outer corners stand out below the edges [m]: a piece that lies on five points instead of twelve
 costs half the time to simulate."""
-INNER = 3
+INNER_CORNER = 3
 """The corner of the outline that points inwards."""
 Point = tuple[float, float]
 """A place seen from above [m], in the axes of a piece."""
@@ -68,7 +68,7 @@ class LPiece(Prop):
             edge = self._round(body, f"edge_{i}", mujoco.mjtGeom.mjGEOM_CAPSULE)
             height = self.rounding + CORNER_RELIEF
             edge.fromto = np.array([*start, height, *end, height])
-            if i != INNER:
+            if i != INNER_CORNER:
                 self._round(body, f"corner_{i}", mujoco.mjtGeom.mjGEOM_SPHERE).pos = np.array([*start, self.rounding])
 
     def _round(self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.MjsGeom:

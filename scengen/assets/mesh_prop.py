@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from ..geometry import Mat3, Vec3
 from .prop import Prop, Rgba, shown, solid
-from .turned import FOOT
+from .turned import FOOT_RADIUS
 
 Points = NDArray[np.float64]
 """Shape (n, 3) [m]."""
 
 DIGITS = 7
 """Decimals of a length in a manifest [m]; what is simulated is always read from such numbers."""
-MOST = 100_000
+MAX_NUMBERS = 100_000
 """Numbers in an array of a manifest, at most."""
-SHAPES = {"feet": (-1, 3), "vertices": (-1, 3), "com": (3,), "inertia": (3, 3)}
+ARRAY_SHAPES = {"feet": (-1, 3), "vertices": (-1, 3), "com": (3,), "inertia": (3, 3)}
 
 MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
-HUES: tuple[Rgba, ...] = (
+PIECE_COLOURS: tuple[Rgba, ...] = (
     (0.90, 0.62, 0.00, 1.0),
     (0.34, 0.71, 0.91, 1.0),
     (0.00, 0.62, 0.45, 1.0),
@@ -63,10 +63,18 @@ class MeshProp(Prop):
         body.fullinertia = np.array([*np.diag(i), i[0, 1], i[0, 2], i[1, 2]])
         for k, points in enumerate(self.corners):
             spec.add_mesh(name=f"piece_{k}", uservert=points.ravel().tolist())
-            piece = solid(body, f"piece_{k}", (), type=MESH, friction=self.friction, mass=0.0, rgba=HUES[k % len(HUES)])
+            piece = solid(
+                body,
+                f"piece_{k}",
+                (),
+                type=MESH,
+                friction=self.friction,
+                mass=0.0,
+                rgba=PIECE_COLOURS[k % len(PIECE_COLOURS)],
+            )
             piece.meshname, piece.group = f"piece_{k}", 0 if self.bare else 3
         for k, foot in enumerate(self.feet):
-            solid(body, f"foot_{k}", [FOOT], foot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
+            solid(body, f"foot_{k}", [FOOT_RADIUS], foot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
         if self.bare:
             return
         spec.add_mesh(name="look", uservert=self.vertices.ravel().tolist(), userface=self.faces.ravel().tolist())
@@ -92,7 +100,7 @@ class MeshProp(Prop):
         if not isinstance(data, Mapping) or set(data) != known:
             raise ValueError(f"expected {', '.join(sorted(known))}")
         corners = tuple(_numbers("corners", points, (-1, 3)) for points in data["corners"])
-        arrays: dict[str, Any] = {name: _numbers(name, data[name], shape) for name, shape in SHAPES.items()}
+        arrays: dict[str, Any] = {name: _numbers(name, data[name], shape) for name, shape in ARRAY_SHAPES.items()}
         faces = _numbers("faces", data["faces"], (-1, 3)).astype(np.int64)
         if not corners or not len(faces) or faces.min() < 0 or faces.max() >= len(arrays["vertices"]):
             raise ValueError("its pieces or triangles are missing, or refer to nothing")
@@ -106,6 +114,6 @@ def _numbers(name: str, told: Any, shape: tuple[int, ...]) -> NDArray[np.float64
     if not len(shape) and found.ndim == 0 and np.isfinite(found):
         return found
     fits = found.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, found.shape, strict=True))
-    if not fits or not shape or found.size > MOST or not np.isfinite(found).all():
+    if not fits or not shape or found.size > MAX_NUMBERS or not np.isfinite(found).all():
         raise ValueError(f"its {name} are no finite numbers of that shape")
     return found

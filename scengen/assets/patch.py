@@ -9,7 +9,7 @@ from ..geometry import quat
 from ..params import param
 from .prop import Prop, Rgba, show, shown
 
-SHEET = 0.001
+SHEET_THICKNESS = 0.001
 """Thickness of each of the two sheets [m]: enough to be drawn before the table."""
 TURNED_OVER = quat("x", math.pi)
 """Orientation (wxyz) in which the lower side of a patch is up."""
@@ -30,9 +30,9 @@ class Patch(Prop):
     """Colour of the lower side."""
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        half = [self.size / 2, self.size / 2, SHEET / 2]
-        shown(body, "upper", self.rgba, size=half, pos=[0.0, 0.0, SHEET / 2])
-        shown(body, "lower", self.below, size=half, pos=[0.0, 0.0, -SHEET / 2])
+        half = [self.size / 2, self.size / 2, SHEET_THICKNESS / 2]
+        shown(body, "upper", self.rgba, size=half, pos=[0.0, 0.0, SHEET_THICKNESS / 2])
+        shown(body, "lower", self.below, size=half, pos=[0.0, 0.0, -SHEET_THICKNESS / 2])
 
 
 if __name__ == "__main__":

@@ -26,18 +26,18 @@ from scipy.special import ellipj, ellipk, ellipkinc
 from ..geometry import quat
 from ..params import param
 from ..physics import GRAVITY
-from .ball import STEEL
+from .ball import STEEL_DENSITY
 from .prop import Prop, Rgba, show, shown, solid
 
-ROD = 0.002
+ROD_RADIUS = 0.002
 """Radius of the rod [m]."""
-BEAM = 0.008
+BEAM_HALF_WIDTH = 0.008
 """Half the thickness of beam and posts [m]."""
-FOOT = 0.024
+FOOT_SIZE = 0.024
 """Half the length of a post's foot, along x, and its width [m]."""
-FREE = 0.02
+COLLISION_FREE_LENGTH = 0.02
 """How far below the axle the rod begins to collide [m]: nearer it would touch the beam that it hangs on."""
-GREY, DARK = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
+FRAME_COLOUR, DARK_COLOUR = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class Pendulum(Prop):
     """From the axle to the bob's centre."""
     radius: float = param(0.022, "m", 0.010, 0.032)
     """Of the bob."""
-    density: float = param(STEEL, "kg/m^3", 200.0, 12000.0)
+    density: float = param(STEEL_DENSITY, "kg/m^3", 200.0, 12000.0)
     friction: float = param(0.8, "1", 0.05, 1.5)
     height: float = param(0.69, "m", 0.3, 1.0)
     """Of the axle above the ground."""
@@ -66,9 +66,23 @@ class Pendulum(Prop):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         for y in (-self.span, self.span):
-            solid(body, "", [BEAM, BEAM, self.height / 2], [0, y, self.height / 2], condim=3, rgba=GREY)
-            solid(body, "", [FOOT, FOOT / 2, 0.003], [0, y, 0.003], condim=3, rgba=GREY)
-        solid(body, "beam", [BEAM, self.span, BEAM], [0, 0, self.height], condim=3, rgba=GREY)
+            solid(
+                body,
+                "",
+                [BEAM_HALF_WIDTH, BEAM_HALF_WIDTH, self.height / 2],
+                [0, y, self.height / 2],
+                condim=3,
+                rgba=FRAME_COLOUR,
+            )
+            solid(body, "", [FOOT_SIZE, FOOT_SIZE / 2, 0.003], [0, y, 0.003], condim=3, rgba=FRAME_COLOUR)
+        solid(
+            body,
+            "beam",
+            [BEAM_HALF_WIDTH, self.span, BEAM_HALF_WIDTH],
+            [0, 0, self.height],
+            condim=3,
+            rgba=FRAME_COLOUR,
+        )
         along, at = self.length * math.sin(self.angle), self.height - self.length * math.cos(self.angle)
         frame = body.add_frame(quat=quat("z", self.turn))
         bob = body.add_body(name="bob", pos=[along, 0, at], quat=quat("y", -self.angle))
@@ -81,17 +95,24 @@ class Pendulum(Prop):
         bob.add_joint(name="hinge", type=hinge, axis=[0, -1, 0], pos=[0, 0, self.length], ref=self.angle)
         sphere, capsule = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE
         solid(bob, "ball", [self.radius], type=sphere, mass=self.mass, friction=self.friction, rgba=self.rgba)
-        half = (self.length - FREE - self.radius) / 2
+        half = (self.length - COLLISION_FREE_LENGTH - self.radius) / 2
         middle = [0, 0, self.radius + half]
-        solid(bob, "rod", [ROD, half, 0], middle, type=capsule, mass=0.0, condim=3, rgba=DARK)
-        shown(bob, "", DARK, type=capsule, size=[ROD, FREE / 2, 0], pos=[0, 0, self.length - FREE / 2])
+        solid(bob, "rod", [ROD_RADIUS, half, 0], middle, type=capsule, mass=0.0, condim=3, rgba=DARK_COLOUR)
+        shown(
+            bob,
+            "",
+            DARK_COLOUR,
+            type=capsule,
+            size=[ROD_RADIUS, COLLISION_FREE_LENGTH / 2, 0],
+            pos=[0, 0, self.length - COLLISION_FREE_LENGTH / 2],
+        )
         for geom in bob.geoms:  # the drag of an ellipsoid, with all coefficients zero: air does not brake it
             geom.fluid_ellipsoid, geom.fluid_coefs = 1, [0.0] * 5
 
     @property
     def size(self) -> tuple[float, float]:
         """Of its outline on the ground [m]."""
-        return 2 * FOOT, 2 * self.span + FOOT
+        return 2 * FOOT_SIZE, 2 * self.span + FOOT_SIZE
 
     # --- mechanics ------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..params import param
 from .prop import Rgba, show
-from .turned import PROUD, SHORTEST, Section, Turned
+from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,8 @@ class Plate(Turned):
 
     @property
     def sections(self) -> list[Section]:
-        hole = self.hole if self.hole >= SHORTEST else 0.0
-        lip = self.lip if self.lip >= SHORTEST else 0.0
+        hole = self.hole if self.hole >= MIN_DETAIL else 0.0
+        lip = self.lip if self.lip >= MIN_DETAIL else 0.0
         ends = [("bottom", hole, 0.0, self.foot, 0.0), ("wall", self.foot, 0.0, self.radius - lip, self.rise)]
         if lip:
             ends.append(("lip", self.radius - lip, self.rise, self.radius, self.rise))
@@ -63,7 +63,10 @@ class Plate(Turned):
     def _strip(self, name: str, inner: float, start: float, outer: float, stop: float) -> Section:
         """What lies between two radii, its underside from height `start` to `stop` [m]."""
         t = self.thickness
-        return Section(name, ((inner, start + PROUD), (outer, stop + PROUD), (outer, stop + t), (inner, start + t)))
+        return Section(
+            name,
+            ((inner, start + FOOT_PROTRUSION), (outer, stop + FOOT_PROTRUSION), (outer, stop + t), (inner, start + t)),
+        )
 
 
 if __name__ == "__main__":

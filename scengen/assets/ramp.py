@@ -15,7 +15,7 @@ hollow. The facets are tangents of the arc and may overlap, as each continues be
 seam stands out. What a facet takes is the normal part of the speed, as far as the contact is inelastic, and a soft
 contact touches several facets at once and is braked by those ahead. With the time constant and damping of the other
 props (0.005 s, critical) that is 4 to 9 % of the height per pass, and a fifth more at half the time step. Steel on
-steel is elastic; with `ELASTIC` it is 0.5 to 2 % for a ball that slides, and half a time step shifts it by 0.1 %.
+steel is elastic; with `FLOOR_SOLREF` it is 0.5 to 2 % for a ball that slides, and half a time step shifts it by 0.1 %.
 """
 
 import math
@@ -30,31 +30,31 @@ from ..params import param
 from ..physics import GRAVITY
 from .prop import PRIORITY, Prop, Rgba, show, solid
 
-ELASTIC = (-2e5, -50.0)
+FLOOR_SOLREF = (-2e5, -50.0)
 """Contact stiffness [1/s^2] and damping [1/s] of the floor, per mass. Natural frequency sqrt(2e5) = 447 /s, 3.5 time
 steps of 2 ms to half an oscillation; damping ratio 50 / (2 * 447) = 0.06: a bounce returns 84 % of the speed."""
-OWN = PRIORITY + 1
+CONTACT_PRIORITY = PRIORITY + 1
 """Contact priority. The friction of the floor is the floor's own, whatever lies on it: the ball must be slippery here
 and firm between the fingers."""
-FACET = math.radians(1.0)
+FACET_ANGLE = math.radians(1.0)
 """Angle between neighbouring facets of the valley [rad]. Scatter of the loss between radii and heights, angles of 12 to
 40 deg: 0.4 to 2.1 % with facets of 1 deg, 0.3 to 2.6 % with 3 deg, which run three times as fast."""
-THICKNESS = 0.012
+FLOOR_THICKNESS = 0.012
 """Thickness of the floor, and height of its lowest point above the table [m]."""
-RIM = 0.015
+WALL_RISE = 0.015
 """How far the side walls rise above the floor [m]: most of a ball's radius, far below the palm of the hand."""
-WALL = 0.005
+WALL_THICKNESS = 0.005
 """Thickness of the side walls [m]."""
-SEAMS = (0.0030, 0.0058)
+HEIGHT_LOSSES = (0.0030, 0.0058)
 """What the valley's facets take of the height per pass, per radian of slope and 1/m of curvature [m]: from a ball that
 slides and from one that rolls. Fitted to 200 and 60 runs at 12 to 40 deg, bends of 80 to 140 mm: what is left is
 0.14 mm and 0.5 mm (standard deviation), 0.6 mm and 1.3 mm at most."""
-STEP = 0.001
+CLIMB_STEP = 0.001
 """Time step of `climb` [s]."""
 
-FLOOR = (0.62, 0.60, 0.57, 1.0)
-GOAL = (0.20, 0.70, 0.30, 1.0)
-GLASS = (0.55, 0.70, 0.80, 0.35)
+FLOOR_COLOUR = (0.62, 0.60, 0.57, 1.0)
+GOAL_COLOUR = (0.20, 0.70, 0.30, 1.0)
+WALL_COLOUR = (0.55, 0.70, 0.80, 0.35)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +130,7 @@ class Ramp(Prop):
         """A point on the middle line of the floor."""
         arc = max(-self.foot, min(self.foot, s))
         x = self.bend * math.sin(arc / self.bend) + (s - arc) * math.cos(self.slope)
-        return np.array([x, 0.0, THICKNESS + self.height(s)])
+        return np.array([x, 0.0, FLOOR_THICKNESS + self.height(s)])
 
     def below(self, x: float) -> float:
         """Where on the floor a point is that is `x` along the ramp, level, from the middle of the valley [m]."""
@@ -173,12 +173,12 @@ class Ramp(Prop):
             inside = abs(s) < foot
             pull = GRAVITY * math.sin(tilt)
             press = GRAVITY * math.cos(tilt) + (speed**2 / within if inside else 0.0)
-            rolling = (pull - (speed - spin) / STEP) / 3.5
+            rolling = (pull - (speed - spin) / CLIMB_STEP) / 3.5
             rub = max(-self.friction * press, min(self.friction * press, rolling))
-            speed += STEP * (rub - pull)
-            spin -= STEP * 2.5 * rub
-            s += STEP * speed * (bend / within if inside else 1.0)
-        return self.height(s) - SEAMS[self.rolls] * self.slope / self.bend * self.height(start)
+            speed += CLIMB_STEP * (rub - pull)
+            spin -= CLIMB_STEP * 2.5 * rub
+            s += CLIMB_STEP * speed * (bend / within if inside else 1.0)
+        return self.height(s) - HEIGHT_LOSSES[self.rolls] * self.slope / self.bend * self.height(start)
 
     def release(self, radius: float) -> float:
         """Height of the floor [m] on the near side from which a ball turns back in the middle of the patch.
@@ -212,15 +212,15 @@ class Ramp(Prop):
     def _floors(self) -> Iterator[tuple[str, Rgba, list[tuple[Vec3, Vec3]]]]:
         """Name, colour and stretches of each part of the floor: the ends of every slab's surface."""
         low, high = self.patch
-        facets = max(2, math.ceil(2 * self.slope / FACET))
+        facets = max(2, math.ceil(2 * self.slope / FACET_ANGLE))
         turn = 2 * self.slope / facets
-        half = self.bend * math.tan(turn / 2) + WALL
+        half = self.bend * math.tan(turn / 2) + WALL_THICKNESS
         middles = [self.bend * (-self.slope + i * turn) for i in range(1, facets)]
-        yield "near", FLOOR, [(self.floor(-self.top), self._along(-self.foot, half))]
-        yield "valley", FLOOR, [(self._along(s, -half), self._along(s, half)) for s in middles]
-        yield "far", FLOOR, [(self._along(self.foot, -half), self.floor(low))]
-        yield "patch", GOAL, [(self.floor(low), self.floor(high))]
-        yield "beyond", FLOOR, [(self.floor(high), self.floor(self.top))]
+        yield "near", FLOOR_COLOUR, [(self.floor(-self.top), self._along(-self.foot, half))]
+        yield "valley", FLOOR_COLOUR, [(self._along(s, -half), self._along(s, half)) for s in middles]
+        yield "far", FLOOR_COLOUR, [(self._along(self.foot, -half), self.floor(low))]
+        yield "patch", GOAL_COLOUR, [(self.floor(low), self.floor(high))]
+        yield "beyond", FLOOR_COLOUR, [(self.floor(high), self.floor(self.top))]
 
     def _along(self, s: float, further: float) -> Vec3:
         """A point on the tangent of the floor at s."""
@@ -231,24 +231,33 @@ class Ramp(Prop):
         """A slab whose upper side runs from `start` to `end`."""
         run = end - start
         tilt = math.atan2(run[2], run[0])
-        down = THICKNESS / 2 * np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
-        size = [float(np.linalg.norm(run)) / 2, self.width / 2, THICKNESS / 2]
+        down = FLOOR_THICKNESS / 2 * np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
+        size = [float(np.linalg.norm(run)) / 2, self.width / 2, FLOOR_THICKNESS / 2]
         self._board(body, name, (start + end) / 2 + down, size, tilt, rgba)
 
     def _walls(self, body: mujoco.MjsBody, side: int) -> None:
         """A side wall along each incline and across the valley, and a post under each top."""
-        y = side * (self.width + WALL) / 2
-        shift, tall = np.array([0.0, y, 0.0]), (THICKNESS + RIM) / 2
+        y = side * (self.width + WALL_THICKNESS) / 2
+        shift, tall = np.array([0.0, y, 0.0]), (FLOOR_THICKNESS + WALL_RISE) / 2
         for end in (-1, 1):
             foot, top, up = self.floor(end * self.foot), self.floor(end * self.top), self.normal(end * self.top)
-            middle = (foot + top) / 2 + (RIM - tall) * up + shift
-            size = [float(np.linalg.norm(top - foot)) / 2, WALL / 2, tall]
-            self._board(body, f"wall_{side}_{end}", middle, size, end * self.slope, GLASS)
-            post = np.array([end * (self.span / 2 - WALL), y, top[2] / 2])
-            self._board(body, f"post_{side}_{end}", post, [WALL, WALL / 2, top[2] / 2], 0.0, FLOOR)
+            middle = (foot + top) / 2 + (WALL_RISE - tall) * up + shift
+            size = [float(np.linalg.norm(top - foot)) / 2, WALL_THICKNESS / 2, tall]
+            self._board(body, f"wall_{side}_{end}", middle, size, end * self.slope, WALL_COLOUR)
+            post = np.array([end * (self.span / 2 - WALL_THICKNESS), y, top[2] / 2])
+            self._board(
+                body, f"post_{side}_{end}", post, [WALL_THICKNESS, WALL_THICKNESS / 2, top[2] / 2], 0.0, FLOOR_COLOUR
+            )
         foot = self.floor(self.foot)
-        middle = np.array([0.0, y, (foot[2] + RIM) / 2])
-        self._board(body, f"wall_{side}_0", middle, [foot[0] + WALL, WALL / 2, (foot[2] + RIM) / 2], 0.0, GLASS)
+        middle = np.array([0.0, y, (foot[2] + WALL_RISE) / 2])
+        self._board(
+            body,
+            f"wall_{side}_0",
+            middle,
+            [foot[0] + WALL_THICKNESS, WALL_THICKNESS / 2, (foot[2] + WALL_RISE) / 2],
+            0.0,
+            WALL_COLOUR,
+        )
 
     def _board(self, body: mujoco.MjsBody, name: str, pos: Vec3, size: list[float], tilt: float, rgba: Rgba) -> None:
         solid(
@@ -261,8 +270,8 @@ class Ramp(Prop):
             mass=0.1,
             rgba=rgba,
             condim=3,
-            solref=ELASTIC,
-            priority=OWN,
+            solref=FLOOR_SOLREF,
+            priority=CONTACT_PRIORITY,
         )
 
 

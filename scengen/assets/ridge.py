@@ -7,9 +7,9 @@ import mujoco
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-PLATE = 0.010
+PLATE_THICKNESS = 0.010
 """Thickness of the plate [m]."""
-MARGIN = 0.010
+PLATE_MARGIN = 0.010
 """How far the plate reaches beyond the ends of the ridge [m]."""
 
 
@@ -27,10 +27,13 @@ class Ridge(Prop):
     rgba: Rgba = (0.45, 0.47, 0.50, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        foot, wall = [self.length / 2 + MARGIN, self.plate / 2, PLATE / 2], (self.height - PLATE) / 2
-        solid(body, "plate", foot, [0, 0, PLATE / 2], rgba=self.rgba)
+        foot, wall = (
+            [self.length / 2 + PLATE_MARGIN, self.plate / 2, PLATE_THICKNESS / 2],
+            (self.height - PLATE_THICKNESS) / 2,
+        )
+        solid(body, "plate", foot, [0, 0, PLATE_THICKNESS / 2], rgba=self.rgba)
         ridge = body.add_body(name="ridge")
-        solid(ridge, "wall", [self.length / 2, self.width / 2, wall], [0, 0, PLATE + wall], rgba=self.rgba)
+        solid(ridge, "wall", [self.length / 2, self.width / 2, wall], [0, 0, PLATE_THICKNESS + wall], rgba=self.rgba)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from ..geometry import quat
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-BOARDS = 24
+RING_BOARDS = 24
 """Straight boards that stand for the ring. They touch it from outside: it is nowhere narrower than nominal."""
 
 
@@ -37,7 +37,7 @@ class RingRack(Prop):
     @property
     def outer(self) -> float:
         """Radius of the circle around all of it [m]."""
-        return (self.radius + self.board) / math.cos(math.pi / BOARDS)
+        return (self.radius + self.board) / math.cos(math.pi / RING_BOARDS)
 
     @property
     def top(self) -> float:
@@ -48,9 +48,9 @@ class RingRack(Prop):
         look = {"friction": self.friction, "rgba": self.rgba}
         half = self.radius + self.board
         solid(body, "plinth", [half, half, self.plinth / 2], [0.0, 0.0, self.plinth / 2], **look)
-        middle, length = self.radius + self.board / 2, half * math.tan(math.pi / BOARDS)
-        for i in range(BOARDS):
-            turn = math.tau * i / BOARDS
+        middle, length = self.radius + self.board / 2, half * math.tan(math.pi / RING_BOARDS)
+        for i in range(RING_BOARDS):
+            turn = math.tau * i / RING_BOARDS
             pos = [middle * np.cos(turn), middle * np.sin(turn), self.plinth + self.height / 2]
             solid(body, f"ring_{i}", [self.board / 2, length, self.height / 2], pos, quat=quat("z", turn), **look)
 

@@ -4,7 +4,7 @@
        |                        [#]         |      x across, y along the rod, the origin under its middle
        |____________________________________|
 
-It balances on an edge under its centre of mass, which lies SLUG times as far from the middle as the slug does.
+It balances on an edge under its centre of mass, which lies SLUG_SHARE times as far from the middle as the slug does.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from ..params import param
 from .box import Box
 from .prop import Rgba, show
 
-SLUG = 2 / 3
+SLUG_SHARE = 2 / 3
 """Share of the mass that is in the slug. At 0.15 kg it is 9 cm^3 of lead, a cube of 21 mm: it fits the tube."""
 SLUG_EDGE = 0.020
 """Edge of the slug [m]."""
@@ -43,12 +43,12 @@ class Rod(Box):
     @property
     def slug(self) -> float:
         """How far from the middle the slug is [m]."""
-        return self.com / SLUG
+        return self.com / SLUG_SHARE
 
     @property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
-        tube, slug = (1 - SLUG) * self.mass, SLUG * self.mass
+        tube, slug = (1 - SLUG_SHARE) * self.mass, SLUG_SHARE * self.mass
         across, along = self.width**2, self.length**2
         apart = tube * self.com**2 + slug * (self.slug - self.com) ** 2
         turned = (tube * (across + along) + 2 * slug * SLUG_EDGE**2) / 12 + apart

@@ -28,15 +28,15 @@ from ..params import param
 from .box import Box
 from .prop import STIFF, Prop, Rgba, show, shown, solid
 
-CHEEK = 0.004
+CHEEK_THICKNESS = 0.004
 """Thickness of the plates that join deck and axle [m]; they count as weightless beside the deck."""
-POST = 0.014
+POST_WIDTH = 0.014
 """Width of the posts [m]."""
-SLACK = 0.003
+CHEEK_GAP = 0.003
 """Air between cheek and post [m]."""
-AXLE = 0.004
+AXLE_RADIUS = 0.004
 """Radius of the axle [m]."""
-GREY, STEEL = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
+FRAME_COLOUR, AXLE_COLOUR = (0.35, 0.37, 0.40, 1.0), (0.2, 0.2, 0.22, 1.0)
 
 Load = tuple[float, float, float]
 """Mass [kg], place along the deck from the axle [m] and height over the deck [m] of a centre of mass."""
@@ -78,10 +78,17 @@ class Seesaw(Prop):
     # --- parts ----------------------------------------------------------------------------
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        side = self.width / 2 + CHEEK + SLACK + POST / 2
-        solid(body, "foot", [0.04, side + POST / 2, 0.004], [0, 0, 0.004], condim=3, rgba=GREY)
+        side = self.width / 2 + CHEEK_THICKNESS + CHEEK_GAP + POST_WIDTH / 2
+        solid(body, "foot", [0.04, side + POST_WIDTH / 2, 0.004], [0, 0, 0.004], condim=3, rgba=FRAME_COLOUR)
         for y in (-side, side):
-            solid(body, "", [POST / 2, POST / 2, self.axle / 2], [0, y, self.axle / 2], condim=3, rgba=GREY)
+            solid(
+                body,
+                "",
+                [POST_WIDTH / 2, POST_WIDTH / 2, self.axle / 2],
+                [0, y, self.axle / 2],
+                condim=3,
+                rgba=FRAME_COLOUR,
+            )
         self._hang(body.add_body(name="beam", pos=[0, 0, self.axle], quat=quat("y", self.tilt)), side)
 
     def _hang(self, beam: mujoco.MjsBody, side: float) -> None:
@@ -101,10 +108,12 @@ class Seesaw(Prop):
         middle = [-self.pivot_offset, 0, at]
         solid(beam, "deck", deck, middle, mass=self.mass, friction=self.friction, rgba=self.rgba)
         tall = self.drop + self.thickness
-        for y in (-(self.width + CHEEK) / 2, (self.width + CHEEK) / 2):
-            solid(beam, "", [0.010, CHEEK / 2, tall / 2], [0, y, -tall / 2], mass=0.0, condim=3, rgba=self.rgba)
-        size, cylinder = [AXLE, side + POST / 2, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
-        shown(beam, "", STEEL, type=cylinder, size=size, quat=quat("x", math.pi / 2))
+        for y in (-(self.width + CHEEK_THICKNESS) / 2, (self.width + CHEEK_THICKNESS) / 2):
+            solid(
+                beam, "", [0.010, CHEEK_THICKNESS / 2, tall / 2], [0, y, -tall / 2], mass=0.0, condim=3, rgba=self.rgba
+            )
+        size, cylinder = [AXLE_RADIUS, side + POST_WIDTH / 2, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
+        shown(beam, "", AXLE_COLOUR, type=cylinder, size=size, quat=quat("x", math.pi / 2))
 
     # --- statics --------------------------------------------------------------------------
 

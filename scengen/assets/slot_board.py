@@ -26,23 +26,23 @@ import numpy as np
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, shown, solid, table
 
-PLATE = 0.012
+PLATE_THICKNESS = 0.012
 """Thickness of the front and of the back plate [m]."""
-INNER = 0.002
+BACK_CHAMFER = 0.002
 """Chamfer of the back window [m]."""
-SHELL = 0.004
+SIDE_THICKNESS = 0.004
 """Thickness of the sides [m]."""
-DENSITY = 700.0
+BEECH_DENSITY = 700.0
 """Of beech [kg/m^3]."""
-LIFT = 0.002
+GROUND_CLEARANCE = 0.002
 """Height of the lowest face above the ground [m]: nothing rubs."""
-ARM, PIN = 0.006, 0.012
+ARM_THICKNESS, PIN_RADIUS = 0.006, 0.012
 """Thickness of the arm and radius of the pin [m]."""
 DAMPING, ARMATURE = 8.0, 0.05
 """Of the hinge [N m s/rad, kg m^2]: with a servo of `STIFFNESS` a turn is over, but for 2 %, after 0.2 s."""
 STIFFNESS = 200.0
 """Of the servo [N m/rad]: at the strongest push of the arm, 30 N at 5 cm from the axis, it gives way by 0.4 deg."""
-STEEL: Rgba = (0.30, 0.32, 0.36, 1.0)
+ARM_COLOUR: Rgba = (0.30, 0.32, 0.36, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,19 +85,26 @@ class SlotBoard(Prop):
         body.add_joint(name="hinge", type=hinge, axis=[0, 0, 1], damping=DAMPING, armature=ARMATURE)
         front, back, half = -self.pivot, self.depth - self.pivot, self.width / 2
         self._window(body, spec, "front", front, self.chamfer)
-        self._window(body, spec, "back", back - PLATE, INNER)
-        middle, long = (front + back) / 2, self.depth / 2 - PLATE
+        self._window(body, spec, "back", back - PLATE_THICKNESS, BACK_CHAMFER)
+        middle, long = (front + back) / 2, self.depth / 2 - PLATE_THICKNESS
         for name, side in (("left", 1.0), ("right", -1.0)):
-            at = [middle, side * (half - SHELL / 2), (LIFT + self.top) / 2]
-            self._solid(body, f"side_{name}", [long, SHELL / 2, (self.top - LIFT) / 2], at)
+            at = [middle, side * (half - SIDE_THICKNESS / 2), (GROUND_CLEARANCE + self.top) / 2]
+            self._solid(body, f"side_{name}", [long, SIDE_THICKNESS / 2, (self.top - GROUND_CLEARANCE) / 2], at)
         thick = self.roof / 4
-        self._solid(body, "top", [long, half - SHELL, thick], [middle, 0.0, self.top - thick])
+        self._solid(body, "top", [long, half - SIDE_THICKNESS, thick], [middle, 0.0, self.top - thick])
         if self.plugged:
             self._solid(body, "plug", [self.depth / 2, self.slot / 2, self.slot / 2], [middle, 0.0, self.centre])
-        arm = [middle / 2, 0.0, LIFT + ARM / 2]
-        shown(body, "arm", STEEL, size=[abs(middle) / 2, PIN, ARM / 2], pos=arm)
+        arm = [middle / 2, 0.0, GROUND_CLEARANCE + ARM_THICKNESS / 2]
+        shown(body, "arm", ARM_COLOUR, size=[abs(middle) / 2, PIN_RADIUS, ARM_THICKNESS / 2], pos=arm)
         cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
-        shown(body, "pin", STEEL, type=cylinder, size=[PIN, ARM, 0.0], pos=[0, 0, LIFT + ARM])
+        shown(
+            body,
+            "pin",
+            ARM_COLOUR,
+            type=cylinder,
+            size=[PIN_RADIUS, ARM_THICKNESS, 0.0],
+            pos=[0, 0, GROUND_CLEARANCE + ARM_THICKNESS],
+        )
 
     def _window(self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, front: float, cut: float) -> None:
         """A plate with a square window: four convex walls, chamfered in front."""
@@ -106,13 +113,13 @@ class SlotBoard(Prop):
 
         def profile(inner: float, outer: float) -> list[tuple[float, float]]:
             """Of a wall: x, and y or z from the window to the outside [m]."""
-            off, back = math.copysign(cut, outer - inner), front + PLATE
+            off, back = math.copysign(cut, outer - inner), front + PLATE_THICKNESS
             return [(back, inner), (back, outer), (front, outer), (front, inner + off), (front + cut, inner)]
 
         for wall, sign in (("left", 1.0), ("right", -1.0)):
-            corners = [(x, y, z) for x, y in profile(sign * half, sign * side) for z in (LIFT, self.top)]
+            corners = [(x, y, z) for x, y in profile(sign * half, sign * side) for z in (GROUND_CLEARANCE, self.top)]
             self._mesh(body, spec, f"{name}_{wall}", corners)
-        for wall, inner, outer in (("bottom", low, LIFT), ("roof", high, self.top)):
+        for wall, inner, outer in (("bottom", low, GROUND_CLEARANCE), ("roof", high, self.top)):
             corners = [(x, y, z) for x, z in profile(inner, outer) for y in (-end, end)]
             self._mesh(body, spec, f"{name}_{wall}", corners)
 
@@ -129,7 +136,7 @@ class SlotBoard(Prop):
         type: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_BOX,
     ) -> mujoco.MjsGeom:
         look = {"friction": self.friction, "rgba": self.rgba, "priority": PRIORITY + 1}
-        return solid(body, name, size, pos, type=type, density=DENSITY, **look)
+        return solid(body, name, size, pos, type=type, density=BEECH_DENSITY, **look)
 
 
 if __name__ == "__main__":

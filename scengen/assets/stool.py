@@ -7,9 +7,9 @@ import mujoco
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
-PLATE = 0.010
+PLATE_THICKNESS = 0.010
 """Thickness of the plate and of the legs [m]."""
-BEECH = 700.0
+BEECH_DENSITY = 700.0
 """Density [kg/m^3]."""
 
 
@@ -24,13 +24,13 @@ class Stool(Prop):
     rgba: Rgba = (0.45, 0.33, 0.22, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        half, leg = PLATE / 2, (self.height - PLATE) / 2
+        half, leg = PLATE_THICKNESS / 2, (self.height - PLATE_THICKNESS) / 2
         parts = {"plate": ([self.length / 2, self.width / 2, half], [0, 0, self.height - half])}
         for i, (x, y) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
             spot = [x * (self.length / 2 - half), y * (self.width / 2 - half), leg]
             parts[f"leg_{i}"] = ([half, half, leg], spot)
         for name, (size, pos) in parts.items():
-            solid(body, name, size, pos, density=BEECH, friction=self.friction, rgba=self.rgba)
+            solid(body, name, size, pos, density=BEECH_DENSITY, friction=self.friction, rgba=self.rgba)
 
 
 if __name__ == "__main__":

@@ -31,12 +31,12 @@ from .prop import PRIORITY, Prop, Rgba, solid
 
 SECTORS = 24
 """Wedges in a full turn."""
-FEET = 8
-FOOT = 0.001
+FOOT_COUNT = 8
+FOOT_RADIUS = 0.001
 """Radius of a foot [m], or half the thickness of a thinner floor."""
-PROUD = 0.0002
+FOOT_PROTRUSION = 0.0002
 """How far feet stand out of the underside [m]. At a tilt of 0.2 rad the underside's edge takes over from them."""
-SHORTEST = 1e-4
+MIN_DETAIL = 1e-4
 """Details that are smaller are left out [m]."""
 
 MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
@@ -98,7 +98,7 @@ class Turned(Prop):
     @property
     @abc.abstractmethod
     def stance(self) -> tuple[float, float]:
-        """Radius of the flat underside, at height `PROUD`, and thickness of the floor above it [m]."""
+        """Radius of the flat underside, at height `FOOT_PROTRUSION`, and thickness of the floor above it [m]."""
 
     def round_body(self) -> tuple[float, Vec3, Mat3]:
         """Volume [m^3] and centre [m] of the round body, and the inertia about it at a density of 1 [m^5]."""
@@ -125,9 +125,9 @@ class Turned(Prop):
         for section in self.sections:
             self._turn(section, body, spec)
         edge, floor = self.stance
-        radius = min(FOOT, floor / 2)
-        for i in range(FEET):
-            pos = (edge - radius) * heading(360.0 * i / FEET) + radius * UP
+        radius = min(FOOT_RADIUS, floor / 2)
+        for i in range(FOOT_COUNT):
+            pos = (edge - radius) * heading(360.0 * i / FOOT_COUNT) + radius * UP
             solid(body, f"foot_{i}", [radius], pos, type=SPHERE, friction=self.friction, mass=0.0, group=3)
 
     def _turn(self, section: Section, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:

@@ -23,12 +23,12 @@ from .box import Box
 from .cup import Cup
 from .plate import Plate
 from .prop import Prop, Rgba, show, solid
-from .turned import FEET, FOOT, PROUD
+from .turned import FOOT_COUNT, FOOT_PROTRUSION, FOOT_RADIUS
 
 CAPSULE, CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
 SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
-SEAM = 0.004
+SEAM_HEIGHT = 0.004
 """Height of a can's seams [m]."""
 
 
@@ -67,14 +67,22 @@ class Can(Prop):
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         squares = 3 * self.radius**2 + self.height**2
         weigh(body, self.mass, [0.0, 0.0, self.height / 2], np.array([squares, squares, 6 * self.radius**2]) / 12)
-        wall = [self.radius - PROUD, self.height / 2 - 2 * PROUD]  # no face of it is one with a seam's
+        wall = [
+            self.radius - FOOT_PROTRUSION,
+            self.height / 2 - 2 * FOOT_PROTRUSION,
+        ]  # no face of it is one with a seam's
         self._round("wall", body, wall, self.height / 2)
-        for end, middle, low in (("foot", SEAM / 2 + PROUD, FOOT), ("top", -SEAM / 2 - PROUD, -FOOT)):
+        for end, middle, low in (
+            ("foot", SEAM_HEIGHT / 2 + FOOT_PROTRUSION, FOOT_RADIUS),
+            ("top", -SEAM_HEIGHT / 2 - FOOT_PROTRUSION, -FOOT_RADIUS),
+        ):
             above = 0.0 if end == "foot" else self.height
-            self._round(f"{end}_seam", body, [self.radius, SEAM / 2], above + middle)
-            for i in range(FEET):
-                spot = (self.radius - FOOT - PROUD) * heading(360.0 * i / FEET) + (above + low) * UP
-                solid(body, f"{end}_{i}", [FOOT], spot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
+            self._round(f"{end}_seam", body, [self.radius, SEAM_HEIGHT / 2], above + middle)
+            for i in range(FOOT_COUNT):
+                spot = (self.radius - FOOT_RADIUS - FOOT_PROTRUSION) * heading(360.0 * i / FOOT_COUNT) + (
+                    above + low
+                ) * UP
+                solid(body, f"{end}_{i}", [FOOT_RADIUS], spot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
 
     def _round(self, name: str, body: mujoco.MjsBody, size: list[float], height: float) -> None:
         part = solid(
@@ -106,7 +114,10 @@ class Tin(Prop):
         for name, size, (px, py) in parts:
             solid(body, name, size, [px, py, up], mass=0.0, friction=self.friction, rgba=self.rgba)
         for i, (a, b) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
-            name, size = f"corner_{i}", [r, up - PROUD]  # its round end keeps off the table: flat faces stand better
+            name, size = (
+                f"corner_{i}",
+                [r, up - FOOT_PROTRUSION],
+            )  # its round end keeps off the table: flat faces stand better
             spot = [a * (x - r), b * (y - r), up]
             solid(body, name, size, spot, type=CYLINDER, mass=0.0, friction=self.friction, rgba=self.rgba)
 
@@ -255,7 +266,7 @@ BROWN, RED, BLUE, WHITE = (
     (0.20, 0.35, 0.65, 1.0),
     (0.90, 0.9, 0.9, 1.0),
 )
-TENNIS = 0.03235
+TENNIS_BALL_RADIUS = 0.03235
 """Radius of a tennis ball [m]."""
 ITEMS = (
     Item(2, "master chef can", _can(51.2, 140.2, 0.414), None, True),
@@ -292,13 +303,13 @@ ITEMS = (
         56,
         "tennis ball",
         RestingBall(
-            radius=TENNIS,
-            density=0.058 / (4 / 3 * math.pi * TENNIS**3),
+            radius=TENNIS_BALL_RADIUS,
+            density=0.058 / (4 / 3 * math.pi * TENNIS_BALL_RADIUS**3),
             friction=0.6,
             rolling=0.03,
             rgba=(0.75, 0.90, 0.20, 1.0),
         ),
-        2 * TENNIS,
+        2 * TENNIS_BALL_RADIUS,
         False,
     ),
     Item(61, "foam brick", _carton(50.0, 75.0, 50.0, 0.028, 0.70, RED), 0.05, False),
@@ -381,7 +392,7 @@ def by_name() -> dict[str, Ycb]:
     return {thing.called: thing for thing in every}
 
 
-PLACES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")
+SCAN_FILES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")
 """Where the scan of an object lies in its folder, best first."""
 
 
@@ -394,12 +405,12 @@ def mesh_of(folder: Path | str, item: Item) -> Path:
     place = Path(folder)
     if not place.is_dir():
         raise BadConfig(f"ycb = {cut(str(folder))} is no folder; name the one that holds {item.folder}")
-    for name in PLACES:
+    for name in SCAN_FILES:
         if (place / item.folder / name).is_file():
             return place / item.folder / name
     there = sorted(p.name for p in place.iterdir() if p.is_dir())
     if item.folder in there:
-        raise BadConfig(f"{cut(str(place / item.folder))} holds no scan; expected one of {', '.join(PLACES)}")
+        raise BadConfig(f"{cut(str(place / item.folder))} holds no scan; expected one of {', '.join(SCAN_FILES)}")
     known = ", ".join(there[:20]) or "nothing"
     raise BadConfig(f"no folder {item.folder} in {cut(str(folder))}{nearest(item.folder, there)}; known: {known}")
 

@@ -7,11 +7,11 @@ import mujoco
 from ..params import param
 from .prop import Prop, Rgba, show, shown
 
-SHEET = 0.001
+SHEET_THICKNESS = 0.001
 """Thickness [m]: enough to be drawn before the table."""
-BAR = (0.006, 0.024)
+BAR_SIZE = (0.006, 0.024)
 """Width and length of a bar [m]; they stand as far apart as they are wide."""
-BESIDE = 0.020
+BAR_DISTANCE = 0.020
 """From the edge of the zone to the middle of the bars [m]."""
 
 
@@ -28,11 +28,11 @@ class Zone(Prop):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half = self.size / 2
-        shown(body, "square", self.rgba, size=[half, half, SHEET / 2], pos=[0.0, 0.0, SHEET / 2])
-        width, length = BAR
+        shown(body, "square", self.rgba, size=[half, half, SHEET_THICKNESS / 2], pos=[0.0, 0.0, SHEET_THICKNESS / 2])
+        width, length = BAR_SIZE
         for k in range(self.label):
-            at = [half + BESIDE, (2 * k - self.label + 1) * width, SHEET / 2]
-            shown(body, f"bar_{k}", self.ink, size=[length / 2, width / 2, SHEET / 2], pos=at)
+            at = [half + BAR_DISTANCE, (2 * k - self.label + 1) * width, SHEET_THICKNESS / 2]
+            shown(body, f"bar_{k}", self.ink, size=[length / 2, width / 2, SHEET_THICKNESS / 2], pos=at)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from ..work.targets import try_file, try_folder
 from . import FAILED, OK, Arguments, intake, out, remark, say, write
 
 if TYPE_CHECKING:
-    from ..intake.asset import Taken
+    from ..intake.asset import MeshAsset
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,8 @@ def _write_mesh(name: str, target: Path) -> int:
 
 def _take_in(settings: Settings, folder: Path) -> int:
     asset = intake("asset")
-    request = asset.Request(**{field.name: getattr(settings, field.name) for field in fields(asset.Request)})
+    names = [field.name for field in fields(asset.IntakeRequest)]
+    request = asset.IntakeRequest(**{name: getattr(settings, name) for name in names})
     request.check()
     try_folder(folder)
     if known := asset.kept(request, folder):
@@ -89,7 +90,7 @@ def _take_in(settings: Settings, folder: Path) -> int:
     return _tell(figures)
 
 
-def _write(taken: "Taken", figures: dict[str, Any], folder: Path) -> None:
+def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
     """The figures last: they vouch for the files beside them."""
     from ..intake.preview import preview
 

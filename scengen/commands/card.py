@@ -7,8 +7,8 @@ from pathlib import Path
 from ..attack.check import attacked
 from ..config import read
 from ..errors import BadConfig, PoolError, at_least, cut
-from ..export.hub import Part, check_parts, check_target, own_license, publish
-from ..pool.pool import Pool
+from ..export.hub import DatasetCard, PublishedPool, check_pools, check_target, own_license, publish
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.recheck import LEVELS
@@ -43,10 +43,10 @@ def command(arguments: Arguments) -> int:
     at_least(settings, workers=1, sample=1)
     check_target(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-    check_parts(pools)
+    check_pools(pools)
     strict, seed = settings.expired == "fail", secrets.randbelow(2**32)
     options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, strict, attacked)
-    parts = []
+    published = []
     for pool in pools:
         with ProgressBar(err, f"verify {pool.folder}", len(pool), settings.workers) as progress_bar:
             report = verified(pool, options, search_path(arguments), progress_bar.show)
@@ -55,13 +55,13 @@ def command(arguments: Arguments) -> int:
             why = f"{report.names.get(fault['id'], fault['id'])}: {cut(fault['reason'], LONGEST)}"
             told = f"{pool.folder} is {report.verdict} at level {report.level}: {why}"
             raise PoolError(f"{told}; a card is for pools that verify, see scengen verify pool={pool.folder}")
-        parts.append(Part(pool, report.settings, _told(report)))
+        published.append(PublishedPool(pool, report.settings, _told(report)))
     tasks = dict.fromkeys(pool.task for pool in pools)
     title = settings.title or f"scengen: {', '.join(tasks)}"
-    publish(parts, Path(settings.to), title, settings.license or own_license())
-    names = ", ".join(part.name for part in parts)
+    publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
+    names = ", ".join(one.name for one in published)
     say(f"wrote {settings.to}: README.md and {sum(map(len, pools))} scenarios as {names}")
-    say(f"datasets.load_dataset({settings.to!r}, {parts[0].name!r}) opens one; upload the folder as it is")
+    say(f"datasets.load_dataset({settings.to!r}, {published[0].name!r}) opens one; upload the folder as it is")
     return OK
 
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..config import read
-from ..export.recording import ROBOMIMIC, Settings, record
-from ..pool.pool import Pool
+from ..export.recording import ROBOMIMIC, RecordSettings, record
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("record", arguments, Settings)
+    settings = read("record", arguments, RecordSettings)
     parts = _apart(settings)
     if len(parts) > 1:
         say(f"{len(parts)} recordings, one for each {_kind(settings)}: {', '.join(parts)}")
@@ -26,12 +26,12 @@ def command(arguments: Arguments) -> int:
     return max(statuses)
 
 
-def _kind(settings: Settings) -> str:
+def _kind(settings: RecordSettings) -> str:
     """What all scenarios of a recording share: a data set has one robot, a file of robomimic one environment."""
     return "task" if settings.format == ROBOMIMIC else "embodiment"
 
 
-def _apart(settings: Settings) -> Mapping[str, Settings]:
+def _apart(settings: RecordSettings) -> Mapping[str, RecordSettings]:
     """The recordings to make, each below `to` if they are more than one."""
     found: dict[str, list[str]] = defaultdict(list)
     for folder in settings.folders:
@@ -45,7 +45,7 @@ def _apart(settings: Settings) -> Mapping[str, Settings]:
     }
 
 
-def _record(settings: Settings, arguments: Arguments) -> int:
+def _record(settings: RecordSettings, arguments: Arguments) -> int:
     """Make one recording, and tell of it."""
     with ProgressBar(err, f"record to {settings.to}", 0, settings.workers) as progress_bar:
         try:

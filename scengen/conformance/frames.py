@@ -48,7 +48,7 @@ STILL = Motion(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedScene:
     """A scenario that is another one moved as a whole."""
 
     parameter: str
@@ -56,15 +56,15 @@ class Moved:
     motion: Motion
 
 
-def moved(scenario: Scenario, key: str) -> Iterator[Moved]:
+def moved(scenario: Scenario, key: str) -> Iterator[MovedScene]:
     """The scenario moved by each parameter that moves it as a whole, to a feasible place that `key` decides."""
     for parameter in parameters(scenario):
         there = next(_elsewhere(scenario, parameter, key), None)
         if there is not None and (motion := _motion(scenario, there)):
-            yield Moved(parameter.name, there, motion)
+            yield MovedScene(parameter.name, there, motion)
 
 
-def differing(scenario: Scenario, other: Moved, actions: Actions, embodiment: str) -> str:
+def differing(scenario: Scenario, other: MovedScene, actions: Actions, embodiment: str) -> str:
     """Play actions in a scenario, and judge every moment of it in the other place too.
 
     Args:

@@ -37,8 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.Item]) -> None:
     """Add the checks, before options such as `-k` choose among them."""
     if task := session.config.option.scengen_task:
-        checks = Checks.from_parent(session, name=task, nodeid=f"scengen/{task}")
-        items.extend(Check.from_parent(checks, name=rule.name, rule=rule) for rule in _rules(session.config))
+        checks = RuleCollector.from_parent(session, name=task, nodeid=f"scengen/{task}")
+        items.extend(RuleItem.from_parent(checks, name=rule.name, rule=rule) for rule in _rules(session.config))
 
 
 def _rules(config: pytest.Config) -> list["Rule"]:
@@ -54,14 +54,14 @@ def _rules(config: pytest.Config) -> list["Rule"]:
         raise pytest.UsageError(str(error)) from None
 
 
-class Checks(pytest.Collector):
+class RuleCollector(pytest.Collector):
     """What the checks of a task belong to."""
 
     def collect(self) -> list[pytest.Item]:
         return []
 
 
-class Check(pytest.Item):
+class RuleItem(pytest.Item):
     """One check."""
 
     def __init__(self, *, rule: "Rule", **others: Any):

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from .. import config
 from ..errors import ScengenError
-from ..ood import behaviour, card, features
+from ..ood import axis_card, behaviour, features
 from ..params import canonical, values, with_values
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -131,13 +131,13 @@ def axis_checks(
         ScengenError: the file cannot be loaded, it has no such axis, or n is less than 2.
     """
     found = config.task(task, search(conf))
-    settings = card.Settings(axis, n, any_n=n // 5, certify_n=0, seed=seed, rounds=0, workers=workers)
+    settings = axis_card.AxisSettings(axis, n, any_n=n // 5, certify_n=0, seed=seed, rounds=0, workers=workers)
     settings.check(found)
     folder = Path(to or f"generated/axes/{task}-{axis}")
 
     @cache
-    def made() -> card.Card:
-        return card.make(found, QUICK, settings, folder, lambda *_: None)[0]
+    def made() -> axis_card.AxisCard:
+        return axis_card.make_axis_card(found, QUICK, settings, folder, lambda *_: None)[0]
 
     return [
         Rule(f"{axis}: the oracle solves it", lambda: _solvable(made())),
@@ -212,7 +212,7 @@ def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) 
         _ask(len(tried) >= TRIED, f"{where}: of its shortcuts only {len(tried)} could be carried out; {gave_up}")
 
 
-def _judged_alike(task: Task, scenario: Scenario, other: frames.Moved) -> None:
+def _judged_alike(task: Task, scenario: Scenario, other: frames.MovedScene) -> None:
     """What a family says of every moment of a solution does not depend on where the scene stands."""
     world = world_of(scenario, task.embodiment)
     solution = run(scenario, world, scenario.oracle, task.horizon)
@@ -221,18 +221,18 @@ def _judged_alike(task: Task, scenario: Scenario, other: frames.Moved) -> None:
     _ask(not differs, f"{task.name}/id/0 moved by {other.parameter}: {differs}")
 
 
-def _solvable(made: card.Card) -> None:
+def _solvable(made: axis_card.AxisCard) -> None:
     """The oracle solves nearly all twins."""
     solved = made.oracle.value if made.oracle else 0.0
     _ask(solved >= SURE, f"{made.task}/{made.axis}: the oracle solves {solved:.0%} of the twins, less than {SURE:.0%}")
 
 
-def _breaks(made: card.Card) -> None:
+def _breaks(made: axis_card.AxisCard) -> None:
     """A memory that works in training fails; where none works there, a feature of the physics leaves training."""
     weak = all(baseline.finding in ("too weak", "not tried") for baseline in made.baselines)
     leaves = weak and any(departure.leaves for departure in made.features)
     told = ", ".join(f"{baseline.name} {baseline.finding}" for baseline in made.baselines)
-    helps = "more twins may tell" if made.verdict == behaviour.CANNOT_TELL else "say in its why what it asks of the eye"
+    helps = "more twins may tell" if made.verdict == behaviour.INCONCLUSIVE else "say in its why what it asks of the eye"
     _ask(made.verdict.startswith("breaks") or leaves, f"{made.task}/{made.axis}: {made.verdict} ({told}); {helps}")
 
 

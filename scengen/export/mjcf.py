@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 
 from ..errors import BadConfig
-from ..pool.pool import PoolRow
+from ..pool import PoolRow
 from ..robots import panda
 from ..sim import scene_text
 from ..sim.world import compose

@@ -28,7 +28,7 @@ from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
 from ..pool import collection
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..sim.world import World, hands
 from ..validate.identity import check_versions
 from ..validate.playable import unplayable
@@ -38,7 +38,7 @@ from ..work.targets import refused, try_file, try_folder
 from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DataSet, Feature
-from .play import Moment, Replay, View
+from .replay import DatasetRow, Snapshot, WitnessReplay
 
 NONE = "none"
 LEROBOT, ROBOMIMIC = "lerobot", "robomimic"
@@ -56,7 +56,7 @@ STATE, ENVIRONMENT = "observation.state", "observation.environment_state"
 
 
 @dataclass(frozen=True)
-class Settings:
+class RecordSettings:
     """Settings of `scengen record`; meanings stand in conf/command/record.yaml."""
 
     pool: str | list[str] = ""
@@ -121,7 +121,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Summary:
+class RecordSummary:
     """What a recording came to."""
 
     episodes: int
@@ -132,7 +132,7 @@ class Summary:
     """Scenarios that were left out, and why: they cannot be played within the limits."""
 
 
-def record(settings: Settings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> Summary:
+def record(settings: RecordSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> RecordSummary:
     """Write the recording that the settings describe; it appears when it is complete.
 
     Args:
@@ -169,8 +169,9 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
                     world = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes))
                     scenario = tasks[row.task].scenario(row.params)
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
-                    look = partial(View.of, world, writer.streams, pictures)
-                    if not writer.episode(Replay(row, scenario, world, periods_between(settings.rate), look)):
+                    observe = partial(Snapshot.of, world, writer.streams, pictures)
+                    replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe)
+                    if not writer.episode(replay):
                         failed.append(row.id)
                 progress(writer.episodes, count)
             writer.finish({"pools": [pool.sha256 for pool in pools], "versions": versions()})
@@ -178,7 +179,7 @@ def record(settings: Settings, progress: Callable[[int, int], None], search: Seq
     except BaseException:
         _discard(settings.unfinished)
         raise
-    return Summary(writer.episodes, writer.rows, tuple(failed), lost)
+    return RecordSummary(writer.episodes, writer.rows, tuple(failed), lost)
 
 
 def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
@@ -187,7 +188,7 @@ def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
     return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
 
 
-def _begin(settings: Settings) -> None:
+def _begin(settings: RecordSettings) -> None:
     """Make the unfinished file or folder, which nobody else may have begun."""
     path = settings.unfinished
     try:
@@ -233,7 +234,7 @@ class Writer(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
-    def episode(self, replay: Replay) -> bool:
+    def episode(self, replay: WitnessReplay) -> bool:
         """Add one scenario's episode, and say whether it reached the goal."""
         ...
 
@@ -243,7 +244,7 @@ class Writer(Protocol):
 
 
 def _writer(
-    settings: Settings, robot: str, streams: Mapping[str, Stream], task: str, search: tuple[str, ...]
+    settings: RecordSettings, robot: str, streams: Mapping[str, Stream], task: str, search: tuple[str, ...]
 ) -> Writer:
     if settings.format == LEROBOT:
         return _LeRobot(settings, robot, streams)
@@ -257,48 +258,48 @@ def _writer(
 class _LeRobot(DataSet):
     """A LeRobot data set of replayed witnesses."""
 
-    def __init__(self, settings: Settings, robot: str, streams: Mapping[str, Stream]):
+    def __init__(self, settings: RecordSettings, robot: str, streams: Mapping[str, Stream]):
         size = (settings.width, settings.height)
         features = _features(settings, robot, streams)
         super().__init__(settings.unfinished, settings.rate, robot, features, settings.eyes, size)
         self.settings, self.streams = settings, streams
 
-    def episode(self, replay: Replay) -> bool:
+    def episode(self, replay: WitnessReplay) -> bool:
         row, success = replay.row, False
         size, views = (self.settings.width, self.settings.height), cameras_of(row.embodiment)
         for name in self.settings.eyes:
             held = replay.scenario.orientation
             self.calibrate(name, calibration(replay.world, views[name], *size, held), str(row.name))
-        for moment in replay.moments():
-            self.add(_values(moment, proprioception(row.embodiment)), moment.seen.pictures)
-            success = moment.success
+        for dataset_row in replay.rows():
+            self.add(_values(dataset_row, proprioception(row.embodiment)), dataset_row.observed.pictures)
+            success = dataset_row.success
         columns = row.plain()
         about = {f"scengen/{name}": columns[name] for name in ABOUT}
         self.end_episode(row.instruction, {**about, "scengen/success": success})
         return success
 
 
-def _values(moment: Moment, state: Sequence[str]) -> dict[str, Any]:
+def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
     """The columns of a row: the paper's streams, the actions, and what LeRobot looks for.
 
     Args:
         state: names of the streams that make up `observation.state`.
     """
-    seen = moment.seen.streams
+    observed = row.observed.streams
     return {
-        **{ENVIRONMENT if name == NAME else name: values for name, values in seen.items()},
-        STATE: np.concatenate([seen[name] for name in state]),
-        "action": moment.action,
-        "actions": moment.actions,
-        "reward": np.float32(moment.success),
-        "next.reward": np.float32(moment.success),
-        "next.done": moment.done,
-        "next.success": moment.success,
+        **{ENVIRONMENT if name == NAME else name: values for name, values in observed.items()},
+        STATE: np.concatenate([observed[name] for name in state]),
+        "action": row.action,
+        "actions": row.actions,
+        "reward": np.float32(row.success),
+        "next.reward": np.float32(row.success),
+        "next.done": row.done,
+        "next.success": row.success,
     }
 
 
 def _camera(
-    stack: ExitStack, world: World, settings: Settings, views: Mapping[str, str], held: Orientation
+    stack: ExitStack, world: World, settings: RecordSettings, views: Mapping[str, str], held: Orientation
 ) -> Callable[[], dict[str, Picture]]:
     """What takes the pictures of a moment, by the paper's names, as policies see them; without any, no OpenGL either.
 
@@ -313,7 +314,7 @@ def _camera(
     return lambda: {name: held.apply(camera.take(views[name])) for name in settings.eyes}
 
 
-def _features(settings: Settings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:
+def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:
     """The columns of `_values`."""
     own, numbers = named(streams, proprioception(robot)), action_names(robot)
     seen = {
@@ -336,7 +337,7 @@ def _robot(pools: list[Pool]) -> str:
     """The one embodiment of all scenarios."""
     robots = set()
     for pool in pools:
-        check_versions(pool.versions, str(pool.folder))
+        check_versions(pool.manifest.versions, str(pool.folder))
         robots |= {*pool.kinds("embodiment")[0]}
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")

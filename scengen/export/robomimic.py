@@ -30,7 +30,7 @@ from ..errors import BadConfig
 from ..robots.panda import Names
 from ..sim.world import World, hands
 from ..versions import versions
-from .play import Replay, View
+from .replay import Snapshot, WitnessReplay
 
 ROBOSUITE_TYPE = 1
 """robomimic's number for robosuite environments."""
@@ -81,22 +81,22 @@ class Demonstrations:
         self._data = self._file.create_group("data")
         self._masks: dict[str, list[str]] = defaultdict(list)
 
-    def episode(self, replay: Replay) -> bool:
+    def episode(self, replay: WitnessReplay) -> bool:
         """Add one scenario's demonstration, and say whether it reached the goal."""
         row, name, success = replay.row, f"demo_{self.episodes}", False
-        group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[View]()
+        group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[Snapshot]()
         views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
-        for moment in replay.moments():
-            columns["actions"].append(moment.action)
-            columns["states"].append(moment.seen.physics)
-            columns["rewards"].append(np.float32(moment.success))
-            columns["dones"].append(np.int64(moment.done))
-            self._add(group, "obs", moment.seen, views)
+        for dataset_row in replay.rows():
+            columns["actions"].append(dataset_row.action)
+            columns["states"].append(dataset_row.observed.physics)
+            columns["rewards"].append(np.float32(dataset_row.success))
+            columns["dones"].append(np.int64(dataset_row.done))
+            self._add(group, "obs", dataset_row.observed, views)
             if seen:
-                self._add(group, "next_obs", moment.seen, views)
-            seen.append(replace(moment.seen, pictures={}))
-            success = moment.success
-        last = replay.look()
+                self._add(group, "next_obs", dataset_row.observed, views)
+            seen.append(replace(dataset_row.observed, pictures={}))
+            success = dataset_row.success
+        last = replay.observe()
         self._add(group, "next_obs", last, views)
         for key in last.streams:
             values = np.array([view.streams[key] for view in (*seen, last)])
@@ -131,7 +131,7 @@ class Demonstrations:
         self._file.close()
 
     @staticmethod
-    def _add(group: Any, what: str, seen: View, views: Mapping[str, str]) -> None:
+    def _add(group: Any, what: str, seen: Snapshot, views: Mapping[str, str]) -> None:
         """Append the pictures of a view: all of an episode would not fit into memory."""
         for camera, picture in seen.pictures.items():
             key, shape = f"{what}/{views[camera]}", picture.shape

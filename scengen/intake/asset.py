@@ -13,13 +13,13 @@ import numpy as np
 
 from ..assets.mesh_prop import MeshProp
 from ..assets.prop import TABLE_TOP, Prop, place, table
-from ..assets.turned import FOOT
+from ..assets.turned import FOOT_RADIUS
 from ..errors import BadConfig, UnknownName, cut
 from ..geometry import Mat3
 from ..sim.scene_text import emit
 from .feet import feet
 from .pieces import Pieces, Surface, cut_up, one_hull
-from .solid import UNITS, Solid, as_mesh, content, read
+from .solid import UNITS, MeshSolid, as_mesh, content, read
 
 WATER = 1000.0
 """Density where neither mass nor density is given [kg/m^3]."""
@@ -34,7 +34,7 @@ SPEED = 0.001
 
 
 @dataclass(frozen=True)
-class Request:
+class IntakeRequest:
     """What a mesh is taken in with; the settings of `scengen asset` of these names."""
 
     mesh: str
@@ -71,7 +71,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Rest:
+class DropResult:
     """How an asset behaves that was let go just above the table."""
 
     creep: float
@@ -87,7 +87,7 @@ class Rest:
         return self.creep <= CREEP and self.speed <= SPEED
 
 
-def dropped(prop: Prop) -> Rest:
+def dropped(prop: Prop) -> DropResult:
     """Let a prop go above the middle of the table, upright, and watch it once it has had time to come to rest."""
     scene = table()
     place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP + DROP])
@@ -101,15 +101,15 @@ def dropped(prop: Prop) -> Rest:
     mujoco.mj_forward(model, data)
     creep = float(np.linalg.norm(data.body("asset").xipos - before))
     turn = 2 * float(np.arccos(np.clip(abs(data.qpos[3]), 0.0, 1.0)))
-    return Rest(creep, speed, turn, int(data.ncon))
+    return DropResult(creep, speed, turn, int(data.ncon))
 
 
 @dataclass(frozen=True)
-class Taken:
+class MeshAsset:
     """A mesh that was taken in."""
 
-    request: Request
-    solid: Solid
+    request: IntakeRequest
+    solid: MeshSolid
     pieces: Pieces
     hull: Pieces
     """The convex hull alone, for comparison."""
@@ -120,7 +120,7 @@ class Taken:
         return _prop(self.request, self.solid, self.pieces, rot)
 
     @cached_property
-    def rest(self) -> Rest:
+    def rest(self) -> DropResult:
         return dropped(self.prop)
 
     @cached_property
@@ -156,7 +156,7 @@ class Taken:
         }
 
 
-def take_in(request: Request) -> Taken:
+def take_in(request: IntakeRequest) -> MeshAsset:
     """Read a mesh, cut it into convex pieces unless its hull is near enough, and weigh it.
 
     Raises:
@@ -168,17 +168,17 @@ def take_in(request: Request) -> Taken:
     hull = one_hull(found, surface, request.seed)
     near = hull.error.worst <= request.error
     pieces = hull if near else cut_up(found, surface, request.error, request.pieces, request.seed)
-    return Taken(request, found, pieces, hull, _prop(request, found, pieces))
+    return MeshAsset(request, found, pieces, hull, _prop(request, found, pieces))
 
 
-def _prop(request: Request, found: Solid, pieces: Pieces, rot: Mat3 | None = None) -> MeshProp:
+def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | None = None) -> MeshProp:
     mesh = found.mesh
     mesh.density = request.mass / mesh.volume if request.mass else (request.density or WATER)
     turn = np.eye(3) if rot is None else rot
     parts = [points if rot is None else points @ rot.T for points in pieces.corners]
     com, corners = turn @ np.asarray(mesh.center_mass), np.vstack(parts)
     stands = feet(corners, com)
-    lowest = np.concatenate([corners[:, 2], stands[:, 2] - FOOT]).min()
+    lowest = np.concatenate([corners[:, 2], stands[:, 2] - FOOT_RADIUS]).min()
     origin = np.array([com[0], com[1], lowest])
     tolerance, look = 1e-4, found.manifold
     while look.num_tri() > FACES:
@@ -201,17 +201,17 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in ("scengen", "coacd", "manifold3d", "mujoco", "trimesh")}
 
 
-def _settings(request: Request) -> dict[str, Any]:
+def _settings(request: IntakeRequest) -> dict[str, Any]:
     return {name: value for name, value in asdict(request).items() if name != "mesh"}
 
 
-def key(request: Request, sha256: str) -> str:
+def key(request: IntakeRequest, sha256: str) -> str:
     """What an asset is known by: the content of the file, the settings and the versions, not where the file is."""
     told = json.dumps([sha256, _settings(request), versions()], sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()
 
 
-def kept(request: Request, folder: Path) -> dict[str, Any] | None:
+def kept(request: IntakeRequest, folder: Path) -> dict[str, Any] | None:
     """The figures of an asset in a folder, if it was made of this very file with these settings and versions.
 
     Raises:

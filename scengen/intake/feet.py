@@ -6,7 +6,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from ..assets.mesh_prop import Points
-from ..assets.turned import FEET, FOOT, PROUD
+from ..assets.turned import FOOT_COUNT, FOOT_PROTRUSION, FOOT_RADIUS
 from ..geometry import Vec3
 
 LEVEL = 0.0003
@@ -16,10 +16,10 @@ LEAN = math.radians(15.0)
 
 
 def feet(corners: Points, com: Vec3) -> Points:
-    """Centres of the spheres of radius `FOOT` that a body stands on, shape (n, 3); none if it would not stand as it is.
+    """Centres of the spheres of radius `FOOT_RADIUS` that a body stands on, shape (n, 3); none if it would not stand as it is.
 
     It stands on that side of its convex hull in which the foot of the perpendicular from the centre of mass lies; of
-    several the most level one. Feet are where its corners reach farthest in `FEET` directions.
+    several the most level one. Feet are where its corners reach farthest in `FOOT_COUNT` directions.
 
     Args:
         corners: of all its pieces [m].
@@ -33,12 +33,14 @@ def feet(corners: Points, com: Vec3) -> Points:
     x = np.cross(up, [0.0, 1.0, 0.0])
     x /= np.linalg.norm(x)
     flat = np.stack([x, np.cross(up, x)])
-    angles = 2 * math.pi * np.arange(FEET) / FEET
+    angles = 2 * math.pi * np.arange(FOOT_COUNT) / FOOT_COUNT
     away = (low - com) @ flat.T
     farthest = np.unique((away @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))
     spots, distances = away[farthest], np.linalg.norm(away[farthest], axis=1, keepdims=True)
-    inwards = spots * np.maximum(1 - FOOT / np.maximum(distances, FOOT), 0.0)  # not to stand out at the side
-    base = com + (height - com @ up + FOOT - PROUD) * up
+    inwards = spots * np.maximum(
+        1 - FOOT_RADIUS / np.maximum(distances, FOOT_RADIUS), 0.0
+    )  # not to stand out at the side
+    base = com + (height - com @ up + FOOT_RADIUS - FOOT_PROTRUSION) * up
     return base + inwards @ flat
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ..assets.mesh_prop import Points
-from .solid import Solid, as_mesh, sampled
+from .solid import MeshSolid, as_mesh, sampled
 
 DETAIL = 0.1
 """Share of the permitted error by which a surface is simplified before it is cut up. A scan of a bottle with 16 000
@@ -27,7 +27,7 @@ ITERATIONS, NODES, RESOLUTION = 60, 15, 1000
 
 
 @dataclass(frozen=True)
-class Error:
+class PieceError:
     """How far convex pieces are from a solid [m]."""
 
     outward: float
@@ -70,7 +70,7 @@ class Pieces:
     """Convex pieces in place of a solid."""
 
     hulls: tuple[Manifold, ...]
-    error: Error
+    error: PieceError
 
     @classmethod
     def of(cls, hulls: list[Manifold], surface: Surface, seed: int) -> Self:
@@ -84,7 +84,7 @@ class Pieces:
         for hull in hulls:
             lowest = np.minimum(lowest, _highest(surface.points, as_mesh(hull)))
         inward = max(0.0, round(float(lowest.max()), 9))
-        return cls(tuple(hulls), Error(outward, inward, union.volume() / surface.manifold.volume()))
+        return cls(tuple(hulls), PieceError(outward, inward, union.volume() / surface.manifold.volume()))
 
     @property
     def corners(self) -> list[Points]:
@@ -92,12 +92,12 @@ class Pieces:
         return [as_mesh(hull).vertices.view(np.ndarray) for hull in self.hulls]
 
 
-def one_hull(solid: Solid, surface: Surface, seed: int) -> Pieces:
+def one_hull(solid: MeshSolid, surface: Surface, seed: int) -> Pieces:
     """The convex hull: what MuJoCo makes of a mesh by itself."""
     return Pieces.of([solid.manifold.hull()], surface, seed)
 
 
-def cut_up(solid: Solid, surface: Surface, error: float, most: int, seed: int) -> Pieces:
+def cut_up(solid: MeshSolid, surface: Surface, error: float, most: int, seed: int) -> Pieces:
     """Convex pieces by CoACD, of which no more than `most` are made, whatever the error is then.
 
     Args:

@@ -29,7 +29,7 @@ RAYS = 2000
 
 
 @dataclass(frozen=True)
-class Solid:
+class MeshSolid:
     """A closed body in one part, in metres."""
 
     file: str
@@ -63,7 +63,7 @@ def sampled(mesh: trimesh.Trimesh, count: int, rng: np.random.Generator) -> tupl
     return (1 - root) * a + root * (1 - share) * b + root * share * c, faces
 
 
-def read(path: str, units: str | None = None, seed: int = 0) -> Solid:
+def read(path: str, units: str | None = None, seed: int = 0) -> MeshSolid:
     """Read a mesh file.
 
     Args:
@@ -91,7 +91,7 @@ def read(path: str, units: str | None = None, seed: int = 0) -> Solid:
             f"than {1000 * median:.1f} mm), and thin walls let things through; give it walls of {1000 * THIN:g} mm"
         )
     sha256 = hashlib.sha256(data).hexdigest()
-    return Solid(Path(path).name, sha256, manifold, len(points) - len(whole), len(faces) - len(kept), thin)
+    return MeshSolid(Path(path).name, sha256, manifold, len(points) - len(whole), len(faces) - len(kept), thin)
 
 
 def content(path: str) -> bytes:

@@ -18,7 +18,7 @@ from ..geometry import UP, Mat3, about_z, shortest
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
 from ..work.targets import cache_folder, try_folder, write
-from .asset import Request, Taken, key, take_in
+from .asset import IntakeRequest, MeshAsset, key, take_in
 from .feet import side_below
 from .solid import content
 
@@ -76,7 +76,7 @@ def _drawn(task: Task, split: str) -> list[Ycb]:
 def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
     """What a task holds of an object: kept in the folder of cached files under what it is made of."""
     path = mesh_of(folder, thing.row)
-    request = Request(str(path), mass=thing.mass, friction=_friction(thing.row.prop))
+    request = IntakeRequest(str(path), mass=thing.mass, friction=_friction(thing.row.prop))
     made_of = key(request, hashlib.sha256(content(request.mesh)).hexdigest())
     kept = cache_folder() / "scans" / f"{made_of}{'-low' * thing.lies}.json"
     if kept.is_file():
@@ -99,7 +99,7 @@ def _friction(proxy: Prop) -> float:
     return float(proxy.spec().compile().geom_friction[0, 0])
 
 
-def _upright(thing: Ycb, taken: Taken) -> Mat3:
+def _upright(thing: Ycb, taken: MeshAsset) -> Mat3:
     """The turn from a scan's axes to those of the proxy: scans of the set stand or lie as their proxies do, but askew.
 
     About the vertical, until the narrow side lies as the proxy's; to its side, if it is a carton that lies; and by

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from ..control.loop import Loop
 from ..episode import Actions, Episode
 from ..errors import UnknownName
-from ..pool.pool import PoolRow
+from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.rollout import Rollout, try_shortcut

@@ -11,7 +11,7 @@ from rich.table import Table
 from ..attack.campaign import AttackReport
 from ..attack.evidence import TierRate, spelled
 from ..certificate import STAGES
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
@@ -92,7 +92,7 @@ def pools_table(pools: Sequence[Pool]) -> Table:
     table = Table("pool", "code", "split", "scenarios", "proposed", title_justify="left")
     for pool in pools:
         codes = ", ".join(sorted(pool.kinds("code")[0]))
-        table.add_row(str(pool.folder), codes, pool.split, str(len(pool)), str(pool.funnel["proposed"]))
+        table.add_row(str(pool.folder), codes, pool.split, str(len(pool)), str(pool.manifest.funnel["proposed"]))
     table.title = f"{len(pools)} pools, {sum(map(len, pools))} scenarios"
     return table
 

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from ..certificate import STAGES
 from ..errors import ScengenError
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -24,7 +24,7 @@ STRIP = (8, 240, 180)
 
 
 @dataclass
-class Card:
+class SheetEntry:
     """One scenario on the sheet. Pictures are data addresses; empty where there is none."""
 
     row: PoolRow
@@ -60,24 +60,24 @@ def contact_sheet(
     remark, sections, figure = "", [], template("contact_sheet_figure.html")
     total, size = sum(min(images, len(pool)) for pool, _ in pools), 0
     for number_of_pool, (pool, task) in enumerate(pools):
-        cards: list[Markup] = []
+        figures: list[Markup] = []
         share = (LARGEST_PAGE - size) // (len(pools) - number_of_pool)
         for number, row in enumerate(islice(pool.rows(), images)):
-            card = Card(row, [_moved(task, name, value) for name, value in row.shifted.items()])
+            entry = SheetEntry(row, [_moved(task, name, value) for name, value in row.shifted.items()])
             if not remark:
                 try:
-                    card.picture, where = thumbnail(row.scene_xml, row.embodiment)
-                    card.twin = thumbnail(_twin(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
-                    card.strip = _strip(task, row) if number < films else ""
+                    entry.picture, where = thumbnail(row.scene_xml, row.embodiment)
+                    entry.twin = thumbnail(_twin(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
+                    entry.strip = _strip(task, row) if number < films else ""
                 except render.NoPictures as error:
                     remark = str(error)
-            text = Markup(figure.render(card=card, task=task, unit=_unit))
+            text = Markup(figure.render(entry=entry, task=task, unit=_unit))
             if len(text) > share:
                 break
             share, size = share - len(text), size + len(text)
-            cards.append(text)
-            progress(sum(len(c) for *_, c in sections) + len(cards), total)
-        sections.append((pool, task, cards))
+            figures.append(text)
+            progress(sum(len(others) for *_, others in sections) + len(figures), total)
+        sections.append((pool, task, figures))
     steps = ("proposed", *STAGES)
     page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
     write(path, page)
@@ -86,7 +86,7 @@ def contact_sheet(
 
 def _twin(pool: Pool, task: Task, row: PoolRow) -> str:
     """The scene of a scenario's training twin, drawn again."""
-    trained = task.draw(ID, row.seed, row.index, task.design(pool.sampler)).scenario
+    trained = task.draw(ID, row.seed, row.index, task.design(pool.manifest.config.sampler)).scenario
     if trained.id != row.id_twin:
         raise ScengenError(
             f"{row.id}: its training twin comes out as {trained.id}, but the pool names {row.id_twin}; the family has "

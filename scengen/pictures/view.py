@@ -11,7 +11,7 @@ import numpy as np
 from ..control.loop import Loop
 from ..episode import Episode
 from ..errors import ScengenError
-from ..pool.pool import PoolRow
+from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 from .film import Take

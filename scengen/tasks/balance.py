@@ -28,7 +28,7 @@ import mujoco
 import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
-from ..assets.ridge import MARGIN, Ridge
+from ..assets.ridge import PLATE_MARGIN, Ridge
 from ..assets.rod import SLUG_EDGE, Rod
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, shortest
 from ..params import param
@@ -254,5 +254,5 @@ class Balance(Scenario):
     @property
     def stand(self) -> Outline:
         """Of the plate under the ridge [m]."""
-        size = [self.ridge.length + 2 * MARGIN, self.ridge.plate]
+        size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]
         return corners(self.foot, math.radians(self.ridge_yaw), size)

@@ -35,7 +35,7 @@ import numpy as np
 from ..assets.ball import Ball
 from ..assets.bin import Bin
 from ..assets.prop import TABLE_TOP, place, table
-from ..assets.ramp import RIM, WALL, Ramp
+from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners
 from ..params import param
 from ..robots import jaw
@@ -197,7 +197,7 @@ class GalileoRampDrop(Scenario):
         yield require(fits, "the open jaw does not fit between the walls", jaw=jaw.SPAN, width=ramp.width)
         room = centre - jaw.TIP_BELOW - jaw.FINGER_ACROSS * fall
         yield require(room >= 0.0, "the fingers meet the floor before the ball does", room=room)
-        room = centre + jaw.PALM_ABOVE - jaw.PALM_ACROSS * fall - RIM / math.cos(ramp.slope)
+        room = centre + jaw.PALM_ABOVE - jaw.PALM_ACROSS * fall - WALL_RISE / math.cos(ramp.slope)
         yield require(room >= 0.0, "the palm meets the walls before the ball meets the floor", room=room)
         yield on_table("the ramp or the tray", self.outlines)
         yield within_reach("the ball's way", self.resting(self.start) + LIFT * UP, self.tray + LIFT * UP)
@@ -223,13 +223,13 @@ class GalileoRampDrop(Scenario):
     def tray(self) -> Vec3:
         """Middle of the tray's foot [m], on that side of the ramp where the robot stands."""
         along, across, _ = self.axes.T
-        away = self.ramp.width / 2 + WALL + self.tray_gap + TRAY.wall + TRAY.length / 2
+        away = self.ramp.width / 2 + WALL_THICKNESS + self.tray_gap + TRAY.wall + TRAY.length / 2
         return self.middle - self.tray_back * along + away * (across if across[0] <= 0 else -across)
 
     @property
     def outlines(self) -> tuple[Outline, Outline]:
         """Of the ramp and of the tray."""
-        yaw, ramp = math.radians(self.heading), (self.ramp.span, self.ramp.width + 2 * WALL)
+        yaw, ramp = math.radians(self.heading), (self.ramp.span, self.ramp.width + 2 * WALL_THICKNESS)
         return corners(self.middle, yaw, ramp), corners(self.tray, yaw, TRAY.outer)
 
     def resting(self, s: float) -> Vec3:

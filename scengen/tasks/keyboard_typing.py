@@ -36,7 +36,7 @@ import mujoco
 import numpy as np
 
 from ..assets.glyph import write
-from ..assets.keyboard import LETTERS, PRINT, Keyboard
+from ..assets.keyboard import LETTERS, PRINT_SIZE, Keyboard
 from ..assets.prop import TABLE_TOP, Rgba, place, shown, table
 from ..control.loop import Loop
 from ..geometry import UP, Mat3, Vec3, about_z, between, quat
@@ -129,7 +129,10 @@ class KeyboardTyping(Scenario):
             scene.geom(f"keyboard/cap_{letter}").rgba = np.array(cap, np.float32)
             write(body, letter, self._shown_at(k), LARGE, BOLD / 2, faint, f"faint_{k}")
             typed = scene.worldbody.add_body(name=f"typed_{k}", mocap=True, pos=self.spot - HIDDEN * UP, quat=turn)
-            for where, height in ((self._shown_at(k), LARGE), (self.keyboard.at(letter), PRINT * self.keyboard.cap)):
+            for where, height in (
+                (self._shown_at(k), LARGE),
+                (self.keyboard.at(letter), PRINT_SIZE * self.keyboard.cap),
+            ):
                 write(typed, letter, where + PROUD * UP, height, BOLD, bold, f"bold_{height:.3f}_{k}")
         return scene
 

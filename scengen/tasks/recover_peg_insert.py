@@ -41,7 +41,7 @@ import numpy as np
 
 from ..assets.peg import Peg, Plinth
 from ..assets.prop import TABLE_TOP, place, servo, table
-from ..assets.slot_board import PLATE, STIFFNESS, SlotBoard
+from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
 from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, axes, between, corners, gap, heading, polar, rotation
@@ -315,7 +315,7 @@ class RecoverPegInsert(Scenario):
         yield require(wall < board.width / 2, "the board is narrower than its mouth", wall=wall, half=board.width / 2)
         room = board.centre + PALM_ABOVE - board.top
         yield require(room > 0.0, "the palm does not pass over the board", room=room)
-        into = peg.length - GRIP - FINGER_ACROSS - CLEAR - (board.depth - PLATE)
+        into = peg.length - GRIP - FINGER_ACROSS - CLEAR - (board.depth - PLATE_THICKNESS)
         yield require(into > 0.0, "the fingers come to the board before the nose is in the back window", into=into)
         balance = board.depth - (HOME - 0.5) * peg.length
         yield require(balance > SAFE, "the peg's middle is behind the slot in the end", balance=balance)

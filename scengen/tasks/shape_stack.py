@@ -29,7 +29,7 @@ import mujoco
 import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
-from ..assets.shape import CYLINDER, FRUSTUM, HEXAGON, STEEP, Shape
+from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, Shape
 from ..geometry import UP, Vec3, about_z
 from ..params import check_bounds, param
 from ..predicates import fallen, still
@@ -200,7 +200,7 @@ class ShapeStack(Scenario):
         yield require(frustums == 1, "not exactly one shape is a frustum", frustums=frustums)
         yield require(self.cone.pointed, "the cone has a face to stand on", radius=self.cone.top)
         held = math.atan(max(piece.shape.friction for piece in pieces)) + SLACK
-        yield require(held <= STEEP, "a shape may rest on the slope of the cone", slope=STEEP, needed=held)
+        yield require(held <= CONE_SLOPE, "a shape may rest on the slope of the cone", slope=CONE_SLOPE, needed=held)
         for shape in (piece.shape for piece in pieces):
             yield require(shape.width + ROOM <= OPEN_GAP, "the jaw cannot take a shape", width=shape.width)
             held = shape.collar - self.grip(shape) + PAD_BELOW if shape.pointed else BITE

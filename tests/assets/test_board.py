@@ -7,7 +7,7 @@ import pytest
 from helpers import anywhere
 from hypothesis import given, settings
 
-from scengen.assets.board import STEEL, Board
+from scengen.assets.board import STRIP_COLOUR, Board
 from scengen.assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from scengen.physics import GRAVITY
 
@@ -60,4 +60,4 @@ def test_let_go_it_coasts_as_far_as_its_friction_says(friction):
 def test_only_a_heavier_strip_shows():
     plain, loaded = (Board(off_centre=off).spec().compile() for off in (0.0, 0.01))
     assert plain.geom("strip").rgba == pytest.approx(plain.geom("board").rgba)
-    assert loaded.geom("strip").rgba == pytest.approx(STEEL, abs=1e-6)
+    assert loaded.geom("strip").rgba == pytest.approx(STRIP_COLOUR, abs=1e-6)

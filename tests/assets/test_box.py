@@ -10,7 +10,7 @@ from helpers import anywhere
 from hypothesis import given, settings
 
 from scengen.assets.bar import Bar
-from scengen.assets.box import LEAD, Block, Cube, Domino, Lid, LoadedCube
+from scengen.assets.box import LEAD_DENSITY, Block, Cube, Domino, Lid, LoadedCube
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.physics import GRAVITY
 
@@ -124,7 +124,7 @@ def test_a_loaded_cube_tips_once_its_centre_of_mass_has_passed_the_edge(beyond, 
 
 def test_the_slug_of_a_loaded_cube_weighs_what_lead_weighs_and_fits_in():
     cube = LoadedCube(edge=0.052, mass=0.05, lean=0.29)
-    assert cube.slug**3 * LEAD == pytest.approx(0.9 * 0.05)
+    assert cube.slug**3 * LEAD_DENSITY == pytest.approx(0.9 * 0.05)
     assert cube.com / 0.9 + cube.slug / 2 < cube.edge / 2  # where its outer side is
     assert cube.lean < cube.steepest
     assert replace(cube, lean=cube.steepest).com / 0.9 + cube.slug / 2 == pytest.approx(cube.edge / 2)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from scengen.assets.dish import Dish
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.turned import PROUD
+from scengen.assets.turned import FOOT_PROTRUSION
 from scengen.physics import GRAVITY
 
 
@@ -56,4 +56,4 @@ def test_anywhere_within_its_bounds_it_weighs_what_it_should(dish):
     model = dish.spec().compile()
     assert model.body("body").mass == pytest.approx(dish.mass)
     assert dish.foot > 0.03 and dish.height == pytest.approx(dish.rise + dish.thickness)
-    assert all(min(z for _, z in section.corners) >= PROUD for section in dish.sections)
+    assert all(min(z for _, z in section.corners) >= FOOT_PROTRUSION for section in dish.sections)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scengen.assets.ball import Ball
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.ramp import THICKNESS, Ramp
+from scengen.assets.ramp import FLOOR_THICKNESS, Ramp
 from scengen.geometry import UP
 from scengen.physics import GRAVITY
 
@@ -58,7 +58,7 @@ class Run:
     def climbed(self):
         """Height of the floor where the ball turns back on the far side [m]."""
         self.until(lambda: self.data.qpos[0] > 0.02 and self.data.qvel[0] <= 0)
-        return self.data.qpos[2] - TABLE_TOP - THICKNESS - self.ball.radius * math.cos(self.ramp.slope)
+        return self.data.qpos[2] - TABLE_TOP - FLOOR_THICKNESS - self.ball.radius * math.cos(self.ramp.slope)
 
 
 @pytest.mark.parametrize("angle", [15.0, 30.0, 45.0])

@@ -6,7 +6,7 @@ import pytest
 from helpers import anywhere
 from hypothesis import given, settings
 
-from scengen.assets.rod import SLUG, SLUG_EDGE, Rod
+from scengen.assets.rod import SLUG_EDGE, SLUG_SHARE, Rod
 
 
 def two_parts(rod):
@@ -15,8 +15,8 @@ def two_parts(rod):
     body, middle = spec.worldbody.add_body(name="body"), rod.width / 2
     tube, slug = rod.size / 2, np.full(3, SLUG_EDGE / 2)
     box = mujoco.mjtGeom.mjGEOM_BOX
-    body.add_geom(type=box, size=tube, pos=[0, 0, middle], mass=(1 - SLUG) * rod.mass)
-    body.add_geom(type=box, size=slug, pos=[0, rod.slug, middle], mass=SLUG * rod.mass)
+    body.add_geom(type=box, size=tube, pos=[0, 0, middle], mass=(1 - SLUG_SHARE) * rod.mass)
+    body.add_geom(type=box, size=slug, pos=[0, rod.slug, middle], mass=SLUG_SHARE * rod.mass)
     return spec.compile()
 
 

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.shape import BEECH, CUBE, CYLINDER, FRUSTUM, HEXAGON, KINDS, STEEP, TIP, TRIANGLE, Shape
+from scengen.assets.shape import (
+    BEECH_DENSITY,
+    CONE_SLOPE,
+    CUBE,
+    CYLINDER,
+    FRUSTUM,
+    HEXAGON,
+    KINDS,
+    TIP_RADIUS,
+    TRIANGLE,
+    Shape,
+)
 
 FLAT = (CUBE, CYLINDER, HEXAGON, TRIANGLE)
 CONE = Shape(kind=FRUSTUM, width=0.042, height=0.041)
@@ -36,7 +47,9 @@ def area(shape):
 @pytest.mark.parametrize("kind", FLAT, ids=KINDS.__getitem__)
 def test_prisms_weigh_density_times_area_times_height(kind):
     shape = Shape(kind=kind)
-    assert shape.spec().compile().body("body").mass == pytest.approx(BEECH * area(shape) * shape.height, rel=0.01)
+    assert shape.spec().compile().body("body").mass == pytest.approx(
+        BEECH_DENSITY * area(shape) * shape.height, rel=0.01
+    )
 
 
 @pytest.mark.parametrize("height", [0.025, 0.041])
@@ -44,8 +57,8 @@ def test_a_frustum_weighs_its_foot_and_its_cone(height):
     frustum = replace(CONE, height=height)
     r, top, low = frustum.width / 2, frustum.top, frustum.collar
     volume = math.pi * r**2 * low + math.pi / 3 * (height - low) * (r**2 + r * top + top**2)
-    assert frustum.spec().compile().body("body").mass == pytest.approx(BEECH * volume, rel=0.02)
-    assert math.atan2(height - low, r - top) == pytest.approx(STEEP)
+    assert frustum.spec().compile().body("body").mass == pytest.approx(BEECH_DENSITY * volume, rel=0.02)
+    assert math.atan2(height - low, r - top) == pytest.approx(CONE_SLOPE)
 
 
 @pytest.mark.parametrize("upper", [*FLAT, FRUSTUM], ids=KINDS.__getitem__)
@@ -63,10 +76,10 @@ def test_a_shape_stands_on_a_cube_as_long_as_its_middle_is_over_it(kind, beyond,
     assert (sunk < 0.005) == stands
 
 
-@pytest.mark.parametrize(("off", "friction"), [(3 * TIP, 0.7), (0.003, 0.7), (0.009, 0.7), (0.003, 1.0)])
+@pytest.mark.parametrize(("off", "friction"), [(3 * TIP_RADIUS, 0.7), (0.003, 0.7), (0.009, 0.7), (0.003, 1.0)])
 @pytest.mark.parametrize("kind", FLAT, ids=KINDS.__getitem__)
 def test_off_its_tip_nothing_rests_on_a_cone_that_is_steeper_than_friction_holds(kind, off, friction):
-    assert math.tan(STEEP) > 1.0
+    assert math.tan(CONE_SLOPE) > 1.0
     upper = Shape(kind=kind, friction=friction)
     assert left_alone(replace(CONE, friction=friction), upper, off=off, yaw=0.2)[1] > math.radians(75.0)
 

@@ -11,12 +11,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold
 
-from scengen.assets.bowl import BEAD, Bowl
+from scengen.assets.bowl import BEAD_HEIGHT, Bowl
 from scengen.assets.box import Block
-from scengen.assets.cup import RIM, SHORTEST_HANDLE, Cup
+from scengen.assets.cup import MIN_HANDLE, RIM_HEIGHT, Cup
 from scengen.assets.plate import Plate
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.turned import PROUD, SECTORS
+from scengen.assets.turned import FOOT_PROTRUSION, SECTORS
 from scengen.physics import GRAVITY
 from scengen.sim.scene_text import emit
 
@@ -126,7 +126,7 @@ def hollow(solid):
             return revolved([*well, (0, solid.height)]) + bore
         case Cup():
             beaded, end = solid.bead > solid.wall, solid.height
-            below, edge = end - (BEAD if beaded else RIM), max(solid.bead, solid.wall)
+            below, edge = end - (BEAD_HEIGHT if beaded else RIM_HEIGHT), max(solid.bead, solid.wall)
             well = [(solid.outer(z) - solid.wall, z) for z in (solid.floor, below)]
             mouth = [(solid.outer(z) - edge, z) for z in (below, end)]
             return revolved([(0, solid.floor), *well, (0, below)]) + revolved([(0, below), *mouth, (0, end)])
@@ -135,7 +135,7 @@ def hollow(solid):
                 [(solid.inner * math.sin(a), -solid.inner * math.cos(a)) for a in np.linspace(0, math.pi, 181)]
             )
             sphere = sphere.translate((0, 0, solid.centre)).trim_by_plane((0, 0, 1), solid.floor)
-            return sphere.trim_by_plane((0, 0, -1), -(solid.depth - 1.3 * BEAD))
+            return sphere.trim_by_plane((0, 0, -1), -(solid.depth - 1.3 * BEAD_HEIGHT))
 
 
 @given(solid=st.one_of(anywhere(Plate), anywhere(Cup), anywhere(Bowl)))
@@ -146,7 +146,7 @@ def test_anywhere_within_its_bounds_the_wedges_are_the_polygon_about_the_circle(
     whole = sum(parts, Manifold())
     assert (whole.volume(), sum(part.volume() for part in parts)) == pytest.approx((volume, volume), rel=1e-4)
     bounds = whole.bounding_box()
-    assert (bounds[2], bounds[5]) == pytest.approx((PROUD, solid.height), abs=1e-6)
+    assert (bounds[2], bounds[5]) == pytest.approx((FOOT_PROTRUSION, solid.height), abs=1e-6)
 
 
 @pytest.mark.parametrize("solid", ALL, ids=name)
@@ -160,10 +160,10 @@ def test_no_wedge_reaches_into_the_hollow(solid):
 @settings(max_examples=25, deadline=None)
 def test_a_ball_fits_into_a_cup_by_size_alone_and_feels_no_handle(cup):
     """Where the wall leans the ball touches it at the foot of the perpendicular, half a ball's lean lower or higher."""
-    middle = 0.5 * (cup.floor + cup.height - BEAD)
+    middle = 0.5 * (cup.floor + cup.height - BEAD_HEIGHT)
     lean = math.atan2(cup.rim - cup.base, cup.height)
     room = (cup.outer(middle) - cup.wall) * math.cos(lean)
-    radius = min(room, middle - cup.floor, (cup.height - BEAD - middle) / (1 + abs(math.sin(lean))))
+    radius = min(room, middle - cup.floor, (cup.height - BEAD_HEIGHT - middle) / (1 + abs(math.sin(lean))))
     assert probed(cup, [(0, 0, middle)], radius - 1e-5) == 0
     if radius == room:
         assert probed(cup, [(0, 0, middle)], 1.01 * radius) == 1
@@ -196,7 +196,7 @@ def test_underneath_two_faces_of_a_cup_that_are_seen_do_not_lie_in_one_plane():
         return mujoco.mju_rayGeom(*where, below, upwards, model.geom_type[g])
 
     seen = sorted(d for g in np.flatnonzero(model.geom_group < 3) if (d := distance(g)) >= 0.0)
-    assert seen[0] == pytest.approx(0.1 + PROUD, abs=1e-6)
+    assert seen[0] == pytest.approx(0.1 + FOOT_PROTRUSION, abs=1e-6)
     assert np.diff(seen).min(initial=1.0) > 1e-4
 
 
@@ -223,10 +223,10 @@ def test_a_ball_may_lie_anywhere_against_the_inner_sphere_of_a_bowl(bowl, turn, 
 def test_a_straight_cup_has_the_inertia_of_a_tube_and_a_disc(mass, radius, height, wall):
     """Tube: m (R^2 + r^2) / 2 and m (3 (R^2 + r^2) + h^2) / 12; disc: m R^2 / 2 and m (3 R^2 + h^2) / 12."""
     cup = Cup(mass=mass, base=radius, rim=radius, height=height, wall=wall, bead=0.0)
-    tall, flat, inner = height - cup.floor + PROUD, cup.floor - 2 * PROUD, radius - wall
+    tall, flat, inner = height - cup.floor + FOOT_PROTRUSION, cup.floor - 2 * FOOT_PROTRUSION, radius - wall
     areas = np.array([radius**2 - inner**2, radius**2])
     m = mass * areas * [tall, flat] / (areas @ [tall, flat])
-    z = np.array([height - tall / 2, PROUD + flat / 2])
+    z = np.array([height - tall / 2, FOOT_PROTRUSION + flat / 2])
     squares = np.array([radius**2 + inner**2, radius**2])
     com, inertia = cup.inertial()
     assert com == pytest.approx([0, 0, m @ z / mass])
@@ -294,7 +294,7 @@ def test_a_finger_fits_behind_the_handle_and_the_jaw_around_its_upright(cup):
 
 
 def test_a_stub_is_no_handle():
-    assert Cup(handle=SHORTEST_HANDLE).has_handle and not Cup(handle=0.9 * SHORTEST_HANDLE).has_handle
+    assert Cup(handle=MIN_HANDLE).has_handle and not Cup(handle=0.9 * MIN_HANDLE).has_handle
 
 
 @pytest.mark.parametrize(("slope", "slides"), [(0.9, False), (1.1, True)])
@@ -311,11 +311,11 @@ def test_a_cup_slides_by_the_friction_of_what_it_stands_on(over, slope, slides):
 @given(mass=st.floats(0.02, 0.3), radius=st.floats(0.08, 0.13), thickness=st.floats(0.002, 0.006))
 @settings(max_examples=20, deadline=None)
 def test_a_flat_plate_has_the_inertia_of_a_disc(mass, radius, thickness):
-    """m r^2 / 2 about the axis and m r^2 / 4 + m h^2 / 12 across it; feet take `PROUD` of the height."""
+    """m r^2 / 2 about the axis and m r^2 / 4 + m h^2 / 12 across it; feet take `FOOT_PROTRUSION` of the height."""
     disc = Plate(mass=mass, radius=radius, thickness=thickness, rise=0.0)
     com, inertia = disc.inertial()
-    height = thickness - PROUD
-    assert com == pytest.approx([0, 0, PROUD + height / 2])
+    height = thickness - FOOT_PROTRUSION
+    assert com == pytest.approx([0, 0, FOOT_PROTRUSION + height / 2])
     across = mass * (radius**2 / 4 + height**2 / 12)
     assert np.diag(inertia) == pytest.approx([across, across, mass * radius**2 / 2])
 
@@ -343,6 +343,6 @@ def test_a_plate_tips_under_a_press_on_its_lip_that_beats_its_weight_about_the_f
 @given(plate=anywhere(Plate).filter(lambda p: p.hole > 0.001))
 @settings(max_examples=15, deadline=None)
 def test_a_ball_fits_into_the_hole_of_a_plate_by_size_alone(plate):
-    middle = [(0, 0, (PROUD + plate.thickness) / 2)]
+    middle = [(0, 0, (FOOT_PROTRUSION + plate.thickness) / 2)]
     assert probed(plate, middle, plate.hole - 1e-5) == 0
     assert probed(plate, middle, plate.hole + 2e-4) == 1

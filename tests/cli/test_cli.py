@@ -20,9 +20,10 @@ from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
 from scengen.export.mjcf import export, without_slashes
-from scengen.ood import card, discover
+from scengen.ood import axis_card
+from scengen.ood.discovery import search as discovery
 from scengen.pictures import film, render
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.sim import scene_text
 from scengen.sim.world import World
@@ -259,10 +260,10 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     ("verb", "kind", "given"),
     [
         ("generate", generate.Settings, {}),
-        ("axis", card.Settings, {"axis": "diagonal"}),
-        ("discover", discover.Settings, {}),
-        ("evaluate", rollouts.Settings, {"policy": "idle", "pool": "here"}),
-        ("record", recording.Settings, {"pool": "here", "to": "there"}),
+        ("axis", axis_card.AxisSettings, {"axis": "diagonal"}),
+        ("discover", discovery.DiscoverSettings, {}),
+        ("evaluate", rollouts.EvaluateSettings, {"policy": "idle", "pool": "here"}),
+        ("record", recording.RecordSettings, {"pool": "here", "to": "there"}),
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
@@ -280,7 +281,7 @@ def test_it_runs_from_any_folder_as_a_module(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("<mujoco", "no well-formed XML"),
+        ("<mujoco", "not well-formed XML"),
         ("<robot/>", "expected <mujoco>"),
         ("<!DOCTYPE m [<!ENTITY a 'b'>]><mujoco>&a;</mujoco>", "document type or entities"),
         ("<mujoco><include file='x.xml'/></mujoco>", "contains <include>"),

@@ -14,7 +14,7 @@ from pools import certificate_of, rewritten
 from scengen import cli
 from scengen.certificate import CHECKS
 from scengen.export import hub
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 POOLS = (BASE / "single_severity", BASE / "mirror_id")
@@ -86,8 +86,8 @@ def test_the_pools_are_there_byte_by_byte(made):
 def test_people_read_what_was_certified_and_how_it_was_verified(made):
     text = (made / "README.md").read_text().split("---\n", 2)[2]
     for name in CHECKS:
-        assert re.search(rf"^\| {name} \| {re.escape(hub.HOLDS[name])} \|", text, re.M), name
-    assert set(hub.HOLDS) == set(CHECKS)
+        assert re.search(rf"^\| {name} \| {re.escape(hub.CHECK_MEANINGS[name])} \|", text, re.M), name
+    assert set(hub.CHECK_MEANINGS) == set(CHECKS)
     assert "level replay" in text and "Not measured" in text and "@software{scengen," in text
     assert Pool.open(POOLS[0]).sha256 in text and "| `domino_single` | wide_gaps | Tiles still reach" in text
 
@@ -96,8 +96,8 @@ def test_accessibility_adds_up_hits_of_checks():
     row = next(Pool.open(POOLS[0]).rows())
     numbers = {"random_raw": {"rollouts": 30, "hits": 1}, "retry_filtered": {"rollouts": 10, "hits": 0}}
     checks = [replace(c, passed=True, numbers=numbers) if c.name == "attack" else c for c in row.certificate.checks]
-    part = hub.Part(Pool.open(POOLS[0]), "quick", "")
-    lines = hub._accessibility([part], [hub.Tally.of([replace(row.certificate, checks=tuple(checks))] * 2)])
+    published = hub.PublishedPool(Pool.open(POOLS[0]), "quick", "")
+    lines = hub._accessibility([published], [hub.Tally.of([replace(row.certificate, checks=tuple(checks))] * 2)])
     assert lines == [
         ["`domino_single-wide_gaps@2`", "random", "raw", "2 of 60", "< 10.1%"],
         ["`domino_single-wide_gaps@2`", "retry", "filtered", "0 of 20", "< 13.9%"],

@@ -21,10 +21,10 @@ from scengen.envs.observations import streams_of
 from scengen.export import recording
 from scengen.export.cameras import calibration
 from scengen.export.lerobot import DataSet, Feature
-from scengen.export.recording import Settings, record
+from scengen.export.recording import RecordSettings, record
 from scengen.export.stats import QUANTILES, Shades
 from scengen.pool import pool
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.sim.world import IDLE, SUCTION, World
 
 PAPER = {
@@ -46,7 +46,7 @@ WIDTH, HEIGHT = 96, 72
 
 
 def recorded(folder, **changed):
-    settings = Settings(pool=str(REFERENCE), to=str(folder), **{"cameras": "none", **changed})
+    settings = RecordSettings(pool=str(REFERENCE), to=str(folder), **{"cameras": "none", **changed})
     return record(settings, lambda *_: None)
 
 
@@ -205,7 +205,7 @@ def test_the_environment_state_is_object_state_as_gymnasium_has_it(made, witness
 )
 def test_where_there_are_cameras_rows_do_not_tell_where_everything_is(asked, cameras, there):
     """LeRobot's policies read `observation.environment_state` wherever it is."""
-    assert Settings(cameras=cameras, environment_state=asked).privileged is there
+    assert RecordSettings(cameras=cameras, environment_state=asked).privileged is there
 
 
 def test_the_rows_actions_held_for_four_control_periods_reach_the_goal(made, witnesses):
@@ -228,7 +228,7 @@ def test_at_100_rows_a_second_every_action_has_its_row(tmp_path, witnesses):
 
 
 def test_a_suction_cup_has_no_jaw_streams():
-    names = set(recording._features(Settings(), SUCTION, streams_of(SUCTION)))
+    names = set(recording._features(RecordSettings(), SUCTION, streams_of(SUCTION)))
     assert set(PAPER) - names == {"robot0_gripper_qpos", "robot0_tactile_left", "robot0_tactile_right"}
 
 
@@ -340,7 +340,7 @@ def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        record(Settings(pool=str(REFERENCE), to=str(tmp_path / "new"), cameras="none"), interrupt)
+        record(RecordSettings(pool=str(REFERENCE), to=str(tmp_path / "new"), cameras="none"), interrupt)
     assert not list(tmp_path.iterdir())
 
 

@@ -11,8 +11,8 @@ from robosuite.environments.base import REGISTERED_ENVS
 
 from scengen import cli
 from scengen.errors import BadConfig
-from scengen.export.recording import Settings, record
-from scengen.pool.pool import Pool
+from scengen.export.recording import RecordSettings, record
+from scengen.pool import Pool
 from scengen.sim.world import World
 
 PROPRIOCEPTION = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")
@@ -23,7 +23,7 @@ PROPRIOCEPTION = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")
 def made(tmp_path_factory):
     """The first two scenarios, read-only."""
     path = tmp_path_factory.mktemp("robomimic") / "made.hdf5"
-    record(Settings(str(REFERENCE), str(path), "robomimic", n=2, cameras="none"), lambda *_: None)
+    record(RecordSettings(str(REFERENCE), str(path), "robomimic", n=2, cameras="none"), lambda *_: None)
     with h5py.File(path, "r", swmr=True, libver="latest") as file:  # as robomimic opens it
         yield file
 
@@ -95,7 +95,9 @@ def test_pictures_have_robosuites_names_and_follow_one_another(tmp_path, monkeyp
     monkeypatch.setattr("scengen.episode.Episode.judge", lambda self: (self.world.time > 0.035 and "timeout") or None)
     path = tmp_path / "seen.hdf5"
     cameras = ["rgb_exo_right_cam", "rgb_gripper_cam"]
-    record(Settings(str(REFERENCE), str(path), "robomimic", 1, cameras=cameras, width=32, height=24), lambda *_: None)
+    record(
+        RecordSettings(str(REFERENCE), str(path), "robomimic", 1, cameras=cameras, width=32, height=24), lambda *_: None
+    )
     with h5py.File(path) as file:
         demo = file["data/demo_0"]
         now, after = (demo[f"{what}/agentview_image"] for what in ("obs", "next_obs"))
@@ -125,7 +127,7 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, s
 def test_a_file_has_one_environment(tmp_path):
     """The command makes a file for each task; who calls it in Python is told."""
     pools = [str(REFERENCE), str(REFERENCE.parents[1] / "tests/checker/base/ball_id")]
-    settings = Settings(pool=pools, to=str(tmp_path / "out.hdf5"), format="robomimic", cameras="none")
+    settings = RecordSettings(pool=pools, to=str(tmp_path / "out.hdf5"), format="robomimic", cameras="none")
     with pytest.raises(BadConfig, match="has one environment"):
         record(settings, lambda *_: None)
     assert not list(tmp_path.iterdir())

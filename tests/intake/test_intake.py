@@ -11,9 +11,9 @@ from helpers import pictures_are_possible
 from manifold3d import Manifold
 
 from scengen import cli
-from scengen.assets.turned import FOOT, PROUD
+from scengen.assets.turned import FOOT_RADIUS, FOOT_PROTRUSION
 from scengen.errors import BadConfig
-from scengen.intake.asset import Request, dropped, take_in
+from scengen.intake.asset import IntakeRequest, dropped, take_in
 from scengen.intake.pieces import Pieces, Surface
 from scengen.intake.solid import as_mesh, read
 from scengen.sim import scene_text
@@ -113,7 +113,7 @@ def test_settings_that_mean_nothing_are_said_in_one_line(tmp_path, capsys, setti
 def taken(tmp_path):
     def take(mesh, **settings):
         mesh.export(tmp_path / "mesh.obj", digits=12)
-        return take_in(Request(str(tmp_path / "mesh.obj"), **settings))
+        return take_in(IntakeRequest(str(tmp_path / "mesh.obj"), **settings))
 
     return take
 
@@ -126,7 +126,7 @@ def test_a_box_is_one_piece_without_error_and_has_the_inertia_of_a_box(taken):
     assert box.prop.mass == pytest.approx(0.21)
     expected = 0.21 / 12 * np.array([0.06**2 + 0.07**2, 0.05**2 + 0.07**2, 0.05**2 + 0.06**2])
     assert np.diag(box.prop.inertia) == pytest.approx(expected)
-    assert box.prop.com == pytest.approx([0, 0, 0.035 + PROUD])
+    assert box.prop.com == pytest.approx([0, 0, 0.035 + FOOT_PROTRUSION])
 
 
 def test_units_and_mass_are_taken_at_their_word(taken):
@@ -148,7 +148,7 @@ def test_an_l_becomes_a_few_pieces_and_its_hull_fills_the_notch(taken):
     about_y = masses @ ((sizes[:, 0] ** 2 + sizes[:, 2] ** 2) / 12 + ((centres - com)[:, [0, 2]] ** 2).sum(axis=1))
     assert found.prop.mass == pytest.approx(masses.sum())
     assert found.prop.inertia[1, 1] == pytest.approx(about_y, rel=1e-6)
-    assert found.prop.com == pytest.approx([0, 0, com[2] + PROUD], abs=1e-5)
+    assert found.prop.com == pytest.approx([0, 0, com[2] + FOOT_PROTRUSION], abs=1e-5)
 
 
 def test_a_ring_keeps_its_hole(taken):
@@ -205,7 +205,7 @@ def test_what_stands_flat_comes_to_rest_and_what_is_round_below_does_not(taken):
 def test_an_l_stands_still_on_its_feet_and_would_creep_without(taken, thick):
     found = taken(ell(thick), error=0.001)
     assert found.rest.rests and found.rest.creep < 1e-6 and len(found.prop.feet) == 4
-    assert found.prop.feet[:, 2] == pytest.approx(FOOT, abs=1e-6)
+    assert found.prop.feet[:, 2] == pytest.approx(FOOT_RADIUS, abs=1e-6)
     assert not dropped(replace(found.prop, feet=np.zeros((0, 3)))).rests
 
 
@@ -273,4 +273,4 @@ class TestCommand:
 
 def test_an_unknown_unit_is_no_matter_of_the_command_line_alone():
     with pytest.raises(BadConfig, match="give one of them"):
-        take_in(Request("nowhere.stl", mass=1.0, density=1.0))
+        take_in(IntakeRequest("nowhere.stl", mass=1.0, density=1.0))

@@ -27,7 +27,7 @@ from scengen.export.lerobot import DataSet
 from scengen.export.recording import record
 from scengen.orientation import VIEW_CENTRE
 from scengen.pool import pool
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.runs.generate import row_of
 from scengen.sim.world import IDLE
 from scengen.tasks.mirror_pick_place import ASIDE, LIFTED, VIEWS, MirrorPickPlace
@@ -131,7 +131,7 @@ def test_recordings_turn_every_picture_bit_by_bit_and_say_so_in_the_calibration(
     monkeypatch.setattr(DataSet, "add", lambda self, values, seen: (taken.append(seen), add(self, values, seen)))
     how = {"cameras": CAMERAS[1], "width": 32, "height": 24, "fps": 2}
     for view in (PLAIN, HALF):
-        record(recording.Settings(str(pools[view]), str(tmp_path / str(view)), **how), lambda *_: None)
+        record(recording.RecordSettings(str(pools[view]), str(tmp_path / str(view)), **how), lambda *_: None)
     plain, turned = taken[: len(taken) // 2], taken[len(taken) // 2 :]
     assert len(plain) == len(turned) == 4
     for one, other in zip(plain, turned, strict=True):
@@ -139,7 +139,7 @@ def test_recordings_turn_every_picture_bit_by_bit_and_say_so_in_the_calibration(
     assert told[1]["extrinsics"] == told[0]["extrinsics"]
     assert (told[1]["intrinsics"] == VIEWS[HALF].pixels(32, 24) @ told[0]["intrinsics"]).all()
     with pytest.raises(BadConfig, match="must be square"):
-        record(recording.Settings(str(pools[QUARTER]), str(tmp_path / "q"), **how), lambda *_: None)
+        record(recording.RecordSettings(str(pools[QUARTER]), str(tmp_path / "q"), **how), lambda *_: None)
 
 
 # --- whom the picture misleads -----------------------------------------------------------

@@ -20,7 +20,7 @@ from controls import (
 
 from scengen import config
 from scengen.assets.peg import Peg
-from scengen.assets.slot_board import PLATE, SlotBoard
+from scengen.assets.slot_board import PLATE_THICKNESS, SlotBoard
 from scengen.episode import Episode
 from scengen.geometry import about_z, axes, between
 from scengen.sim.world import World
@@ -165,7 +165,7 @@ def test_a_peg_that_is_shifted_but_not_turned_meets_the_back_plate(turn):
     for action in scenario.shortcuts()["shift_without_turning"].plan(world):
         episode.step(world.filter(action))
         deepest = max(deepest, float(scenario.ends(world)[1][0]))
-    assert deepest == pytest.approx(scenario.board.depth - PLATE, abs=0.005)
+    assert deepest == pytest.approx(scenario.board.depth - PLATE_THICKNESS, abs=0.005)
 
 
 @pytest.mark.parametrize("name", ["ignore_the_turn", "turn_the_wrong_way"])
