@@ -79,7 +79,7 @@ def card(verdict="breaks replay", oracle=1.0, findings=("breaks", "too weak"), l
 def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
     rules._solvable(card())
     rules._breaks(card())
-    rules._breaks(card("cannot tell", findings=("too weak", "not tried"), leaves=True))
+    rules._breaks(card("inconclusive", findings=("too weak", "not tried"), leaves=True))
 
 
 @pytest.mark.parametrize(
@@ -89,11 +89,11 @@ def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
         (rules._solvable, card(oracle=None), "solves 0%"),
         (
             rules._breaks,
-            card("cosmetic to memory", findings=("holds",)),
+            card("solved by memory", findings=("holds",)),
             "say in its why what it asks of the eye",
         ),
-        (rules._breaks, card("cannot tell", findings=("holds",), leaves=True), "more twins may tell"),
-        (rules._breaks, card("cannot tell", findings=("too weak",)), "baseline_0 too weak"),
+        (rules._breaks, card("inconclusive", findings=("holds",), leaves=True), "more twins may tell"),
+        (rules._breaks, card("inconclusive", findings=("too weak",)), "baseline_0 too weak"),
     ],
 )
 def test_an_axis_that_is_unsolvable_or_asks_nothing_new_fails(check, made, says):

@@ -16,7 +16,7 @@ from ..errors import BadConfig, Infeasible, UnknownName, at_least
 from ..pictures import film, render
 from ..pictures.plots import svg
 from ..pictures.report import template, thumbnail
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..runs import generate
 from ..samplers.axis import Proof, spell
 from ..samplers.split import ID

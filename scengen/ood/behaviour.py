@@ -44,12 +44,12 @@ OWN = 0.9
 WORKS = 0.3
 """A baseline that solves fewer scenarios of its control arm is too weak to tell anything about an axis."""
 HALF = 0.5
-"""An axis is cosmetic if a memory solves more than this share of it, by the lower end of the interval."""
+"""An axis counts as solved by memory if the interval for some memory lies above this share."""
 MOVES = 20
 """Draws of a move within training until one is feasible."""
 LIMITS = Limits(600.0, 4000)
 """Of one twin: some oracle runs and replays take some seconds."""
-COSMETIC, CANNOT_TELL = "cosmetic to memory", "cannot tell"
+SOLVED_BY_MEMORY, INCONCLUSIVE = "solved by memory", "inconclusive"
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,12 @@ class Baseline:
 
 
 def verdict(baselines: Iterable[Baseline]) -> str:
-    """The strongest memory that an axis breaks; else `COSMETIC` if some memory solves most of it, or `CANNOT_TELL`."""
+    """The strongest memory that an axis breaks; else `SOLVED_BY_MEMORY` if some memory solves most of it, or `INCONCLUSIVE`."""
     tried = {baseline.name: baseline for baseline in baselines}
     if broken := [name for name in BASELINES if name in tried and tried[name].finding == "breaks"]:
         return f"breaks {broken[-1]}"
     solved = any(baseline.here is not None and baseline.here.low > HALF for baseline in tried.values())
-    return COSMETIC if solved else CANNOT_TELL
+    return SOLVED_BY_MEMORY if solved else INCONCLUSIVE
 
 
 def measure(

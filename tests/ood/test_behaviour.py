@@ -8,7 +8,7 @@ import pytest
 
 from scengen import cli, config
 from scengen.ood import behaviour, features
-from scengen.ood.behaviour import CANNOT_TELL, COSMETIC, Baseline, measure, verdict
+from scengen.ood.behaviour import INCONCLUSIVE, SOLVED_BY_MEMORY, Baseline, measure, verdict
 from scengen.ood.solution_memory import remember
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
@@ -42,9 +42,9 @@ def test_the_verdict_names_the_strongest_memory_that_breaks():
     broken, intact, weak = baseline("replay", 20, 0), baseline("object_centric", 20, 20), baseline("any_replay", 2, 0)
     assert verdict([broken, weak, intact]) == "breaks replay"
     assert verdict([broken, baseline("object_centric", 19, 2)]) == "breaks object_centric"
-    assert verdict([weak, intact]) == COSMETIC
-    assert verdict([weak]) == verdict([]) == CANNOT_TELL, "a memory that fails in training too is no evidence"
-    assert verdict([Baseline("replay", 1.0, "held-out training", None, None, None)]) == CANNOT_TELL
+    assert verdict([weak, intact]) == SOLVED_BY_MEMORY
+    assert verdict([weak]) == verdict([]) == INCONCLUSIVE, "a memory that fails in training too is no evidence"
+    assert verdict([Baseline("replay", 1.0, "held-out training", None, None, None)]) == INCONCLUSIVE
 
 
 def solved(split, index):
