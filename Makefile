@@ -1,11 +1,11 @@
-# make demo: from zero to a verified pool and a contact sheet.   make test: from zero to the passing tests.
+# make demo: certify and verify two small pools.   make test: run the tests.   make ci: everything that CI runs.
 PYTHON ?= python3
 ENV := .venv
 BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo test wheel slow readme fuzz kills check types format certify axes attacks drift docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify axes attacks drift docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -25,12 +25,22 @@ demo: setup
 	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
 	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html
 
+# What continuous integration runs. The certified sample is one task per category and a second task with two arms.
+SAMPLE := sheltered_grasp galileo_ramp_drop domino_single tool_retrieve mass_sort slip_recovery packing mirror_pick_place bowl_table
+ci:
+	$(MAKE) check types
+	$(MAKE) test
+	$(MAKE) slow
+	$(MAKE) readme
+	$(MAKE) wheel
+	$(MAKE) certify N=1 SPLITS=id TASKS="$(SAMPLE)"
+
 test: setup
 	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-# The wheel with all its extras, tried away from this folder in an environment of its own, as pip makes it: needs a C
-# compiler for the keyboard driver that robosuite asks for.
+# Builds the wheel, installs it with all extras into an environment of its own, and tries it outside this folder. Needs a C
+# compiler for the keyboard driver on which robosuite depends.
 WHEEL := build/wheel
 wheel:
 	rm -rf $(WHEEL)
@@ -39,22 +49,22 @@ wheel:
 	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
 	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
 
-# Tests that simulate for minutes: coverage of intervals, power.
+# Tests that simulate for minutes, such as coverage of intervals and one certificate per task.
 slow: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
 
-# The commands of the README as they are written, but for the long ones; ALL=all runs those too: hours.
+# Runs the commands of the README and of the pages in docs/ as they are written, except long ones; ALL=all runs those too (hours).
 ALL ?=
 readme: setup
 	$(BIN)/python tests/readme/run.py $(ALL)
 
-# Mangled command lines: each must end with exit 0, 1 or 2 and one line with a remedy. FUZZ of them, from SEED.
+# Runs FUZZ mangled command lines, from SEED. Each must exit with 0, 1 or 2 and print one line with a remedy.
 FUZZ ?= 2000
 SEED ?= 0
 fuzz: setup
 	$(BIN)/python tests/fuzz/run.py $(FUZZ) $(SEED)
 
-# Generation runs that are killed in every way and continued: their pools must have the same bytes in the end.
+# Kills and continues KILLS generation runs. Their pools must have the same bytes at the end.
 KILLS ?= 50
 kills: setup
 	$(BIN)/python tests/fuzz/kills.py $(KILLS) $(SEED)
@@ -70,7 +80,7 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# Every split of every task at level full: long. N scenarios each; SPLITS=id takes the training splits alone, and
+# Certifies N scenarios of every split of every task at level full (hours). SPLITS=id selects the training splits,
 # TASKS=packing some tasks.
 N ?= 20
 SPLITS ?=
@@ -78,23 +88,23 @@ TASKS ?=
 certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(TASKS) $(SPLITS)
 
-# The card of every axis of every task, and docs/axes.md: hours. AXES: settings of scengen axis, and tasks to do alone.
+# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)
 
-# The adversary on every task, and docs/attacks.md: some 40 minutes. BUDGET rollouts each; TASKS=packing takes some.
+# Attacks every task with BUDGET rollouts and writes docs/attacks.md (40 minutes). TASKS=packing selects tasks.
 BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
 
-# Verdicts under other versions of MuJoCo, and docs/drift.md: hours. N scenarios of the pools in POOLS, made where
-# there are none; TASKS=packing takes some. The environments come from the package index.
+# Compares verdicts under other versions of MuJoCo and writes docs/drift.md (hours). Uses N scenarios of the pools in POOLS and makes
+# missing ones. TASKS=packing selects tasks. The environments come from the package index.
 POOLS ?= generated/drift
 drift: setup
 	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(TASKS)
 
-# docs/api.md, and a page for each task in docs/tasks, with pictures (needs OpenGL); TASKS=packing writes some alone.
+# Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
 docs: setup
 	$(BIN)/python tools/api_page.py
 	$(BIN)/python tools/paper_page.py
@@ -102,27 +112,27 @@ docs: setup
 	$(BIN)/python tools/certified_page.py
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
-# README, docs, axis cards and reports as plain HTML in SITE.
+# Writes README, docs, axis cards and reports as HTML into SITE.
 SITE ?= generated/site
 site: setup
 	$(BIN)/python tools/site.py $(SITE)
 
-# Verification, and checkers that must do badly, on some 450 pools that are sound, false or hostile: about 15 minutes.
-# CHECKER=robosuite lets robosuite judge the sound ones.
+# Runs verification, and control checkers that must fail, on about 450 sound, false and hostile pools (15 minutes).
+# CHECKER=robosuite replays the sound ones in robosuite.
 CHECKER ?= scengen always parse hashes
 checker: setup
 	$(BIN)/python tests/checker/run_corpus.py --checker $(CHECKER) --json generated/checker/report.json
 
-# Sound pools with one value changed: what is accepted must be the author's word, or told. MUTANTS of them, from SEED.
+# Verifies MUTANTS sound pools with one changed value, from SEED. An accepted change must be the author's word, or reported.
 MUTANTS ?= 2000
 mutants: setup
 	$(BIN)/python tests/checker/mutants.py $(MUTANTS) $(SEED)
 
-# The sound pools that the corpus is made from; make them anew when a family changes.
+# Makes the sound pools of the corpus again; needed when a family changes.
 checker-base: setup
 	$(BIN)/python tests/checker/make_base.py
 
-# The small pool in the repository; write it anew when a family or the format changes.
+# Makes the small pool in the repository again; needed when a family or the format changes.
 reference: setup
 	rm -rf generated/reference generated/reference.run
 	$(BIN)/scengen generate task=domino_single n=6 workers=2 pool=generated/reference
