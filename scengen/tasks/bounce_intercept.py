@@ -314,9 +314,8 @@ class BounceIntercept(LaunchedBall):
     def _ways_after_launch(self, restitution: float | None = None) -> list[Way]:
         """The ball's ways from the moment at which its motion is known."""
         velocity = self.speed * self.u
-        return self.ways(
-            self.start + OBSERVATION_TIME * velocity, velocity, velocity * bool(self.friction), restitution
-        )
+        at = self.start + OBSERVATION_TIME * velocity
+        return self.ways(at, velocity, velocity * bool(self.friction), restitution)
 
     @property
     def mirror_miss(self) -> float:

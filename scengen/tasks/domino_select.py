@@ -8,23 +8,24 @@
      |   |   |   |   |   @            blue          lane 1   decoy: intact, but leads to the wrong slab
      |   |       |   |   #            red           lane 0   (not in training) a tile is missing
 
-Bottleneck: the choice is made by looking, because a toppled chain cannot be tried again. Near the hand all chains look
-the same: their first tiles stand in one row and so do their slabs, and only what lies between tells them apart.
+Bottleneck: the robot must choose by looking, because a toppled chain cannot be tried again. Near the hand all chains
+look the same: the first tiles stand in one row and so do the slabs. Only the tiles between them differ.
 
 Decisions:
 
-* The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide
-  without standing in each other's way. Here every chain has a slab of its own: a red one counts wherever it stands, a
-  blue one never does. So colour tells the decoys and nothing else.
+* The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide without
+  standing in each other's way. Here every chain has a slab of its own: any red one counts, a blue one never does. So
+  colour identifies the decoys and nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth that repeats a kind.
-* One try: the robot may touch one first tile and nothing else, and topple it but not carry it; all else is a latched
-  failure. Touching a wrong first tile is none: nothing can be won any more, and so every wrong chain is judged by
-  physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until all is still.
-* Chance: the intact chain is in any lane alike, and the others are dealt at random. A blind guess is right in 1 of 5
-  scenes; who sees nothing but colours, in 1 of as many as there are red slabs, which are 4 in two of three training
-  scenes and 3 in the others: 28 %. Where a decoy stands tells no more.
-* How hard a first tile is pushed does not matter: it gets 2 rad/s from the oracle and 8 from the fastest hand, but 11
-  from its own fall over a gap of 0.6 heights.
+* One try: the robot may touch one first tile and nothing else, and may topple it but not carry it; anything else ends
+  the episode. Touching a wrong first tile is no failure: the goal can no longer be reached, so every wrong chain is
+  judged by physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until
+  everything is at rest.
+* Chance: the intact chain is in each lane equally often, and the others are dealt at random. A blind guess is right in
+  1 of 5 scenes. A policy that sees only colours chooses among the red slabs, 4 in two of three training scenes and 3 in
+  the others: 28 %. The place of a decoy carries no further information.
+* The strength of the push does not matter: a first tile gets 2 rad/s from the oracle and 8 from the fastest hand, but
+  11 from its own fall over a gap of 0.6 heights.
 """
 
 import itertools
@@ -50,16 +51,12 @@ from ..skills.motion import go_to, push, retreat, wait
 
 LANES = 5
 """Chains on the table (paper, App. B, T18)."""
-SLAB_MOVES = 0.05
-"""How far a slab's centre of mass must go, measured along the table [m] (paper, App. B, T17; T18 gives no number)."""
-CLEAR = 0.002
+SLAB_DISPLACEMENT = 0.05
+"""Displacement along the table at which a slab counts as knocked over [m] (paper, App. B, T17; T18 gives no number)."""
+MIN_CLEARANCE = 0.002
 """Free space across the chains that neighbouring chains must leave [m]: the jitter of the robustness check."""
-CARRIED = 0.01
-"""How far the foot of a first tile may have moved while the robot still touches it [m]; in a topple less than 1 mm."""
-TOLERANCE = 1e-10
-"""Solver tolerance: at MuJoCo's 1e-8 of the scene's inertia two dozen tiles of 20 g never stop rocking."""
-TOPPLED = math.radians(30.0)
-"""Lean at which a slender first tile falls on by itself, even if it carries its neighbour along [rad]."""
+CARRY_TOLERANCE = 0.01
+"""Distance that a first tile's foot may move while the robot touches it [m]; a topple moves it by less than 1 mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +72,7 @@ class DominoSelect(Scenario):
     y: float = param(0.0, "m", -0.4, 0.4)
     intact: int = param(2, "lane, from the right", 0, LANES - 1)
     order: int = param(0, "", 0, math.factorial(LANES - 1) - 1)
-    """How the four defects are dealt to the other lanes: number of their permutation in lexicographic order."""
+    """Number of the permutation, in lexicographic order, that deals the four defects to the other lanes."""
     first: Defect = Defect(kind=GAP)
     second: Defect = Defect(kind=DRIFT)
     third: Defect = Defect(kind=DECOY)
@@ -89,7 +86,8 @@ class DominoSelect(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
-        scene.option.tolerance = TOLERANCE
+        # Relative to the scene's inertia; at MuJoCo's 1e-8 two dozen tiles of 20 g never stop rocking.
+        scene.option.tolerance = 1e-10
         for name, foot in self.feet.items():
             place(scene, self.lanes.piece(name), name, foot, math.radians(self.heading))
         return scene
@@ -97,7 +95,7 @@ class DominoSelect(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return any(displaced(world, slab, foot) >= SLAB_MOVES for slab, foot in self.targets.items())
+        return any(displaced(world, slab, foot) >= SLAB_DISPLACEMENT for slab, foot in self.targets.items())
 
     def failure(self, world: World) -> str | None:
         firsts = [f"tile_{k}_0" for k in range(LANES)]
@@ -105,27 +103,28 @@ class DominoSelect(Scenario):
             return "the robot touched a slab or a tile other than a first one"
         if len(touched := [tile for tile in firsts if world.touched(ROBOT, tile)]) > 1:
             return "the robot touched a second chain"
-        away = any(carried(world, tile, self.feet[tile], CARRIED) for tile in touched)
+        away = any(carried(world, tile, self.feet[tile], CARRY_TOLERANCE) for tile in touched)
         return "the robot carried the first tile away" if away else None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Topple the intact chain and watch."""
+        """Topple the intact chain and wait until its slab has fallen."""
         yield from self.topple(world, f"tile_{self.intact}_0")
         yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def topple(self, world: World, tile: str) -> Plan:
         """Push a tile over along its chain with the closed finger tips, then step back."""
         piece = self.lanes.piece(tile)
-        behind = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER_ACROSS + 0.02) * self.u
-        lean = max(TOPPLED, 1.3 * piece.tipping_angle)
-        yield from poke(world.arm, behind, 0.08 * self.u, lambda: world.tilt(tile) > lean, above=0.08)
+        start = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER_ACROSS + 0.02) * self.u
+        # Past 30 deg a slender first tile falls by itself, even if it carries its neighbour along.
+        lean = max(math.radians(30.0), 1.3 * piece.tipping_angle)
+        yield from poke(world.arm, start, 0.08 * self.u, lambda: world.tilt(tile) > lean, above=0.08)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """Each wrong chain, which must be seen to fall short by itself, and four ways around the choice."""
+        """Topple each wrong chain, which must fall short by physics, and try four ways around the choice."""
         wrong = {f"topple_chain_{k}": partial(self.topple, tile=f"tile_{k}_0") for k in self.wrong}
         return {name: Shortcut(plan, to_rest=True) for name, plan in wrong.items()} | {
             "try_a_second_chain": Shortcut(self._try_a_second_chain),
@@ -135,30 +134,30 @@ class DominoSelect(Scenario):
         }
 
     def _try_a_second_chain(self, world: World) -> Plan:
-        """Choose wrongly, see it, and go on to the right chain."""
+        """Topple a wrong chain, then the right one."""
         yield from self.topple(world, f"tile_{self.wrong[0]}_0")
         yield from retreat(world.arm, 0.05)
         yield from self.topple(world, f"tile_{self.intact}_0")
 
     def _push_slab(self, world: World) -> Plan:
-        """Straight to the target: knock the slab of the intact chain over along its lane."""
-        before = self.feet[f"slab_{self.intact}"] + 0.8 * self.slab.height * UP - 0.06 * self.u
-        yield from poke(world.arm, before, 0.15 * self.u, lambda: self.success(world), above=0.06)
+        """Knock the slab of the intact chain over along its lane."""
+        start = self.feet[f"slab_{self.intact}"] + 0.8 * self.slab.height * UP - 0.06 * self.u
+        yield from poke(world.arm, start, 0.15 * self.u, lambda: self.success(world), above=0.06)
 
     def _carry(self, world: World) -> Plan:
-        """Take the intact chain's first tile, which may be touched, and knock its slab over with the tile's foot."""
+        """Carry the intact chain's first tile, which may be touched, to the slab and knock it over with the foot."""
         tile, slab = self.feet[f"tile_{self.intact}_0"], self.feet[f"slab_{self.intact}"]
         yield from pick(world.arm, tile + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
         yield from go_to(world.arm, slab + (self.slab.height + TIP_BELOW + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
     def answer(self) -> Answer:
-        """The number of the intact chain's lane; after one try nothing can be won any more."""
+        """The lane of the intact chain. One try: a toppled chain cannot be tried again."""
         lanes = tuple(float(k) for k in range(LANES))
         return Answer(lanes, lambda w, k: self.topple(w, f"tile_{round(k)}_0"), lambda k: k == self.intact, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the intact chain its first tile falls on nothing; one tile less might be bridged by the others."""
+        """Remove all tiles of the intact chain but the first; the others might bridge the place of a missing tile."""
         scene = self.build()
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{self.intact}_{i}"))
@@ -176,15 +175,15 @@ class DominoSelect(Scenario):
         yield require(widest < spaces, "the drift takes more space than the chain has", widest=widest, spaces=spaces)
         red, room = len(self.targets), self.lanes.room
         yield require(red > 1, "colour alone tells the intact chain", red_slabs=red)
-        yield require(room >= CLEAR, "a piece stands in a neighbouring chain", room=room, needed=CLEAR)
+        yield require(room >= MIN_CLEARANCE, "a piece stands in a neighbouring chain", room=room, needed=MIN_CLEARANCE)
         starts = [self.feet[f"tile_{k}_0"] for k in range(LANES)]
         fallen = [foot + self.slab.height * self.u for name, foot in self.feet.items() if not name.startswith("tile")]
         yield on_table("a chain", starts + fallen)
         yield within_reach("a first tile", *(start + self.starter.height * UP for start in starts))
 
     def features(self) -> Mapping[str, float]:
-        """How far tiles lean when they strike, the room between chains, how narrowly chains fail (0: none do so), and
-        the first push [rad].
+        """How far tiles lean when they strike, the space between chains, by how much chains fail (0: none does), and
+        how far to push [rad].
         """
         return {
             "gap_over_height": self.gap / self.tile.height,
@@ -209,7 +208,7 @@ class DominoSelect(Scenario):
 
     @cached_property
     def defects(self) -> tuple[Defect | None, ...]:
-        """What is wrong with the chain in each lane; None with the intact one."""
+        """The defect of the chain in each lane; None for the intact one."""
         dealt = list(itertools.permutations((self.first, self.second, self.third, self.fourth)))[self.order]
         return *dealt[: self.intact], None, *dealt[self.intact :]
 
@@ -226,11 +225,11 @@ class DominoSelect(Scenario):
 
     @cached_property
     def feet(self) -> dict[str, Vec3]:
-        """Where everything stands, by its name as in `Lanes.feet` [m]."""
+        """Positions of all feet [m], by name as in `Lanes.feet`."""
         middle, turn = np.array([self.x, self.y, TABLE_TOP]), about_z(math.radians(self.heading))
         return {name: middle + turn @ foot for name, foot in self.lanes.feet.items()}
 
     @cached_property
     def targets(self) -> dict[str, Vec3]:
-        """The red slabs and where they stand [m]."""
+        """Positions of the red slabs [m], by name."""
         return {name: foot for name, foot in self.feet.items() if name.startswith("slab")}

@@ -1,5 +1,6 @@
-"""What the two tasks with a ball that is launched and caught share (T12, T13): its launch, its goal, meeting it."""
+"""Base of the tasks in which a ball is launched and caught (T12, T13): launch, goal, and moves that meet the ball."""
 
+import abc
 import math
 from collections.abc import Callable, Iterator
 from typing import ClassVar
@@ -9,7 +10,7 @@ import numpy as np
 from ..assets.ball import Ball
 from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, between, heading
+from ..geometry import UP, Vec3, between
 from ..predicates import fallen, held
 from ..robots import jaw
 from ..robots.panda import BASE
@@ -18,31 +19,41 @@ from ..sim.world import World
 from ..skills.jaw import grasp, pick
 from ..skills.motion import COARSE, OPEN, Condition, closing_along, go_to, hold, retreat, stay, steer, until
 
-LIFTED = 0.04
-"""How far the ball's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
+MIN_LIFT = 0.04
+"""Height of the ball's centre above its height on the table at which it counts as lifted [m]: robosuite Lift,
+`_check_success`."""
 HAND_SPEED = 0.28
-"""Of the hand along one axis, at most [m/s]; measured."""
-HAND_TURN = 1.2
-"""How fast the hand turns on its way [rad/s]; measured."""
-READY: Vec3 = np.array([-0.05, 0.0, TABLE_TOP + 0.10])
-"""Where the hand waits until the ball rolls [m]."""
-SETTLING, SPARE = 0.8, 0.1
-"""What the hand needs besides its way, to come down and stand still, and how long before the ball it is there [s]."""
-ABOVE = 0.06
-"""Height over its place from which the hand comes down, so that nothing strikes the ball [m]."""
-NEAREST, FARTHEST, EDGE = 0.40, 0.74, 0.03
-"""Where the ball is taken: its distance from the robot's first axis, and from the table's edge [m]."""
-LONGEST = 6.0
-"""How far ahead a meeting is looked for [s]."""
-SEEN = 0.05
-"""How long after its launch it is known how the ball rolls [s]."""
-BESIDE, CAUGHT = 0.02, 0.008
-"""How near the hand is to being over its place, or the ball, when it comes down; and to a ball that it goes after, when
-it closes [m]."""
-NEAR, SHIFTING = 0.08, 0.10
-"""So near to a place the hand goes there straight, not from above [m], and how long it needs besides its way [s]."""
-AIR = 0.006
-"""Between finger tips and table, and between palm and ball [m]."""
+"""Largest speed of the hand along one axis [m/s]; measured."""
+HAND_TURN_RATE = 1.2
+"""Rate at which the hand turns on its way [rad/s]; measured."""
+PARKED_HAND: Vec3 = np.array([-0.05, 0.0, TABLE_TOP + 0.10])
+"""Place where the hand waits until the ball rolls [m]."""
+SETTLING_TIME = 0.8
+"""Time that the hand needs besides its way, to come down and stand still [s]."""
+LEAD_TIME = 0.1
+"""Time by which the hand arrives before the ball [s]."""
+APPROACH_HEIGHT = 0.06
+"""Height from which the hand comes down, so that nothing strikes the ball [m]."""
+MIN_DISTANCE = 0.40
+"""Smallest distance from the robot's first axis at which the ball is taken [m]."""
+MAX_DISTANCE = 0.74
+"""Largest distance from the robot's first axis at which the ball is taken [m]."""
+EDGE_MARGIN = 0.03
+"""Distance from the table's edge within which no ball is taken [m]."""
+FORESIGHT_TIME = 6.0
+"""Time ahead in which a meeting is looked for [s]."""
+OBSERVATION_TIME = 0.05
+"""Time after the launch from which the motion of the ball is known [s]."""
+ARRIVAL_TOLERANCE = 0.02
+"""Distance from its place, or from the ball, within which the hand comes down [m]."""
+CATCH_TOLERANCE = 0.008
+"""Level distance from a ball that it follows, within which the hand closes [m]."""
+DIRECT_DISTANCE = 0.08
+"""Distance up to which the hand goes straight to a place, not from above [m]."""
+DIRECT_TIME = 0.10
+"""Time that the hand needs besides such a straight way [s]."""
+MIN_CLEARANCE = 0.006
+"""Gap between finger tips and table, and between palm and ball [m]."""
 
 
 class LaunchedBall(Scenario):
@@ -51,9 +62,6 @@ class LaunchedBall(Scenario):
     HOLD: ClassVar[float] = 0.3
     MOVING: ClassVar[tuple[str, ...]] = ("ball",)
 
-    x: float
-    y: float
-    heading: float
     speed: float
     launch: float
     ball: Ball
@@ -64,32 +72,38 @@ class LaunchedBall(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return world.com("ball")[2] - self.start[2] >= LIFTED and held(world, "ball")
+        return world.com("ball")[2] - self.start[2] >= MIN_LIFT and held(world, "ball")
 
     def failure(self, world: World) -> str | None:
         return "the ball rolled off the table" if fallen(world, "ball") else None
 
     # --- moves ----------------------------------------------------------------------------
 
-    def look(self, world: World) -> Plan:
-        """Be ready over the middle of the table, with the jaw open, until the ball rolls."""
+    def observe(self, world: World) -> Plan:
+        """Wait over the middle of the table, with the jaw open, until the ball rolls."""
         rot = closing_along(world.arm, np.cross(UP, BASE - self.start))
 
         def rolls() -> bool:
-            return world.time > self.launch + SEEN
+            return world.time > self.launch + OBSERVATION_TIME
 
-        yield from until(go_to(world.arm, READY, rot, COARSE, OPEN), rolls)
-        yield from until(hold(world.arm, LONGEST, OPEN), rolls)
+        yield from until(go_to(world.arm, PARKED_HAND, rot, COARSE, OPEN), rolls)
+        yield from until(hold(world.arm, FORESIGHT_TIME, OPEN), rolls)
 
     def wait_at(self, world: World, at: Vec3, along: Vec3, ends: Condition) -> Plan:
         """Bring the open jaw to a place, its fingers on either side of a path, and keep it there.
 
         Args:
+            at: the place [m].
             along: direction of the path.
+            ends: condition that ends the move.
         """
-        arm, over, rot = world.arm, at + ABOVE * UP, closing_along(world.arm, np.cross(UP, along))
-        if math.dist(arm.hand, at) > NEAR:
-            yield from stay(arm, over, rot, lambda: ends() or math.dist(arm.hand, over) < BESIDE, COARSE, OPEN)
+        arm, above, rot = world.arm, at + APPROACH_HEIGHT * UP, closing_along(world.arm, np.cross(UP, along))
+        if math.dist(arm.hand, at) > DIRECT_DISTANCE:
+
+            def over_place() -> bool:
+                return ends() or math.dist(arm.hand, above) < ARRIVAL_TOLERANCE
+
+            yield from stay(arm, above, rot, over_place, COARSE, OPEN)
         yield from stay(arm, at, rot, ends, grip=OPEN)
 
     def catch(self, world: World) -> Plan:
@@ -98,82 +112,83 @@ class LaunchedBall(Scenario):
         yield from retreat(world.arm)
 
     def pick_at(self, world: World, at: Vec3) -> Plan:
-        """Pick the ball from a place where it is taken to be."""
-        yield from pick(world.arm, [at[0], at[1], self.grip], np.cross(UP, self.u), ABOVE)
+        """Pick the ball from a given place."""
+        yield from pick(world.arm, [at[0], at[1], self.grip], np.cross(UP, self.u), APPROACH_HEIGHT)
 
     def follow(self, world: World, along: Callable[[], Vec3]) -> Plan:
-        """Go after the ball where it is, and close when it is between the fingers.
+        """Follow the ball, and close when it is between the fingers.
 
         Args:
-            along: direction of its path now.
+            along: gives the direction of its path.
         """
-        yield from self.look(world)
+        yield from self.observe(world)
         arm = world.arm
         while world.com("ball")[2] > TABLE_TOP:
             rot = closing_along(arm, np.cross(UP, along()))
             offset = world.com("ball") - arm.hand
-            aside = math.hypot(offset[0], offset[1])
-            if aside < CAUGHT and abs(offset[2]) < BESIDE:
+            level_distance = math.hypot(offset[0], offset[1])
+            if level_distance < CATCH_TOLERANCE and abs(offset[2]) < ARRIVAL_TOLERANCE:
                 yield from self.catch(world)
                 return
-            aim = world.com("ball") + (ABOVE * UP if aside > BESIDE else 0.0)
+            aim = world.com("ball") + (APPROACH_HEIGHT * UP if level_distance > ARRIVAL_TOLERANCE else 0.0)
             yield steer(arm, aim, np.zeros(3), between(arm.hand_rot, rot), OPEN)
 
     # --- foresight --------------------------------------------------------------------------
 
     def meetings(
         self,
-        way: Callable[[float], Vec3 | None],
+        path: Callable[[float], Vec3 | None],
         hand: Vec3,
         turn: Callable[[float], float],
-        spare: float = SPARE,
+        lead: float = LEAD_TIME,
     ) -> Iterator[tuple[Vec3, float]]:
-        """The places on the ball's path where the hand is in time, and when [s].
+        """Places on the ball's path where the hand arrives in time [m], each with the time until the ball is there [s].
 
         Args:
-            way: where the ball will be in so many seconds [m], None where it cannot be taken.
-            hand: where the hand is [m].
-            turn: by how much the hand must turn to have its fingers on either side of the path there [rad].
-            spare: how long before the ball it is to be there [s].
+            path: gives the ball's place after a time [m], None where it cannot be taken.
+            hand: place of the hand [m].
+            turn: gives the angle by which the hand must turn to have its fingers on either side of the path [rad].
+            lead: time by which the hand must arrive before the ball [s].
         """
-        for seconds in np.arange(0.0, LONGEST, 0.02):
-            if (at := way(float(seconds))) is None:
+        for seconds in np.arange(0.0, FORESIGHT_TIME, 0.02):
+            if (at := path(float(seconds))) is None:
                 continue
             at = np.array([at[0], at[1], self.grip])
             distance = math.hypot(at[0] - BASE[0], at[1] - BASE[1])
-            if not (NEAREST < distance < FARTHEST and max(abs(at[0]), abs(at[1])) < TABLE_HALF - EDGE):
+            if not (MIN_DISTANCE < distance < MAX_DISTANCE and max(abs(at[0]), abs(at[1])) < TABLE_HALF - EDGE_MARGIN):
                 continue
-            if (left := math.dist(at, hand)) < NEAR:
-                there = left / HAND_SPEED + SHIFTING
+            if (way := math.dist(at, hand)) < DIRECT_DISTANCE:
+                arrival = way / HAND_SPEED + DIRECT_TIME
             else:
-                there = max(math.dist(at + ABOVE * UP, hand) / HAND_SPEED, turn(seconds) / HAND_TURN) + SETTLING
-            if there + spare + self.closing < seconds:
+                way = math.dist(at + APPROACH_HEIGHT * UP, hand)
+                arrival = max(way / HAND_SPEED, turn(seconds) / HAND_TURN_RATE) + SETTLING_TIME
+            if arrival + lead + self.closing_time < seconds:
                 yield at, float(seconds)
 
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def closing(self) -> float:
-        """How long the jaw takes from the command until it touches the ball [s]."""
+    def closing_time(self) -> float:
+        """Time from the command until the jaw touches the ball [s]."""
         return jaw.time_to_touch(2 * self.ball.radius)
 
     @property
     def grip(self) -> float:
-        """Height of the grip site of a hand that takes the ball [m]: finger tips over the floor, palm over the ball."""
+        """Height of the grip site when the hand takes the ball [m]: finger tips over the floor, palm over the ball."""
         centre, palm = self.ball.radius, 2 * self.ball.radius - jaw.PALM_ABOVE
-        return self.floor + max(centre, palm + AIR, jaw.TIP_BELOW + AIR)
+        return self.floor + max(centre, palm + MIN_CLEARANCE, jaw.TIP_BELOW + MIN_CLEARANCE)
 
     @property
     def floor(self) -> float:
-        """Height of what the ball lies on [m]."""
+        """Height of the surface on which the ball lies [m]."""
         return TABLE_TOP
 
     @property
+    @abc.abstractmethod
     def u(self) -> Vec3:
         """Unit vector along the path after the launch."""
-        return heading(self.heading)
 
     @property
+    @abc.abstractmethod
     def start(self) -> Vec3:
         """Centre of the ball at the start [m]."""
-        return np.array([self.x, self.y, self.floor + self.ball.radius])

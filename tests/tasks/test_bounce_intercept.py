@@ -103,8 +103,8 @@ def test_who_goes_after_it_touches_it_too_soon_or_never_gets_there(name):
 
 
 def test_a_mirror_image_is_beside_it():
-    scenario = next(s for s in (TASK.draw("id", 0, i).scenario for i in range(20)) if s.beside_mirror < math.inf)
-    assert "expect_a_mirror_image" in scenario.shortcuts() or scenario.beside_mirror <= 0.06
+    scenario = next(s for s in (TASK.draw("id", 0, i).scenario for i in range(20)) if s.mirror_miss < math.inf)
+    assert "expect_a_mirror_image" in scenario.shortcuts() or scenario.mirror_miss <= 0.06
     dead = replace(BACK, enclosure=Enclosure(restitution=0.55))
     assert not play_shortcut(TASK, dead, "expect_a_mirror_image").solved
 

@@ -24,7 +24,7 @@ from scengen.assets.box import Domino
 from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Defect
 from scengen.attack.priors import fit
 from scengen.params import with_values
-from scengen.tasks.domino_select import LANES, SLAB_MOVES, DominoSelect
+from scengen.tasks.domino_select import LANES, SLAB_DISPLACEMENT, DominoSelect
 from scengen.validate.rebuilt import rebuild
 from scengen.validate.rollout import AT_REST, STILL
 
@@ -69,7 +69,7 @@ def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_a_r
     scenario = TASK.draw(split, 0, 1).scenario
     spin = speed / scenario.starter.height
     rest = 3 * STILL if split == "low_tiles" else STILL  # three low tiles, fallen on one another, rock by 1.4 mrad/s
-    reached = [k for k in range(LANES) if strike(scenario, k, spin, rest) >= SLAB_MOVES]
+    reached = [k for k in range(LANES) if strike(scenario, k, spin, rest) >= SLAB_DISPLACEMENT]
     assert reached == [scenario.intact]
 
 
@@ -77,13 +77,13 @@ def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_a_r
 def test_a_chain_stays_intact_as_long_as_its_spaces_are_shorter_than_a_tile_is_tall(gap_ratio):
     """The textbook's reach of a falling tile is its height: 50 mm; the widest space here is 45 mm."""
     scenario = DominoSelect(gap_ratio=gap_ratio, count=3)
-    assert strike(scenario, scenario.intact, 6.0) >= SLAB_MOVES
+    assert strike(scenario, scenario.intact, 6.0) >= SLAB_DISPLACEMENT
 
 
 @pytest.mark.parametrize(("stretch", "reaches"), [(1.02, True), (1.07, False), (1.15, False)])
 def test_the_reach_of_a_falling_tile_is_its_height_and_the_two_millimetres_by_which_it_slides(stretch, reaches):
     scenario = DominoSelect(second=Defect(kind=DRIFT, stretch=stretch))
-    assert (strike(scenario, lane_of(scenario, DRIFT), 6.0) >= SLAB_MOVES) == reaches
+    assert (strike(scenario, lane_of(scenario, DRIFT), 6.0) >= SLAB_DISPLACEMENT) == reaches
 
 
 @pytest.mark.parametrize("kind", [GAP, DRIFT, DECOY, MISSING])

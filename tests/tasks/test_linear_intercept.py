@@ -57,14 +57,14 @@ def test_felt_slows_it_by_five_sevenths_of_its_share_of_gravity(rolling):
     _, velocities = path(ball, 2.5)
     speeds = np.linalg.norm(velocities[:, 3:5], axis=1)
     assert speeds[70] - speeds[220] == pytest.approx(1.5 * 5 / 7 * rolling * 9.81, rel=0.05)
-    assert ball.slowing == pytest.approx(5 / 7 * rolling * 9.81)
+    assert ball.deceleration == pytest.approx(5 / 7 * rolling * 9.81)
 
 
 @pytest.mark.parametrize(("late", "caught"), [(-0.30, False), (-0.03, True), (0.0, True), (0.03, True), (0.30, False)])
 def test_fingers_must_close_when_it_is_there(late, caught):
     """By how much [s]; it takes the ball a tenth of a second to cross the pads."""
     scenario = replace(CATCH, speed=0.15)
-    assert play(TASK, scenario, lambda world: scenario.take(world, scenario.closing - late)).solved == caught
+    assert play(TASK, scenario, lambda world: scenario.take(world, scenario.closing_time - late)).solved == caught
 
 
 # --- what must not work -------------------------------------------------------------------
