@@ -1,19 +1,31 @@
-"""The commands of README.md, as they are written there, and which of them are not run as a matter of course."""
+"""The commands of README.md and docs/ as they are written there, and those that are not run by default."""
 
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
+PAGES = tuple(
+    ROOT / page
+    for page in (
+        "README.md",
+        "docs/generate.md",
+        "docs/view.md",
+        "docs/policies.md",
+        "docs/adversary.md",
+        "docs/axis-evaluation.md",
+    )
+)
+"""Pages whose commands are run one after the other: later pages use the pools of earlier ones."""
+
 APART = {
-    "make demo": "continuous integration runs it by itself",
-    "make test": "continuous integration runs it by itself",
+    "make demo": "continuous integration runs it separately",
+    "make test": "continuous integration runs it separately",
     "scengen generate task=domino_single split=diagonal+wide_gaps certify=full": "certifies at level full: 5 minutes",
     "scengen generate task=seesaw_balance": "64 scenarios: 10 minutes",
     "scengen generate task=domino_single split=slick": "20 scenarios more: 2 minutes",
     "scengen generate task=domino_single split=id,diagonal seed=0,1": "20 scenarios more: 2 minutes",
     "scengen generate task=domino_single n=100 attack=500": "100 scenarios, and 500 rollouts: 15 minutes",
-    "scengen verify pool=generated/id level=full": "certifies scenarios again at level full: 2 minutes",
     "scengen show pool=generated/id,generated/diagonal": "40 pictures: a minute without a graphics card",
     "scengen view": "needs a display",
     "scengen attack": "200 rollouts: 2 minutes",
@@ -26,12 +38,14 @@ APART = {
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
 }
-"""Beginnings of commands that `make readme` leaves out, and why; `make readme ALL=all` runs them too."""
+"""Prefixes of commands that `make readme` omits, with the reason. `make readme ALL=all` runs them too."""
 
 
-def commands(page: Path = ROOT / "README.md") -> list[str]:
-    """Every command in the `sh` blocks of a page, in order; a line that ends in a backslash goes on in the next."""
-    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.M | re.S)
+def commands(*pages: Path) -> list[str]:
+    """Every command in the `sh` blocks of some pages, in order. A backslash at the end joins the next line."""
+    blocks = [
+        block for page in pages or PAGES for block in re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.M | re.S)
+    ]
     return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.strip()]
 
 

@@ -1,6 +1,6 @@
-"""Runs the commands of README.md in their order, in a folder of their own: `python tests/readme/run.py [all]`.
+"""Runs the commands of README.md and docs/ in order, in a temporary folder: `python tests/readme/run.py [all]`.
 
-Without `all` those of `commands.APART` are left out. Exit status 1: one of them ended otherwise than well.
+Without `all`, those of `commands.APART` are omitted. Exit status 1 means that a command failed.
 """
 
 import os
@@ -27,9 +27,9 @@ class Still:
 def make_policy(env):
     return Still()
 """
-"""What the README calls a policy of yours."""
+"""The policy `my_package:make_policy` of the pages."""
 MESH = "scengen asset name=cup to=mug.obj"
-"""Writes what it calls a mesh of yours."""
+"""Writes the mesh `mug.obj` of the pages."""
 
 
 def run(command: str, folder: Path) -> tuple[int, str, float]:
@@ -57,14 +57,14 @@ def main() -> int:
         for command in (MESH, *commands()):
             told = " ".join(command.split("#")[0].split())
             if (why := why_apart(command)) and not everything:
-                print(f"left out   {told}: {why}", flush=True)
+                print(f"omitted    {told}: {why}", flush=True)
                 continue
             status, said, seconds = run(command, Path(made))
             print(f"exit {status} {seconds:4.0f} s  {told}", flush=True)
             if status:
                 failed.append(told)
                 print(said, flush=True)
-    print(f"{len(failed)} commands of the README ended otherwise than well", flush=True)
+    print(f"{len(failed)} commands failed", flush=True)
     return bool(failed)
 
 

@@ -1,16 +1,19 @@
-"""Every command of the README is one that scengen takes; `make readme` runs them."""
+"""Every command of the pages exists with its settings; `make readme` runs them."""
 
 import shlex
 
 import pytest
 from helpers import REFERENCE
-from readme.commands import APART, ROOT, commands, why_apart
+from readme.commands import APART, PAGES, ROOT, commands, why_apart
 from readme.run import run
 
 from scengen import cli, config
 
-PAGES = (ROOT / "README.md", ROOT / "example" / "README.md")
-LINES = [line for page in PAGES for line in commands(page) if line.startswith("scengen ")]
+LINES = [
+    line
+    for line in commands(*PAGES, ROOT / "docs" / "axis.md", ROOT / "example" / "README.md")
+    if line.startswith("scengen ")
+]
 
 
 def test_what_is_left_out_is_there():
