@@ -4,24 +4,24 @@
        /      \\                          |______|                        \\____/
     --/________\\-------                                               ----=======--
 
-Bottleneck: neither hand can do it alone. The jaw finds nothing to hold: the cup is wider than it opens, and the rim is
-on the table. Suction holds the base, but a cup that is to stand has its base down, where no hand fits between it and
-the table. So the suction hand lifts the cup and turns it until the jaw gets at the rim, the jaw takes it, suction lets
+Bottleneck: one hand alone cannot do it. The jaw finds nothing to hold: the cup is wider than the jaw opens, and the rim
+is on the table. Suction holds the base, but a cup that stands has its base down, where no hand fits between it and the
+table. So the suction hand lifts the cup and turns it until the jaw can reach the rim, the jaw takes it, suction lets
 go, and the jaw puts it down upright.
 
 Decisions, where the paper (App. B, T04) is silent:
 
-* "The jaw cannot grasp the smooth rim", and yet "grabs it by the rim": it cannot on the table, it can in the air.
-* Each hand turns the cup by a quarter. In the paper suction turns it by half; here a hand points up only where the cup
-  is 0.28 m and more above the table, and the level hands get by with less.
-* The wall is smooth and leans: two hands that press from both sides, of which each can roll by half a turn, slip off
-  where its friction is less than its slope. Upright it could be lifted that way, upside down it cannot. Suction does
-  not hold on it either, as it is ribbed: else a level hand could take it by its wall, with the other one behind it as
-  a stop, and roll.
+* "The jaw cannot grasp the smooth rim", and yet it "grabs it by the rim": it cannot on the table, it can in the air.
+* Each hand turns the cup by a quarter turn. In the paper suction turns it by half; here a hand points up only where the
+  cup is at least 0.28 m above the table, and level hands need less height.
+* The wall is smooth and leans. Two hands can press from both sides, and each can roll by half a turn: they slip off
+  if the wall's friction is less than its slope. Upright, the cup could be lifted that way; upside down, it cannot. The
+  wall is ribbed, so that suction does not hold on it: else a level hand could take the cup by its wall, with the other
+  hand behind it as a stop, and roll.
 * "Toppling is not a reliable option since the cup just slides out": the rim's friction on the table is less than its
-  radius over the cup's height. A cup that touches the table askew, or comes down faster than a hand lowers it, is lost:
-  else it could be laid down for the jaw, or be dropped from a hand that points up.
-* In the region means that the whole base is on the square, upright within 8 deg, and let go.
+  radius over the cup's height. A cup that touches the table askew, or falls faster than a hand lowers it, is lost: else
+  it could be laid down for the jaw, or be dropped from a hand that points up.
+* In the region means that the whole base is on the square, upright within 8 deg, and released.
 """
 
 import math
@@ -32,9 +32,9 @@ import mujoco
 import numpy as np
 
 from ..assets.cup import Cup
-from ..assets.patch import Patch
+from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Mat3, Vec3, between, corners, gap, quat, rotation, shortest
+from ..geometry import UP, Mat3, Vec3, between, corners, gap, rotation, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen
@@ -43,48 +43,32 @@ from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
 from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
-from ..skills import jaw, suction
+from ..skills import jaw, motion, suction
 from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
-from ..skills.motion import (
-    CLOSED,
-    COARSE,
-    OPEN,
-    STEADY,
-    Pace,
-    alone,
-    facing,
-    facing_down,
-    go_to,
-    hold,
-    retreat,
-    steer,
-    together,
-    turn_to,
-)
+from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing, facing_down, go_to, together, turn_to, with_arm
 
 TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True)
-"""86 mm wide where it is narrowest, and polished but for its bead."""
-STANDING = math.radians(8.0)
+"""Cup of the training distribution: 86 mm wide at its narrowest, and polished except for its bead."""
+UPRIGHT_TOLERANCE = math.radians(8.0)
 """Largest tilt of a cup that counts as upright [rad]."""
-LYING = (math.radians(25.0), math.radians(155.0))
-"""Tilts at which a cup that touches the table is neither upright nor upside down [rad]."""
-DROPPED = 0.5
-"""Speed of a fall by which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
-looked at every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
-TURNED_OVER = quat("x", math.pi)
-OUT: Mat3 = facing(math.pi / 2, 0.0)
-"""The suction hand, level, points at the other arm."""
-MEETING: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
-"""Where the middle of the base is when the cup changes hands [m]; the palm is then 0.09 m above the table at least."""
-ASIDE: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
-"""Where the suction hand is out of the way [m]."""
-OVER = 0.06
-"""Height at which the cup is brought over the square, and put upright [m]."""
-FARTHEST = 0.77
-"""How far from its base, level, the jaw's hand sets the cup down [m]: to its side it fails from 0.774 on, straight
-ahead from 0.79."""
-SLIP = 0.75
-"""Share of the slope of the wall that its friction may be."""
+FALL_ANGLE = math.radians(25.0)
+"""Tilt above which a cup that touches the table is no longer upright [rad]."""
+INVERTED_ANGLE = math.radians(155.0)
+"""Tilt above which a cup that touches the table counts as upside down [rad]."""
+MAX_FALL_SPEED = 0.5
+"""Speed of a fall above which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
+checked every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
+LEFTWARDS: Mat3 = facing(math.pi / 2, 0.0)
+"""Orientation of the suction hand, level, in which it points at the other arm."""
+HANDOVER_POINT: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
+"""Position of the middle of the base during the handover [m]; the palm is then at least 0.09 m above the table."""
+PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
+"""Position of the suction hand while it is out of the way [m]; the jaw's hand waits at its mirror image."""
+CARRY_HEIGHT = 0.06
+"""Height above the square at which the cup is brought there and put upright [m]."""
+MAX_REACH = 0.77
+"""Level distance from its base up to which the jaw's hand sets the cup down [m]: to its side it fails from 0.774 on,
+straight ahead from 0.79."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,16 +98,16 @@ class CupInversion(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        let_go = world.touching("cup", "table") and not world.touching(ROBOT, "cup")
+        released = world.touching("cup", "table") and not world.touching(ROBOT, "cup")
         off = float(np.abs(world.pos("cup") - self.goal)[:2].max())
-        return let_go and world.tilt("cup") < STANDING and off < self.patch.size / 2 - self.cup.base
+        return released and world.tilt("cup") < UPRIGHT_TOLERANCE and off < self.patch.size / 2 - self.cup.base
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "cup"):
             return "the cup fell off the table"
-        if world.velocity("cup")[5] < -DROPPED and not world.touching(ROBOT, "cup"):
+        if world.velocity("cup")[5] < -MAX_FALL_SPEED and not world.touching(ROBOT, "cup"):
             return "the cup was dropped"
-        askew = LYING[0] < world.tilt("cup") < LYING[1]
+        askew = FALL_ANGLE < world.tilt("cup") < INVERTED_ANGLE
         return "the cup was knocked over" if askew and world.touching("cup", "table") else None
 
     # --- oracle ---------------------------------------------------------------------------
@@ -131,144 +115,134 @@ class CupInversion(Scenario):
     def oracle(self, world: World) -> Plan:
         """Hold the cup out with the suction hand, hand it over to the jaw, put it down upright.
 
-        Every target is computed from where the cup is when its move begins, so that each makes up for what the one
-        before has left.
+        Every target is computed from the cup's pose when its move begins, so that each move corrects the error of the
+        one before.
         """
-        giver, taker = world.arms
-        yield from alone(taker, self.wait_beside(taker))
-        yield from alone(giver, self.present(giver))
-        yield from hand_over(giver, taker, lambda: self.rim(world), SIDEWAYS)
-        yield from together(world, self.leave(giver), hold(taker, 0.0))
-        yield from alone(taker, self.set_down(taker))
+        right, left = world.arms
+        yield from alone(left, self.wait_beside(left))
+        yield from alone(right, self.present(right))
+        yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS)
+        yield from together(world, self.park(right), motion.hold(left, 0.0))
+        yield from alone(left, self.set_down(left))
 
     def present(self, arm: Arm) -> Plan:
         """Lift the cup, turn its opening to the other arm, and hold it out."""
         yield from self.lift(arm)
-        yield from turn_to(arm, OUT, 1.0)
+        yield from turn_to(arm, LEFTWARDS, 1.0)
         level = shortest(arm.world.rot("cup")[:, 2], LEFT) @ arm.world.rot("cup")
-        yield from suction.carry_to(arm, "cup", MEETING, level, Pace(0.20, 0.004))
+        yield from suction.carry_to(arm, "cup", HANDOVER_POINT, level, Pace(0.20, 0.004))
 
     def lift(self, arm: Arm) -> Plan:
         """Suck the cup in the middle of its base and lift it."""
         base, down = arm.world.pos("cup"), facing_down(math.pi / 2)
         yield from go_to(arm, base + 0.03 * UP, down, STEADY, OPEN)
         yield from suction.suck(arm, base, down)
-        yield from retreat(arm, 0.15, Pace(0.15, 0.02))
+        yield from motion.retreat(arm, 0.15, Pace(0.15, 0.02))
 
     def rim(self, world: World) -> Vec3:
-        """The uppermost point of the rim while the cup lies in the air, in the middle of the bead [m]."""
-        along = world.rot("cup")[:, 2]
-        up = UP - along[2] * along
-        return world.pos("cup") + self.cup.height * along + self.held * up / np.linalg.norm(up)
+        """Uppermost point of the rim of a cup that is held out, in the middle of the bead [m]."""
+        axis = world.rot("cup")[:, 2]
+        up = UP - axis[2] * axis
+        return world.pos("cup") + self.cup.height * axis + self.grip_radius * up / np.linalg.norm(up)
 
     def wait_beside(self, arm: Arm) -> Plan:
-        """Bring the open jaw beside the place where the rim is going to be, and where the cup comes up."""
-        away = max(MEETING[1] + self.cup.height, self.y + self.cup.rim) + STAND_OFF + 0.04
-        yield from go_to(arm, [MEETING[0], away, MEETING[2] + self.held], SIDEWAYS, STEADY, OPEN)
+        """Bring the open jaw beside the place where the rim is going to be, clear of the cup as it comes up."""
+        y = max(HANDOVER_POINT[1] + self.cup.height, self.y + self.cup.rim) + STAND_OFF + 0.04
+        yield from go_to(arm, [HANDOVER_POINT[0], y, HANDOVER_POINT[2] + self.grip_radius], SIDEWAYS, STEADY, OPEN)
 
-    def leave(self, arm: Arm) -> Plan:
-        """Back, and out of the way."""
+    def park(self, arm: Arm) -> Plan:
+        """Draw the suction hand back, and take it out of the way."""
         yield from go_to(arm, arm.hand - 0.08 * arm.hand_rot[:, 2], pace=COARSE)
-        yield from go_to(arm, ASIDE, pace=COARSE)
+        yield from go_to(arm, PARKED_HAND, pace=COARSE)
 
     def set_down(self, arm: Arm) -> Plan:
         """Tip the hand down, so that the cup hangs under it; turn the cup upright, put it on the square, let go."""
         world, com = arm.world, self.goal + self.cup.inertial()[0][2] * UP
         yield from turn_to(arm, facing_down(), 0.8)
-        yield from go_to(arm, [*arm.hand[:2], self.goal[2] + self.cup.height + 2 * OVER], pace=STEADY)
-        for pace in (STEADY, Pace(0.10, 0.005)):  # once more: what hangs in the pinch has swung
+        yield from go_to(arm, [*arm.hand[:2], self.goal[2] + self.cup.height + 2 * CARRY_HEIGHT], pace=STEADY)
+        for pace in (STEADY, Pace(0.10, 0.005)):  # twice: the cup swings in the pinch
             upright = shortest(world.rot("cup")[:, 2], UP) @ world.rot("cup")
-            yield from jaw.carry(arm, "cup", com + OVER * UP, upright, pace)
-        yield from jaw.put(arm, "cup", com, "table", hover=OVER / 2)
-        yield from retreat(arm)
+            yield from jaw.carry(arm, "cup", com + CARRY_HEIGHT * UP, upright, pace)
+        yield from jaw.put(arm, "cup", com, "table", hover=CARRY_HEIGHT / 2)
+        yield from motion.retreat(arm)
 
     # --- what must not work ---------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
             "topple_it": Shortcut(self._topple, to_rest=True),
-            "put_down_as_it_is": Shortcut(self._as_it_is),
-            "jaw_from_above": Shortcut(self._from_above),
+            "put_down_as_it_is": Shortcut(lambda world: self._with_jaw_parked(world, self._put_down_inverted)),
+            "jaw_from_above": Shortcut(self._pinch_base),
             "let_go_without_partner": Shortcut(self._let_go),
-            "turn_it_up_and_drop_it": Shortcut(self._drop),
+            "turn_it_up_and_drop_it": Shortcut(lambda world: self._with_jaw_parked(world, self._turn_up_and_drop)),
             "squeeze_and_roll": Shortcut(self._squeeze),
-            "suck_the_wall_and_roll": Shortcut(self._by_its_wall),
+            "suck_the_wall_and_roll": Shortcut(self._suck_wall),
         }
 
     def _topple(self, world: World) -> Plan:
-        """Push the cup near its base, which is up, as fast as the jaw's hand goes: across its reach, so that it does
-        not get out of it, and with the other arm out of the way."""
-        other, arm = world.arms
+        """Push the cup near its base, which is on top, as fast as the jaw's hand goes.
+
+        The push goes across the arm's reach, so that the cup stays within it; the other arm is out of the way.
+        """
+        right, left = world.arms
         x, y, _ = self.start - panda.bases(2)[1]
         along = np.array([y, -x, 0.0]) / math.hypot(x, y)
         beside = world.pos("cup") - 0.01 * UP - (self.cup.rim + 0.03) * along
-        pushed = jaw.poke(arm, beside, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.16)
-        yield from together(world, go_to(other, ASIDE, pace=COARSE), pushed)
+        pushed = jaw.poke(left, beside, 0.3 * along, lambda: float((left.hand - beside) @ along) > 0.16)
+        yield from together(world, go_to(right, PARKED_HAND, pace=COARSE), pushed)
 
-    def _as_it_is(self, world: World) -> Plan:
-        """Put the cup into the square upside down."""
-        arm, other = world.arms
+    def _with_jaw_parked(self, world: World, plan: Callable[[Arm], Plan]) -> Plan:
+        """Run a plan of the suction hand's arm while the jaw's hand goes out of its way."""
+        right, left = world.arms
+        yield from together(world, plan(right), go_to(left, PARKED_HAND * [1.0, -1.0, 1.0], pace=COARSE))
 
-        def plan() -> Plan:
-            yield from self.lift(arm)
-            at = self.goal + (self.cup.height + 0.002) * UP
-            yield from suction.carry_to(arm, "cup", at, world.rot("cup"), Pace(0.15, 0.003))
-            yield from suction.let_go(arm)
+    def _put_down_inverted(self, arm: Arm) -> Plan:
+        """Put the cup on the square upside down."""
+        yield from self.lift(arm)
+        base = self.goal + (self.cup.height + 0.002) * UP
+        yield from suction.carry_to(arm, "cup", base, arm.world.rot("cup"), Pace(0.15, 0.003))
+        yield from suction.let_go(arm)
 
-        yield from together(world, plan(), go_to(other, ASIDE * [1.0, -1.0, 1.0], pace=COARSE))
-
-    def _from_above(self, world: World) -> Plan:
+    @with_arm(1)
+    def _pinch_base(self, arm: Arm) -> Plan:
         """Take the cup across its base with the jaw, turn it over in the air, put it down."""
-        arm = world.arms[1]
+        yield from jaw.pick(arm, arm.world.pos("cup") - 0.015 * UP, LEFT, lift=0.25)
+        yield from turn_to(arm, SIDEWAYS)
+        yield from jaw.put(arm, "cup", self.goal + self.cup.rim * UP, "table")
 
-        def plan() -> Plan:
-            yield from jaw.pick(arm, world.pos("cup") - 0.015 * UP, LEFT, lift=0.25)
-            yield from turn_to(arm, SIDEWAYS)
-            yield from jaw.put(arm, "cup", self.goal + self.cup.rim * UP, "table")
+    @with_arm(0)
+    def _let_go(self, arm: Arm) -> Plan:
+        """Hold the cup out over the square, low above it, and let go although the jaw does not hold it."""
+        yield from self.lift(arm)
+        yield from turn_to(arm, LEFTWARDS, 1.0)
+        yield from go_to(arm, self.goal - self.cup.height / 2 * LEFT + (self.cup.rim + 0.01) * UP, LEFTWARDS)
+        yield from suction.let_go(arm)
 
-        yield from alone(arm, plan())
-
-    def _let_go(self, world: World) -> Plan:
-        """Hold the cup out over the square, low above it, and let go while nobody has it."""
-        arm = world.arms[0]
-
-        def plan() -> Plan:
-            yield from self.lift(arm)
-            yield from turn_to(arm, OUT, 1.0)
-            yield from go_to(arm, self.goal - self.cup.height / 2 * LEFT + (self.cup.rim + 0.01) * UP, OUT)
-            yield from suction.let_go(arm)
-
-        yield from alone(arm, plan())
-
-    def _drop(self, world: World) -> Plan:
+    def _turn_up_and_drop(self, arm: Arm) -> Plan:
         """Turn the opening up with the suction hand, go down as far as it goes, pull the hand away below the cup."""
-        arm, other = world.arms
-
-        def plan() -> Plan:
-            yield from self.lift(arm)
-            yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.45], pace=Pace(0.15, 0.02))
-            for up in (0.0, 0.5, 1.0, math.pi / 2):
-                yield from turn_to(arm, facing(math.pi / 2, -up), 1.0, within=0.05)
-            yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.30], pace=Pace(0.10, 0.02))
-            yield from go_to(arm, arm.hand - [0.15, 0.0, 0.15], pace=COARSE, grip=OPEN)
-
-        yield from together(world, plan(), go_to(other, ASIDE * [1.0, -1.0, 1.0], pace=COARSE))
+        yield from self.lift(arm)
+        yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.45], pace=Pace(0.15, 0.02))
+        for above_level in (0.0, 0.5, 1.0, math.pi / 2):
+            yield from turn_to(arm, facing(math.pi / 2, -above_level), 1.0, within=0.05)
+        yield from go_to(arm, [*self.goal[:2], TABLE_TOP + 0.30], pace=Pace(0.10, 0.02))
+        yield from go_to(arm, arm.hand - [0.15, 0.0, 0.15], pace=COARSE, grip=OPEN)
 
     def _squeeze(self, world: World) -> Plan:
-        """Press both hands on the wall, half way up, lift the cup, roll both by half a turn, put it down."""
+        """Press both hands on the wall at half its height, lift the cup, roll both by half a turn, put it down."""
         middle, far = self.start + self.cup.height / 2 * UP, self.goal + (self.cup.height / 2 + 0.003) * UP
         beside, high = self.cup.outer(self.cup.height / 2), 0.2 * UP
-        hands = list(zip(world.arms, (-1, 1), (OUT, facing(-math.pi / 2, 0.0)), (0.0, TIP_BELOW), strict=True))
+        hands = list(zip(world.arms, (-1, 1), (LEFTWARDS, facing(-math.pi / 2, 0.0)), (0.0, TIP_BELOW), strict=True))
 
         def both(seconds: float, pose: Callable[[float], tuple[Vec3, float, float]]) -> Plan:
-            """Place between the hands, way from there to each, and roll, against the share of the time."""
+            """Steer both hands; `pose` maps the share of the time to their middle, distance from it, and roll."""
             start = world.time
             while world.time < start + seconds:
-                at, way, roll = pose((world.time - start) / seconds)
+                centre, distance, roll = pose((world.time - start) / seconds)
                 actions = []
                 for arm, side, rot, tip in hands:
                     turn = 2.0 * between(arm.hand_rot, rotation(math.pi * roll * LEFT) @ rot)
-                    actions.append(steer(arm, at + side * (way + tip) * LEFT, np.zeros(3), turn, CLOSED))
+                    target = centre + side * (distance + tip) * LEFT
+                    actions.append(motion.steer(arm, target, np.zeros(3), turn, motion.CLOSED))
                 yield np.concatenate(actions)
 
         tight = beside - 0.02
@@ -281,34 +255,33 @@ class CupInversion(Scenario):
         yield from both(4.0, lambda t: (far + (1 - t) * high, tight, 1.0))
         yield from both(1.0, lambda t: (far, tight + 0.07 * t, 1.0))
 
-    def _by_its_wall(self, world: World) -> Plan:
+    def _suck_wall(self, world: World) -> Plan:
         """Suck the wall, with the jaw's hand as a stop behind the cup, lift it, roll by half a turn, put it down."""
-        arm, stop = world.arms
+        right, left = world.arms
+        yield from together(world, self._roll_by_wall(right), self._stop_behind(left))
+
+    def _roll_by_wall(self, arm: Arm) -> Plan:
         high = self.cup.height / 2 + 0.01
         spot = self.start + high * UP - self.cup.outer(self.cup.height - high) * LEFT
         rot = facing(math.pi / 2, math.atan(self.slope))
+        yield from go_to(arm, spot - 0.15 * LEFT + 0.1 * UP, rot, STEADY, OPEN)
+        yield from go_to(arm, spot - 0.03 * LEFT, rot, STEADY)
+        yield from suction.suck_upright(arm, spot, rot, give_up=3.0)
+        yield from motion.retreat(arm, 0.05, Pace(0.05, 0.005))
+        yield from motion.retreat(arm, 0.10, STEADY)
+        start, way = arm.hand_rot, -math.copysign(1.0, float(arm.joint_pos[6]))
+        for part in (1, 2):
+            yield from turn_to(arm, rotation(way * part * math.pi / 2 * start[:, 2]) @ start)
+        yield from go_to(arm, self.goal + (self.cup.height - high) * UP - self.cup.rim * LEFT)
+        yield from suction.let_go(arm)
 
-        def behind() -> Plan:
-            at = self.start + (self.cup.rim + PALM_ACROSS + 0.002) * LEFT + 0.045 * UP
-            yield from go_to(stop, at + 0.1 * UP + 0.05 * LEFT, facing_down(math.pi / 2), STEADY, CLOSED)
-            yield from go_to(stop, at)
-
-        def plan() -> Plan:
-            yield from go_to(arm, spot - 0.15 * LEFT + 0.1 * UP, rot, STEADY, OPEN)
-            yield from go_to(arm, spot - 0.03 * LEFT, rot, STEADY)
-            yield from suction.suck_upright(arm, spot, rot, give_up=3.0)
-            yield from retreat(arm, 0.05, Pace(0.05, 0.005))
-            yield from retreat(arm, 0.10, STEADY)
-            start, way = arm.hand_rot, -math.copysign(1.0, float(arm.joint_pos[6]))
-            for part in (1, 2):
-                yield from turn_to(arm, rotation(way * part * math.pi / 2 * start[:, 2]) @ start)
-            yield from go_to(arm, self.goal + (self.cup.height - high) * UP - self.cup.rim * LEFT)
-            yield from suction.let_go(arm)
-
-        yield from together(world, plan(), behind())
+    def _stop_behind(self, arm: Arm) -> Plan:
+        behind = self.start + (self.cup.rim + PALM_ACROSS + 0.002) * LEFT + 0.045 * UP
+        yield from go_to(arm, behind + 0.1 * UP + 0.05 * LEFT, facing_down(math.pi / 2), STEADY, motion.CLOSED)
+        yield from go_to(arm, behind)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """A cup without its base, where suction finds nothing; one without bead, its rim as smooth as its wall."""
+        """A cup without the base that suction holds; one without its bead, with a rim as smooth as its wall."""
         ring = self.build()
         for geom in list(ring.body("cup").geoms):
             if geom.name.startswith(("cup/bottom", "cup/floor", "cup/foot")):
@@ -333,7 +306,7 @@ class CupInversion(Scenario):
         yield require(width > OPENING + 0.002, "the jaw can span the cup", width=width, jaw=OPENING)
         topples = cup.rim / cup.height
         yield require(cup.rim_friction < 0.7 * topples, "a push topples the cup", friction=cup.rim_friction, at=topples)
-        most = SLIP * self.slope
+        most = 0.75 * self.slope  # two hands hold it if the friction reaches the slope
         yield require(cup.friction < most, "two hands can lift the cup by its wall", friction=cup.friction, most=most)
         shear = cup.friction * PULL
         yield require(shear > 2.2 * weight, "a level suction hand does not hold the cup", shear=shear, weight=weight)
@@ -342,9 +315,9 @@ class CupInversion(Scenario):
         yield require(self.droop < 1.5, "the cup turns in the jaw", droop=self.droop)
         right, left = panda.bases(2)
         yield within_reach("the cup", self.start + cup.height * UP, base=right)
-        yield within_reach("the square", self.goal + (cup.height + 2 * OVER) * UP, base=left)
-        away = math.hypot(*(self.goal - self.held * LEFT - left)[:2])
-        yield require(away < FARTHEST, "the jaw cannot set the cup down so far out", distance=away, farthest=FARTHEST)
+        yield within_reach("the square", self.goal + (cup.height + 2 * CARRY_HEIGHT) * UP, base=left)
+        away = math.hypot(*(self.goal - self.grip_radius * LEFT - left)[:2])
+        yield require(away < MAX_REACH, "the jaw cannot set the cup down so far out", distance=away, farthest=MAX_REACH)
 
     def features(self) -> Mapping[str, float]:
         right, left = panda.bases(2)
@@ -364,26 +337,26 @@ class CupInversion(Scenario):
 
     @property
     def start(self) -> Vec3:
-        """On the table, in the middle of the cup [m]."""
+        """Initial position of the cup's middle on the table [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
     def goal(self) -> Vec3:
-        """Middle of the square [m]."""
+        """Position of the middle of the square [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
 
     @property
-    def held(self) -> float:
-        """Distance from the cup's axis of what the jaw takes: the middle of the bead [m]."""
+    def grip_radius(self) -> float:
+        """Distance of the middle of the bead, which the jaw takes, from the cup's axis [m]."""
         return self.cup.rim - self.cup.bead / 2
 
     @property
     def slope(self) -> float:
-        """By how much the wall leans."""
+        """Slope of the wall: how far it leans out per height."""
         return (self.cup.rim - self.cup.base) / self.cup.height
 
     @property
     def droop(self) -> float:
-        """Torque of the level cup's weight about the pads, over what they resist: above 1 it turns between them."""
+        """Torque of the level cup's weight about the pads, over the torque that they resist: above 1 the cup turns."""
         lever = self.cup.height - OVERLAP - self.cup.inertial()[0][2]
         return GRAVITY * self.cup.mass * lever / (pinch(self.cup.bead) * PAD / 2)

@@ -22,7 +22,7 @@ from scengen.assets.bowl import Bowl
 from scengen.geometry import UP, about_y
 from scengen.params import values, with_values
 from scengen.robots.jaw import OPENING
-from scengen.tasks.bowl_table import BREAKS, LEANING, ROOM, UPRIGHT, BowlTable
+from scengen.tasks.bowl_table import FALL_ANGLE, MAX_FALL_SPEED, RIM_CLEARANCE, UPRIGHT_TOLERANCE, BowlTable
 from scengen.validate.rollout import replay
 
 TASK = config.task("bowl_table")
@@ -74,8 +74,8 @@ def room():
         ({}, True),
         ({"aside": room() - 0.002}, True),
         ({"aside": room() + 0.002}, False),
-        ({"tilt": UPRIGHT - 0.03}, True),
-        ({"tilt": UPRIGHT + 0.03}, False),
+        ({"tilt": UPRIGHT_TOLERANCE - 0.03}, True),
+        ({"tilt": UPRIGHT_TOLERANCE + 0.03}, False),
         ({"tilt": math.pi}, False),
         ({"up": 0.01}, False),
     ],
@@ -84,7 +84,7 @@ def test_what_counts_as_standing(world, change, counts):
     assert NOMINAL.success(standing(world, **change)) == counts
 
 
-@pytest.mark.parametrize(("tilt", "lost"), [(LEANING - 0.05, False), (LEANING + 0.05, True), (math.pi, True)])
+@pytest.mark.parametrize(("tilt", "lost"), [(FALL_ANGLE - 0.05, False), (FALL_ANGLE + 0.05, True), (math.pi, True)])
 def test_nothing_but_hands_touches_a_bowl_that_leans(world, tilt, lost):
     assert (NOMINAL.failure(standing(world, tilt)) == ACCIDENT) == lost
 
@@ -100,7 +100,7 @@ def test_the_bowl_in_its_rack_is_no_accident(world):
 @pytest.mark.parametrize(("share", "breaks"), [(0.8, False), (1.7, True)])
 def test_a_fall_breaks_the_bowl_from_the_height_of_a_textbook(world, share, breaks):
     """v^2 = 2 g h. A fall is looked at every 10 ms, in which it gains 0.1 m/s: at 1.7 h it is seen for certain."""
-    standing(world, up=share * BREAKS**2 / (2 * 9.81))
+    standing(world, up=share * MAX_FALL_SPEED**2 / (2 * 9.81))
     broken = False
     for _ in range(30):
         world.step(world.idle)
@@ -190,6 +190,6 @@ def test_every_constraint_refutes_what_violates_it():
 
 
 def test_no_finger_gets_in_beside_the_rim_and_each_thing_is_on_its_own_side_in_training():
-    assert NOMINAL.rack.radius - NOMINAL.bowl.radius == pytest.approx(ROOM)
+    assert NOMINAL.rack.radius - NOMINAL.bowl.radius == pytest.approx(RIM_CLEARANCE)
     assert all(TASK.draw("id", 0, i).scenario.rack_y < 0 < TASK.draw("id", 0, i).scenario.goal_y for i in range(20))
     assert all(TASK.draw("across", 0, i).scenario.goal_y < 0 for i in range(20))

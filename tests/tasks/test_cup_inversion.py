@@ -17,7 +17,7 @@ from controls import (
 
 from scengen import config
 from scengen.physics import GRAVITY
-from scengen.tasks.cup_inversion import DROPPED, LYING, STANDING, CupInversion
+from scengen.tasks.cup_inversion import FALL_ANGLE, INVERTED_ANGLE, MAX_FALL_SPEED, UPRIGHT_TOLERANCE, CupInversion
 from scengen.validate.rollout import replay
 
 TASK = config.task("cup_inversion")
@@ -55,8 +55,8 @@ def world():
         ({"off": (0.030, 0.0)}, False),
         ({"off": (0.0, -0.030)}, False),
         ({"up": 0.01}, False),
-        ({"tilt": STANDING - 0.03}, True),
-        ({"tilt": STANDING + 0.03}, False),
+        ({"tilt": UPRIGHT_TOLERANCE - 0.03}, True),
+        ({"tilt": UPRIGHT_TOLERANCE + 0.03}, False),
         ({"tilt": math.pi}, False),
     ],
 )
@@ -64,7 +64,9 @@ def test_what_counts_as_upright_on_the_square(world, change, counts):
     assert NOMINAL.success(stood(world, **change)) == counts
 
 
-@pytest.mark.parametrize(("tilt", "lost"), [(LYING[0] - 0.1, False), (LYING[0] + 0.1, True), (math.pi - 0.1, False)])
+@pytest.mark.parametrize(
+    ("tilt", "lost"), [(FALL_ANGLE - 0.1, False), (FALL_ANGLE + 0.1, True), (math.pi - 0.1, False)]
+)
 def test_a_cup_that_touches_the_table_askew_is_lost(world, tilt, lost):
     assert (NOMINAL.failure(stood(world, tilt=tilt)) == "the cup was knocked over") == lost
 
@@ -72,7 +74,7 @@ def test_a_cup_that_touches_the_table_askew_is_lost(world, tilt, lost):
 @pytest.mark.parametrize(("share", "lost"), [(0.8, False), (1.6, True)])
 def test_a_fall_costs_the_cup_from_the_height_of_a_textbook(world, share, lost):
     """v^2 = 2 g h. A fall is looked at every 10 ms, in which it gains 0.1 m/s: at 1.5 h it is seen for certain."""
-    stood(world, up=share * DROPPED**2 / (2 * GRAVITY))
+    stood(world, up=share * MAX_FALL_SPEED**2 / (2 * GRAVITY))
     seen = set()
     for _ in range(30):
         world.step(world.idle)
@@ -107,7 +109,7 @@ def test_with_one_arm_parked_the_witness_fails(arm):
 def test_ablations_fail_at_what_they_take_away():
     ends = ablated(TASK, NOMINAL)
     assert not any(rollout.solved for rollout, _ in ends.values())
-    assert ends["no_base"][1].tilt("cup") > LYING[1]
+    assert ends["no_base"][1].tilt("cup") > INVERTED_ANGLE
     assert ends["smooth_rim"][1].touched("robot1", "cup")
 
 
