@@ -1,4 +1,4 @@
-"""scengen: physical puzzles for robot manipulation, each proved solvable before anyone meets it.
+"""scengen: physical puzzles for robot manipulation, each verified to be solvable before it is released.
 
     import scengen
 
@@ -6,7 +6,7 @@
     draw = task.draw("wide_gaps", seed=0, index=7)
     certified = scengen.certify(draw.scenario, task.horizon)
 
-The names below are the public face; they are imported when they are first used.
+The names below are the public interface. Each is imported at its first use.
 """
 
 import ctypes.util
@@ -16,7 +16,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
-    # MuJoCo chooses its OpenGL back end when it is imported, and without a display its own choice cannot draw.
+    # MuJoCo chooses its OpenGL back end at import. Without a display its default cannot draw.
     for _library, _backend in (("EGL", "egl"), ("OSMesa", "osmesa")):
         if ctypes.util.find_library(_library):
             os.environ["MUJOCO_GL"] = _backend
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .config import task as load_task
     from .config import tasks as list_tasks
     from .params import param
-    from .pool.pool import Pool
+    from .pool import Pool
     from .samplers.task import Draw, Task
     from .scenario import Scenario, Shortcut
     from .sim.world import World
@@ -65,7 +65,8 @@ _HOME = {
     "replay": ("validate.rollout", "replay"),
     "run": ("validate.rollout", "run"),
 }
-"""Where each public name lives: importing scengen alone costs nothing, and no module below imports this one."""
+"""Module and name of each public name. Importing scengen imports none of them, and no module of scengen imports this
+one."""
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Certificates as data: what was checked about a scenario, with numbers, so that others can disagree."""
+"""Certificates as data: the checks of a scenario with their numbers, so that others can disagree."""
 
 import json
 from collections.abc import Mapping
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Verdict = Literal["certified", "refuted", "unknown"]
-"""`unknown` is no claim, as in SMT-LIB: the oracle failed, and nobody has shown that all others must."""
+"""Result of certification. As in SMT-LIB, `unknown` is no claim: the oracle failed, and no check shows that every other
+policy must fail."""
 
 CHECKS: dict[str, Verdict] = {
     "feasible": "refuted",
@@ -23,15 +24,16 @@ CHECKS: dict[str, Verdict] = {
     "witness": "unknown",
     "attack": "refuted",
 }
-"""The checks in the order in which they run, and the verdict when one fails.
+"""Checks in the order in which they run, and the verdict if one fails.
 
-A failed check refutes the scenario where it shows, by itself, that the scenario is invalid: it cannot be, it does not
-stand still, it solves itself, or a shortcut solves it. Where only the oracle failed the verdict is unknown."""
+A failed check refutes the scenario if the failure alone shows that the scenario is invalid: it cannot exist, does not
+stand still, solves itself, or is solved by a shortcut. If only the oracle failed, the verdict is unknown.
+"""
 
 WAIVABLE = ("ablations", "attack")
-"""Checks that may have nothing to check: a family without ablations, settings that ask for no attack."""
+"""Checks that may have nothing to check: a family without ablations, settings that request no attack."""
 NOT_CHECKED = "not checked: "
-"""How the reason of such a check begins."""
+"""Prefix of the reason of such a check."""
 
 STAGES: dict[str, tuple[str, ...]] = {
     "feasible": ("feasible",),
@@ -42,7 +44,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "robust": ("robust", "numerics", "ablations"),
     "certified": ("witness", "attack"),
 }
-"""Steps of the funnel, and the checks that a scenario must pass to get through each."""
+"""Steps of the rejection report, and the checks that a scenario must pass to get through each step."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +52,23 @@ class Check:
     """One line of a certificate."""
 
     name: str
+    """Name of the check, a key of `CHECKS`."""
     passed: bool | None
-    """None: not made. It was skipped, which certifies nothing, or there was nothing to check, see `waived`."""
+    """Whether the check passed. None if it was not made: either it was skipped, which certifies nothing, or there was
+    nothing to check (see `waived`)."""
     reason: str
-    """Why it failed or was not made; empty when it passed."""
+    """Reason why it failed or was not made; empty if it passed."""
     settings: Mapping[str, Any]
+    """Settings of the check."""
     numbers: Mapping[str, Any]
+    """Numbers that the check measured."""
 
     @property
     def waived(self) -> bool:
-        """Whether there was nothing to check, which is told and stands against nothing."""
+        """Whether there was nothing to check.
+
+        The certificate states it, and it does not count against the scenario.
+        """
         return self.passed is None and self.name in WAIVABLE and self.reason.startswith(NOT_CHECKED)
 
 
@@ -70,6 +79,7 @@ class Certificate:
     settings: str
     """Name of the settings of the checks, `quick` or `full`."""
     checks: tuple[Check, ...]
+    """Checks in the order in which they ran."""
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""
@@ -77,53 +87,59 @@ class Certificate:
 
     @property
     def failed(self) -> Check | None:
-        """The first check that did not pass."""
+        """The first check that did not pass, or None."""
         return next((c for c in self.checks if not c.passed and not c.waived), None)
 
     @property
     def verdict(self) -> Verdict:
+        """Verdict of the first check that did not pass, else `certified`."""
         return CHECKS[self.failed.name] if self.failed else "certified"
 
     @property
     def reason(self) -> str:
-        """What stands against the scenario, or nothing."""
+        """Name and reason of the first check that did not pass, or an empty text."""
         return f"{self.failed.name}: {self.failed.reason}" if self.failed else ""
 
 
 @dataclass(frozen=True)
 class StoredCertificate:
-    """A certificate as a pool holds it: its checks, what they speak of, and what they were made with."""
+    """A certificate as a pool holds it: its checks, the scene and witness that they concern, and the code used."""
 
     verdict: str
+    """Verdict, see `Verdict`."""
     reason: str
+    """Name and reason of the first check that did not pass; empty if the scenario is certified."""
     settings: str
-    """See `Certificate`."""
+    """Name of the settings, see `Certificate.settings`."""
     checks: tuple[Check, ...]
+    """Checks in the order in which they ran."""
     scene_sha256: str
+    """Hash of the scene's text."""
     witness_sha256: str
+    """Hash of the witness."""
     final_state: str
     """Hash of the physics state at the end of the witness."""
     fingerprint: str
-    """How the machine rounds that made it; see `scengen.validate.identity`."""
+    """Fingerprint of the machine's rounding, see `scengen.fingerprint`."""
     source_sha256: str
     """Hash of the code that gives the family its meaning."""
     versions: Mapping[str, str]
-    """Of every package that the physics depends on, and the platform."""
+    """Versions of every package that the physics depends on, and the platform."""
 
     @property
     def complete(self) -> bool:
-        """Whether it says `certified`, and every check passed or had nothing to check."""
+        """Whether the verdict is `certified` and every check passed or was waived."""
         held = all(check.passed or check.waived for check in self.checks)
         return self.verdict == "certified" and bool(self.checks) and held
 
     @property
     def settle(self) -> float | None:
-        """How long the goal had to hold when the witness was certified [s]; None if the certificate does not say."""
+        """Time for which the goal had to hold when the witness was certified [s]; None if it is not stated."""
         found = next((check.settings.get("settle") for check in self.checks if check.name == "witness"), None)
         return found if isinstance(found, (int, float)) else None
 
     def plain(self) -> dict[str, Any]:
-        """Plain data, as a pool stores it: settings, numbers and versions as JSON text."""
+        """Plain data as a pool stores it: settings, numbers and versions as JSON text."""
         checks = [
             {**vars(check), "settings": as_json(check.settings), "numbers": as_json(check.numbers)}
             for check in self.checks
@@ -132,10 +148,10 @@ class StoredCertificate:
 
     @classmethod
     def of(cls, plain: Mapping[str, Any]) -> "StoredCertificate":
-        """The reverse of `plain`.
+        """Read the plain data of a pool; the inverse of `plain`.
 
         Raises:
-            ValueError: a part is missing or no canonical JSON.
+            ValueError: a part is missing or is not canonical JSON.
         """
         if gaps := [name for name, value in plain.items() if value is None]:
             raise ValueError(f"the certificate lacks {', '.join(gaps)}")
@@ -147,12 +163,12 @@ class StoredCertificate:
 
 
 def as_json(values: Mapping[str, Any]) -> str:
-    """The one way in which pools write a mapping: equal mappings are equal texts."""
+    """Canonical JSON text of a mapping, as pools store it: equal mappings give equal texts."""
     return json.dumps(values, sort_keys=True)
 
 
 def from_json(text: str) -> dict[str, Any]:
-    """Read what `as_json` wrote.
+    """Read a text that `as_json` wrote.
 
     Raises:
         ValueError: the text is not what `as_json` writes for a mapping.
@@ -162,5 +178,5 @@ def from_json(text: str) -> dict[str, Any]:
     except (TypeError, ValueError):
         values = None
     if not isinstance(values, dict) or as_json(values) != text:
-        raise ValueError(f"{str(text)[:60]!r} is no mapping in canonical JSON")
+        raise ValueError(f"{str(text)[:60]!r} is not a mapping in canonical JSON")
     return values

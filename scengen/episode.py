@@ -1,4 +1,4 @@
-"""Episode: one run of a scenario. The order of things in a control period is decided here and nowhere else."""
+"""An episode: one run of a scenario. Only this module decides the order of steps in a control period."""
 
 import math
 from typing import Literal
@@ -12,26 +12,33 @@ from .scenario import Scenario
 from .sim.world import World
 
 Outcome = Literal["success", "failure", "timeout", "unstable"]
+"""Result of an episode."""
 Actions = NDArray[np.float32]
-"""Shape (n, 7 * arms): one row per control period, exactly as the controller received it."""
+"""Actions of an episode, shape (n, 7 * arms): one row per control period, exactly as the controller received it."""
 
 
 class Episode:
     """A scenario in a world: first the scene's events, then a control period, then the verdict.
 
-    The world must be at its start. Whoever steps the physics by other means (robosuite) calls `begin` before each
-    control period and `judge` after it.
+    The world must be at its start. A program that steps the physics by other means (robosuite) calls `begin` before
+    each control period and `judge` after it.
     """
 
     def __init__(self, scenario: Scenario, world: World, horizon: float = math.inf):
-        """`horizon`: time limit for reaching the goal [s]."""
+        """Start an episode in a world at its start.
+
+        Args:
+            scenario: the scenario that sets events and goal.
+            world: a world of that scenario's scene.
+            horizon: time limit for reaching the goal [s].
+        """
         self.scenario, self.world, self.horizon = scenario, world, horizon
         self.outcome: Outcome | None = None
-        """What has come of it; None as long as it is open. A success is lost by a later failure."""
+        """Outcome so far; None while it is open. A later failure turns a success into a failure."""
         self.reason = ""
-        """Why it is no success; empty as long as that is open, and for a success."""
+        """Reason why the episode is not a success; empty while the outcome is open, and for a success."""
         self.held = 0.0
-        """How long the goal has held without interruption [s]."""
+        """Time for which the goal has held without interruption [s]."""
         self._eventful = type(scenario).events is not Scenario.events
 
     def step(self, action: NDArray[np.float32]) -> Outcome | None:
@@ -55,7 +62,7 @@ class Episode:
                 self.scenario.events(self.world)
 
     def judge(self) -> Outcome | None:
-        """Decide what the control period that has passed means. Failure comes before success, success before time."""
+        """Judge the past control period: failure takes precedence over success, success over the time limit."""
         if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
@@ -68,7 +75,7 @@ class Episode:
         return self.outcome
 
     def settled(self) -> tuple[Outcome, str]:
-        """The final outcome and its reason, once the time in which a reached goal has to last is over."""
+        """The final outcome and its reason, after the time for which a reached goal has to last."""
         assert self.outcome is not None
         if self.outcome == "success" and not self.scenario.success(self.world):
             return "timeout", "the goal was reached but did not last"

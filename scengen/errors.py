@@ -1,11 +1,11 @@
-"""Errors a user can act on. Each message says what was given, what is accepted, and the nearest name."""
+"""Errors that a user can act on. Each message says what was given, what is accepted, and the nearest known name."""
 
 import difflib
 from collections.abc import Iterable, Mapping
 
 
 class ScengenError(Exception):
-    """Base class of every error raised on purpose by scengen."""
+    """Base class of every error that scengen raises on purpose."""
 
 
 class BadConfig(ScengenError):
@@ -20,7 +20,7 @@ class OutOfBounds(ScengenError):
 
 
 class UnknownName(ScengenError):
-    """A name was asked for that does not exist; the message lists the ones that do."""
+    """A requested name does not exist. The message lists the names that do."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
         names = sorted(known)
@@ -38,15 +38,15 @@ class Infeasible(ScengenError):
 
 
 class PoolError(ScengenError):
-    """A pool is missing, damaged, locked, or does not belong to the run that wants to write it."""
+    """A pool is missing, damaged or locked, or does not belong to the run that wants to write it."""
 
 
 class Unstable(ScengenError):
-    """MuJoCo raised a warning, so that nothing simulated after it means anything."""
+    """MuJoCo raised a warning, so that nothing simulated after it is valid."""
 
 
 class NoEvent(ScengenError):
-    """Something tried to change, outside of a scenario's `events`, what only events may change."""
+    """Code outside a scenario's `events` tried to change something that only events may change."""
 
     def __init__(self, what: str):
         super().__init__(f"{what} outside of events; only Scenario.events may do that, called by Episode.begin")
@@ -64,25 +64,25 @@ class GaveUp(ScengenError):
 
 
 class ForeignCode(ScengenError):
-    """Code that is not scengen's, such as a policy, raised an exception, which is the cause of this one."""
+    """Code outside scengen, such as a policy, raised an exception, which is the cause of this error."""
 
 
-SHOWN = 200
-"""How many letters of a value that somebody gave are repeated in an error."""
+SHOWN_LENGTH = 200
+"""Length up to which an error repeats a given value [characters]."""
 
 
-def cut(text: str, most: int = SHOWN) -> str:
-    """The beginning of a text that may be long."""
+def cut(text: str, most: int = SHOWN_LENGTH) -> str:
+    """The first `most` characters of a text, with `...` if it is longer."""
     return text if len(text) <= most else f"{text[:most]}..."
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The clause ` (did you mean 'x'?)`, or nothing when no known name is close."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6) if len(name) <= SHOWN else []
+    """The clause ` (did you mean 'x'?)`, or an empty text if no known name is close."""
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6) if len(name) <= SHOWN_LENGTH else []
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
-MOST = {
+MAX_SETTINGS = {
     "budget": 10_000_000,
     "any_n": 1_000_000,
     "attack": 1_000_000,
@@ -108,13 +108,14 @@ MOST = {
     "width": 4096,
     "workers": 256,
 }
-"""Largest values of settings that count or measure something: far beyond use, and within what can be computed."""
+"""Largest values of settings that count or measure something: far beyond practical use, and within what can be
+computed."""
 
 
 def at_least(settings: object, **lowest: float) -> None:
-    """Raise `BadConfig` for the first of the named settings that is less than its lowest value, or beyond `MOST`.
+    """Raise `BadConfig` for the first of the named settings that is below its lowest value or above `MAX_SETTINGS`.
 
-    What is no number passes, such as None.
+    Values that are not numbers, such as None, are accepted.
     """
     for name, low in lowest.items():
         value = getattr(settings, name)
@@ -122,5 +123,5 @@ def at_least(settings: object, **lowest: float) -> None:
             continue
         if not value >= low:
             raise BadConfig(f"{name} = {cut(str(value))}; it must be at least {low:g}")
-        if value > MOST[name]:
-            raise BadConfig(f"{name} = {cut(str(value))}; it must be at most {MOST[name]}")
+        if value > MAX_SETTINGS[name]:
+            raise BadConfig(f"{name} = {cut(str(value))}; it must be at most {MAX_SETTINGS[name]}")

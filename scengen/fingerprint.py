@@ -14,8 +14,8 @@ from .sim.world import World
 def fingerprint() -> str:
     """Hash of the final state of a fixed short rollout of the arm and a falling tile.
 
-    It tells how this machine rounds. Machines with equal fingerprints replay actions bit for bit. On other machines
-    (another libm, another instruction set) the same actions end in nearly the same state.
+    It shows how this machine rounds. Machines with equal fingerprints replay actions bit for bit. On a machine with
+    another fingerprint (another libm, another instruction set) the same actions end in nearly the same state.
     """
     scene = table()
     place(scene, Domino(), "tile", [0.1, 0.0, TABLE_TOP + 0.01], yaw=0.3)

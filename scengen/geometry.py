@@ -1,4 +1,4 @@
-"""Directions, rotations and outlines: the few lines of geometry that scenes and moves share. [m], [rad]."""
+"""Directions, rotations and outlines: the geometry that scenes and moves share. Lengths in [m], angles in [rad]."""
 
 import math
 
@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Vec3 = NDArray[np.float64]
-"""Shape (3,)."""
+"""Vector of shape (3,)."""
 Mat3 = NDArray[np.float64]
-"""Shape (3, 3), columns are the axes of what is turned."""
+"""Rotation matrix of shape (3, 3). Its columns are the axes of the rotated frame."""
 Outline = NDArray[np.float64]
-"""Shape (4, 2): the corners of a rectangle in order, seen from above [m]."""
+"""Corners of a rectangle in order, seen from above [m], shape (4, 2)."""
 
 UP: Vec3 = np.array([0.0, 0.0, 1.0])
+"""Unit vector that points up."""
 
 
 def heading(angle: float) -> Vec3:
@@ -23,25 +24,25 @@ def heading(angle: float) -> Vec3:
 
 
 def polar(offset: Vec3) -> tuple[float, float]:
-    """Direction [rad], 0 is x, and length [m] of an offset as seen from above."""
+    """Direction [rad] (0 is x) and length [m] of an offset seen from above."""
     x, y = offset[:2]
     return math.atan2(y, x), math.hypot(x, y)
 
 
 def about_z(yaw: float) -> Mat3:
-    """The rotation by `yaw` [rad] about the vertical."""
+    """Rotation by `yaw` [rad] about the vertical."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def about_y(tilt: float) -> Mat3:
-    """The rotation by `tilt` [rad] about y: it turns z towards x, and x down."""
+    """Rotation by `tilt` [rad] about y. It turns z towards x, and x down."""
     c, s = math.cos(tilt), math.sin(tilt)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def rotation(turn: Vec3) -> Mat3:
-    """The matrix of a rotation vector [rad]."""
+    """Rotation matrix of a rotation vector [rad]."""
     q, mat, angle = np.empty(4), np.empty(9), math.sqrt(turn @ turn)
     mujoco.mju_axisAngle2Quat(q, turn / max(angle, 1e-12), angle)
     mujoco.mju_quat2Mat(mat, q)
@@ -49,14 +50,14 @@ def rotation(turn: Vec3) -> Mat3:
 
 
 def quat(axis: str, angle: float) -> list[float]:
-    """The rotation by `angle` [rad] about the axis `x`, `y` or `z`, as a quaternion (wxyz)."""
+    """Rotation by `angle` [rad] about the axis `x`, `y` or `z`, as a quaternion (wxyz)."""
     q = [math.cos(angle / 2), 0.0, 0.0, 0.0]
     q[1 + "xyz".index(axis)] = math.sin(angle / 2)
     return q
 
 
 def between(here: Mat3, there: Mat3) -> Vec3:
-    """The rotation vector in world axes [rad] that turns `here` into `there`."""
+    """Rotation vector in world axes [rad] that turns `here` into `there`."""
     q, turn = np.empty(4), np.empty(3)
     mujoco.mju_mat2Quat(q, (there @ here.T).ravel())
     mujoco.mju_quat2Vel(turn, q, 1.0)
@@ -64,14 +65,14 @@ def between(here: Mat3, there: Mat3) -> Vec3:
 
 
 def shortest(here: Vec3, there: Vec3) -> Mat3:
-    """The smallest rotation that takes one unit vector, not opposite to the other, to the other."""
+    """Smallest rotation that takes one unit vector to another. The two must not be opposite."""
     v, c = np.cross(here, there), float(here @ there)
     k = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
     return np.eye(3) + k + k @ k / (1.0 + c)
 
 
 def axes(x: Vec3, z: Vec3) -> Mat3:
-    """The orientation of what has these two unit vectors, at right angles, as its first and its last axis."""
+    """Orientation of a frame whose first and last axes are the given perpendicular unit vectors."""
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
@@ -81,13 +82,13 @@ def yaw_of(rot: Mat3) -> float:
 
 
 def corners(pos: ArrayLike, yaw: float, size: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -> Outline:
-    """The outline of a box: what of it is seen from above.
+    """Outline of a box, seen from above.
 
     Args:
-        pos: of the body that it belongs to, of which x and y count [m].
-        yaw: of that body [rad].
-        size: full length along the body's x and y [m].
-        offset: of the box' middle from the body's origin, in the body's axes [m].
+        pos: position of the body that the box belongs to, of which x and y are used [m].
+        yaw: yaw of that body [rad].
+        size: full lengths along the body's x and y [m].
+        offset: offset of the box's middle from the body's origin, in the body's axes [m].
     """
     signs = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
     flat = about_z(yaw)[:2, :2]
@@ -95,9 +96,9 @@ def corners(pos: ArrayLike, yaw: float, size: ArrayLike, offset: ArrayLike = (0.
 
 
 def gap(one: Outline, other: Outline) -> float:
-    """A lower bound of the distance of two rectangles [m], exact face to face; negative where they overlap.
+    """Lower bound of the distance between two rectangles [m], exact face to face; negative if they overlap.
 
-    The largest gap between their shadows on the directions of their sides (separating axes).
+    It is the largest gap between their projections on the directions of their sides (separating axes).
     """
     sides = np.array([one[1] - one[0], one[2] - one[1], other[1] - other[0], other[2] - other[1]])
     axes = sides / np.linalg.norm(sides, axis=1, keepdims=True)

@@ -1,6 +1,6 @@
-"""How a picture is held before somebody: upright, turned by quarters, or as in a mirror; the eight ways of Exif.
+"""Orientation of pictures in front of a viewer: upright, turned by quarters, or mirrored; the eight ways of Exif.
 
-What is turned is the picture alone. Actions, the robot's own pose and all privileged poses stay in world axes.
+Only the picture is turned. Actions, the robot's own pose and all privileged poses stay in world axes.
 """
 
 from dataclasses import dataclass
@@ -12,30 +12,37 @@ from .errors import BadConfig
 from .geometry import Vec3
 
 VIEW_CENTRE = np.array([-0.05, 0.0])
-"""Where the axis of the camera "agentview", in the middle of its pictures, meets the table: x and y [m]."""
+"""Point where the axis of the camera "agentview", in the middle of its pictures, meets the table: x and y [m]."""
 RIGHT_AND_UP = np.array([[0.0, 1.0], [-1.0, 0.0]])
-"""Takes x and y to the picture's right and up, for cameras that look at the table from the front or from above."""
+"""Matrix that takes x and y to the picture's right and up, for cameras that look at the table from the front or from
+above."""
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """An exchange of left and right, then quarter turns. Applied to pictures it moves pixels and changes none."""
+    """An exchange of left and right, followed by quarter turns.
+
+    Applied to a picture, it moves pixels and changes none.
+    """
 
     turns: int = 0
-    """Quarter turns, counter-clockwise."""
+    """Number of quarter turns, counter-clockwise."""
     mirrored: bool = False
-    """Whether left and right are exchanged before that."""
+    """Whether left and right are exchanged before the turns."""
 
     def apply(self, picture: NDArray) -> NDArray:
-        """The picture as it is seen: shape (height, width, ...), first row on top; odd turns swap width and height."""
+        """The picture as the viewer sees it: shape (height, width, ...), first row on top.
+
+        Odd turns swap width and height.
+        """
         seen = picture[:, ::-1] if self.mirrored else picture
         return np.ascontiguousarray(np.rot90(seen, self.turns))
 
     def check_size(self, width: int, height: int) -> None:
-        """Raise unless what is seen has the size of the picture [pixels], so that one shape serves all scenarios.
+        """Raise unless the turned picture has the same size [pixels], so that one shape serves all scenarios.
 
         Raises:
-            BadConfig: an odd turn of a picture that is not square.
+            BadConfig: the turns are odd and the picture is not square.
         """
         if self.turns % 2 and width != height:
             raise BadConfig(
@@ -44,11 +51,13 @@ class Orientation:
             )
 
     def pixels(self, width: int, height: int) -> NDArray[np.float64]:
-        """Takes homogeneous pixel coordinates (x right, y down) of the picture to those of what is seen, shape (3, 3).
+        """Matrix from homogeneous pixel coordinates of the picture to those of the turned picture, shape (3, 3).
+
+        x points right, y down.
 
         Args:
-            width: of the picture before it is turned [pixels].
-            height: of the same [pixels].
+            width: width of the picture before it is turned [pixels].
+            height: its height [pixels].
         """
         size = np.array([width, height])
         down, found = np.diag([1.0, -1.0]), np.eye(3)
@@ -65,19 +74,22 @@ class Orientation:
         return self._moved(point, self._right_and_up)
 
     def stands_at(self, seen: Vec3) -> Vec3:
-        """Where a thing stands that is seen there [m], shape (3,): the inverse of `seen_at`."""
+        """Position of an object that appears at a position [m], shape (3,): the inverse of `seen_at`."""
         return self._moved(seen, self._right_and_up.T)
 
     @staticmethod
     def _moved(point: Vec3, by: NDArray[np.float64]) -> Vec3:
+        """A position, turned about `VIEW_CENTRE` by a matrix in the picture's axes [m]."""
         moved = RIGHT_AND_UP.T @ by @ RIGHT_AND_UP @ (point[:2] - VIEW_CENTRE)
         return np.array([*(VIEW_CENTRE + moved), point[2]])
 
     @property
     def _right_and_up(self) -> NDArray[np.float64]:
-        """What becomes of the picture's right and up, shape (2, 2)."""
+        """Matrix that turns the picture's right and up, shape (2, 2)."""
         quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-        return np.linalg.matrix_power(quarter, self.turns % 4) @ np.diag([-1.0 if self.mirrored else 1.0, 1.0])
+        turns: NDArray[np.float64] = np.linalg.matrix_power(quarter, self.turns % 4)
+        return turns @ np.diag([-1.0 if self.mirrored else 1.0, 1.0])
 
 
 UPRIGHT = Orientation()
+"""Orientation that leaves pictures as they are."""

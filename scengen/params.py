@@ -1,7 +1,7 @@
 """Physical parameters: plain dataclass fields that know their unit and bounds.
 
-The bounds are declared once, here, and used four times: by the constructor, by the check of a task
-file, by the property tests and by the printed table of parameters.
+The bounds are declared once, here, and used four times: by the constructor, by the check of a task file, by the
+property tests and by the printed table of parameters.
 """
 
 import dataclasses
@@ -16,6 +16,7 @@ from .errors import BadConfig, OutOfBounds, UnknownName
 N = TypeVar("N", int, float)
 D = TypeVar("D")
 Value = int | float
+"""Value of a parameter."""
 
 
 @dataclass(frozen=True)
@@ -23,20 +24,30 @@ class Parameter:
     """One parameter of a scenario family, nested assets included."""
 
     name: str
-    """Dotted path, e.g. `tile.mass`."""
+    """Dotted path, such as `tile.mass`."""
     nominal: Value
+    """Nominal value [unit]."""
     unit: str
+    """Unit of the value and the bounds."""
     low: float
+    """Lowest value that makes physical sense [unit]."""
     high: float
+    """Highest value that makes physical sense [unit]."""
     period: float | None
-    """Values that differ by this much are the same scene, e.g. 180 for the yaw of a slab [unit]."""
+    """Period [unit]: values that differ by it give the same scene, such as 180 for the yaw of a slab. None if there is
+    none."""
     hidden: bool
-    """Whether nobody may read the value off the scene's geometry, colours or names."""
+    """Whether the value must not be readable from the scene's geometry, colours or names."""
     integer: bool
-    """Whether only whole numbers make sense."""
+    """Whether the value is a whole number."""
 
     def check(self, where: str, value: Any) -> None:
-        """Raise unless `value` is a finite number of the right kind within the bounds."""
+        """Raise unless `value` is a finite number of the right kind within the bounds.
+
+        Args:
+            where: name of the value in the error message.
+            value: the value to check.
+        """
         if isinstance(value, bool) or not isinstance(value, int if self.integer else (int, float)):
             kind = "a whole number" if self.integer else "a number"
             raise BadConfig(f"{where} = {value!r}; it must be {kind} in [{self.low:g}, {self.high:g}] {self.unit}")
@@ -45,13 +56,21 @@ class Parameter:
 
 
 def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None, hidden: bool = False) -> N:
-    """Declare a parameter: its nominal value, its unit, and the bounds of its meaning.
+    """Declare a parameter: its nominal value, its unit and its physical bounds.
 
-    The bounds are physical, not statistical: outside them the builder makes no sense. Which values
-    are *likely* is written in conf/task/.
+    The bounds are physical, not statistical: outside them the scene cannot be built or makes no sense. The
+    distributions of likely values are in conf/task/.
+
+    Args:
+        nominal: the value if nothing else is said; a whole number declares an integer parameter.
+        unit: the unit, such as `m`.
+        low: lowest value allowed.
+        high: highest value allowed.
+        period: see `Parameter.period`.
+        hidden: see `Parameter.hidden`.
 
     Raises:
-        ValueError: the period is no positive number.
+        ValueError: the period is not a positive number.
     """
     if period is not None and not (math.isfinite(period) and period > 0):
         raise ValueError(f"period = {period}; it must be a positive number, or None")
@@ -61,7 +80,7 @@ def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None
 
 
 def parameters(owner: Any, prefix: str = "") -> Iterator[Parameter]:
-    """Yield every parameter of an instance, with the instance's values as nominal ones."""
+    """Yield every parameter of an instance, with the instance's values as the nominal ones."""
     for field in dataclasses.fields(owner):
         value = getattr(owner, field.name)
         if dataclasses.is_dataclass(value):
@@ -76,14 +95,14 @@ def values(owner: Any) -> dict[str, Value]:
 
 
 def check_bounds(owner: Any) -> None:
-    """Raise for the first own parameter of `owner` that leaves its bounds (nested assets check themselves)."""
+    """Raise for the first parameter of `owner` outside its bounds. Nested assets check their own."""
     for p in parameters(owner):
         if "." not in p.name:
             p.check(f"{type(owner).__name__}.{p.name}", p.nominal)
 
 
 def with_values(owner: D, new: Mapping[str, Value]) -> D:
-    """Copy `owner` with some parameters replaced, e.g. `{"count": 6, "tile.mass": 0.03}`."""
+    """Copy `owner` with some parameters replaced, such as `{"count": 6, "tile.mass": 0.03}`."""
     known = values(owner)
     flat: dict[str, Any] = {}
     nested: dict[str, dict[str, Value]] = {}
@@ -103,5 +122,5 @@ def with_values(owner: D, new: Mapping[str, Value]) -> D:
 
 
 def canonical(owner: Any) -> str:
-    """The parameter values as JSON with sorted keys: what identities are made of."""
+    """The parameter values as JSON with sorted keys, from which ids are computed."""
     return json.dumps(values(owner), sort_keys=True)

@@ -1,4 +1,4 @@
-"""What goals and failures ask of a world, by the names that tasks use."""
+"""Predicates that goals and failures of tasks are made of."""
 
 import math
 
@@ -10,18 +10,22 @@ from .sim.world import ROBOT, World
 
 
 def fallen(world: World, *bodies: str, below: float = 0.05) -> str | None:
-    """The first body whose centre of mass is more than `below` [m] under the table top, or None: it is lost."""
+    """The first body whose centre of mass is more than `below` [m] under the table top, or None."""
     return next((body for body in bodies if world.com(body)[2] < TABLE_TOP - below), None)
 
 
 def displaced(world: World, body: str, start: Vec3) -> float:
-    """How far a body's centre of mass is from `start`, measured along the table [m]."""
+    """Distance of a body's centre of mass from `start`, measured along the table [m]."""
     offset = world.com(body) - start
     return math.hypot(offset[0], offset[1])
 
 
 def carried(world: World, body: str, start: Vec3, beyond: float) -> bool:
-    """Whether the robot touches a body whose origin is more than `beyond` [m] from where it stood."""
+    """Whether the robot touches a body whose origin is more than `beyond` [m] from its initial position.
+
+    Args:
+        start: the initial position of the origin [m].
+    """
     return world.touching(ROBOT, body) and math.dist(world.pos(body), start) > beyond
 
 
@@ -43,28 +47,28 @@ def rests_on(world: World, body: str, support: str) -> bool:
 
 
 def inside(world: World, body: str, container: str, low: Vec3, high: Vec3) -> bool:
-    """Whether a body's origin lies between two corners, given in the container's axes [m]."""
+    """Whether a body's origin lies between two corners given in the container's axes [m]."""
     place = world.rot(container).T @ (world.pos(body) - world.pos(container))
     return bool(np.all(place >= low) and np.all(place <= high))
 
 
 def seated(world: World, body: str, container: str, middle: Vec3, off: float, high: float) -> bool:
-    """Whether a body rests on `container` alone, its centre of mass near a place.
+    """Whether a body rests on `container` alone with its centre of mass near a position.
 
     Args:
-        middle: the place [m].
-        off: how far from there it may be along the table [m].
-        high: how far above or below [m].
+        middle: the position [m].
+        off: largest distance from it along the table [m].
+        high: largest distance above or below it [m].
     """
     away = world.com(body) - middle
     return math.hypot(away[0], away[1]) < off and abs(away[2]) < high and rests_on(world, body, container)
 
 
 def over(world: World, body: str, spot: Vec3, half: float) -> bool:
-    """Whether a body's centre of mass is over a square along x and y, given by its middle and half a side [m]."""
+    """Whether a body's centre of mass is over a square along x and y, given by its middle and half its side [m]."""
     return bool(np.abs(world.com(body) - spot)[:2].max() <= half)
 
 
 def touched_only(world: World, *allowed: str) -> str | None:
-    """The first free body that the robot has touched since the start although it is not allowed, or None."""
+    """The first free body, not among the allowed ones, that the robot has touched since the start, or None."""
     return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)

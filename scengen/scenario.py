@@ -1,4 +1,4 @@
-"""Scenario: one physical problem with every number filled in, able to build and judge itself."""
+"""A scenario: one physical problem with all its numbers, which builds its scene and judges its outcome."""
 
 import abc
 import hashlib
@@ -19,41 +19,47 @@ from .sim.world import World
 from .symmetry import Symmetry
 
 Action = NDArray[np.float64]
-"""Shape (7 * arms,), each in [-1, 1]: end-effector translation (3), rotation vector (3), gripper (-1 open, 1 closed) of
-every arm in its order."""
+"""Action of shape (7 * arms,), each number in [-1, 1]: end-effector translation (3), rotation vector (3) and gripper
+(-1 open, 1 closed) of every arm, in the order of the arms."""
 
 Plan = Generator[Action, None, None]
-"""A scripted behaviour: one action per control period, until it has nothing left to do."""
+"""Scripted behaviour: a generator that yields one action per control period and ends when the behaviour is complete."""
 
 Planner = Callable[[World], Plan]
+"""Function that starts a plan in a world."""
 
 
 @dataclass(frozen=True)
 class Shortcut:
-    """A tempting plan that must fail: it shows that the task's bottleneck is real."""
+    """A tempting plan that must fail. Its failure shows that the task's bottleneck is real."""
 
     plan: Planner
+    """Function that starts the plan."""
     to_rest: bool = False
-    """Whether it is simulated until everything is at rest, and has to fail by physics alone.
+    """Whether the plan is simulated until everything is at rest and must fail by physics alone.
 
-    A certificate then counts nothing else as a failure: neither a rule that ends the episode earlier, nor a move that
-    gave up, nor the time limit."""
+    If so, a certificate counts nothing else as a failure: neither a rule that ends the episode earlier, nor a move that
+    gave up, nor the time limit.
+    """
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a family asks for, as one number: for an adversary that answers without looking.
+    """The answer that a family asks for, as one number. An adversary tries it without looking at the scene.
 
-    Its values mean the same in every scenario of the family: the number of a lane, a share of a height or an offset.
+    The number means the same in every scenario of the family: the index of a lane, or a share of a height or an offset.
     """
 
     candidates: tuple[float, ...]
+    """Values that a guess may take."""
     act: Callable[[World, float], Plan]
-    """Acts on a guess as the oracle acts on the right answer, and leaves the scene such that another may follow."""
+    """Plan that acts on a guess as the oracle acts on the right answer. It leaves the scene such that another guess can
+    follow."""
     right: Callable[[float], bool] | None = None
-    """Whether a guess is right, by statics, without simulating anything; None if only a rollout can tell."""
+    """Function that decides by statics, without a simulation, whether a guess is right; None if only a rollout can
+    decide."""
     tries: int = 3
-    """How many guesses an episode allows, three at most: one where a wrong one ends it."""
+    """Number of guesses that an episode allows, at most three; 1 if a wrong guess ends the episode."""
 
 
 @dataclass(frozen=True)
@@ -61,35 +67,44 @@ class Refutation:
     """A checkable reason why a combination of parameters is an invalid scenario."""
 
     reason: str
-    """The same words for every scenario that fails in this way, so that rejections can be counted."""
+    """Reason in words, the same for every scenario that fails in this way, so that rejections can be counted."""
     numbers: Mapping[str, float]
-    """What was compared, in SI units."""
+    """Numbers that were compared, in SI units."""
 
 
 def require(holds: bool, otherwise: str, **numbers: float) -> Refutation | None:
-    """One constraint of a family, as a positive statement.
+    """State one constraint of a family, in the positive.
 
     Args:
-        holds: what must be true.
-        otherwise: the reason for the refutation where it is not, the same words for every scenario.
-        numbers: what was compared, in SI units.
+        holds: the condition that must be true.
+        otherwise: the reason of the refutation if it is false; the same words for every scenario.
+        numbers: the numbers that were compared, in SI units.
+
+    Returns:
+        The refutation if the condition is false, else None.
     """
     return None if holds else Refutation(otherwise, {name: float(value) for name, value in numbers.items()})
 
 
 def on_table(what: str, points: ArrayLike, margin: float = 0.0) -> Refutation | None:
-    """Require that every point, shape (..., 2 or 3), is over the table and `margin` from its edge [m]."""
+    """Require that every point, shape (..., 2 or 3), is over the table and at least `margin` [m] from its edge.
+
+    Args:
+        what: name of the object that the points belong to.
+        points: in world axes [m].
+        margin: least distance from the edge [m].
+    """
     far = float(np.abs(np.asarray(points, float)[..., :2]).max())
     return require(far <= TABLE_HALF - margin, f"{what} leaves the table", farthest=far, edge=TABLE_HALF - margin)
 
 
 def within_reach(what: str, *points: ArrayLike, base: NDArray[np.float64] = BASE) -> Refutation | None:
-    """Require that the grip site can come to each point [m], by a bound that no posture exceeds (`panda.REACH`).
+    """Require that the grip site can come to each point, by a bound that no posture exceeds (`panda.REACH`).
 
     Args:
-        what: names the points.
-        points: in world axes.
-        base: where the arm in question stands [m]; one arm in the middle by default, else see `panda.bases`.
+        what: name of the points.
+        points: in world axes [m].
+        base: position of the arm's base [m]; by default the single arm in the middle. See `panda.bases` for two arms.
     """
     shoulder = SHOULDER + base - BASE
     away = max(float(np.linalg.norm(np.asarray(point, float) - shoulder)) for point in points)
@@ -97,25 +112,31 @@ def within_reach(what: str, *points: ArrayLike, base: NDArray[np.float64] = BASE
 
 
 class Scenario(abc.ABC):
-    """Base of every scenario family. Subclasses are frozen dataclasses; subclass once, never twice.
+    """Base of every scenario family. A family is a frozen dataclass, and no family derives from another family.
+
+    Families with much in common may share one abstract base, which derives from `Scenario` directly. Such a base
+    declares every field that it uses, so that it can be read without its families.
 
     A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `shortcuts`,
     `ablations`, `constraints`, geometry.
     """
 
     HOLD: ClassVar[float] = 0.0
-    """How long the goal must hold without interruption before it counts [s]."""
+    """Time for which the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()
-    """Bodies that are meant to move without anybody acting; they are exempt from the rest check."""
+    """Bodies that are meant to move on their own. The rest check ignores them."""
     DISTURBED: ClassVar[tuple[str, ...]] = ()
-    """Hinges whose start is disturbed in jittered runs, as the places of free bodies are."""
+    """Hinges whose initial angles are disturbed in jittered runs, as the positions of free bodies are."""
     NO_ABLATIONS: ClassVar[str] = ""
-    """Why a family has no ablations: its certificates say so, and that this was not checked."""
+    """Reason why the family has no ablations. Its certificates state the reason, and that ablations were not
+    checked."""
     SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
-    """Changes of the parameters that give the same scene, besides the periods that parameters declare themselves.
+    """Changes of the parameters that give the same scene, in addition to the periods that parameters declare
+    themselves.
 
-    The mirror image of a scene is another scene: the arm is not mirrored with it, and who has learnt to use the left
-    arm of a seesaw has not learnt to use the right one. A family may declare it all the same, where that is not asked.
+    The mirror image of a scene is a different scene: the arm is not mirrored with it, and a policy that has learned to
+    use the left arm of a seesaw has not learned to use the right one. A family may still declare a mirror symmetry if
+    its task does not probe the difference.
     """
 
     def __post_init__(self) -> None:
@@ -123,36 +144,39 @@ class Scenario(abc.ABC):
 
     @abc.abstractmethod
     def build(self) -> mujoco.MjSpec:
-        """The scene, without the robot. Bodies that goals and oracles name must be named here."""
+        """Build the scene without the robot. Bodies that goals and oracles refer to need names."""
 
     @abc.abstractmethod
     def success(self, world: World) -> bool:
         """Whether the goal holds now."""
 
     def failure(self, world: World) -> str | None:
-        """Why the episode is lost for good, or None. A failure ends the episode."""
+        """Reason why the episode is lost for good, or None. A failure ends the episode."""
         return None
 
     def events(self, world: World) -> None:  # noqa: B027
-        """Events of the scene itself, called before every control period. Draws nothing: all values are parameters.
+        """Let the scene's own events happen. Called before every control period. It draws nothing: all values are
+        parameters.
 
-        What they must know of the episode so far is in `world.memory`, which nothing else may write: a family has no
-        state. Nor may anything else call `arm.jam`, `arm.tell`, `world.move`, `world.launch` or `world.spin`.
+        A family has no state. What events need to know about the episode so far is in `world.memory`, which only this
+        method may write. Only this method may call `arm.jam`, `arm.tell`, `world.move`, `world.launch` and
+        `world.spin`.
         """
 
     def pending(self, world: World) -> bool:
-        """Whether something is still going to happen by itself, although everything is at rest and nobody acts: an
-        event, or a goal that time alone brings.
+        """Whether something will still happen on its own although everything is at rest: an event, or a goal that time
+        alone brings.
 
-        As long as it is, no episode ends because everything is at rest, and the rest check ends with it. A family whose
-        events answer what the robot does should say when they are over; of one that does not, nothing is known.
+        While this is true, no episode ends because everything is at rest, and the rest check ends when it becomes
+        false. A family whose events respond to the robot should report when they are over. By default, a family with
+        events is always pending.
         """
         return type(self).events is not Scenario.events
 
     def oracle(self, world: World) -> Plan:
-        """A scripted solution, which may read the full state but acts only through the robot.
+        """Scripted solution. It may read the full state but acts only through the robot.
 
-        Certification calls it and nothing else does: verification, environments and pools work without it.
+        Only certification calls it: verification, environments and pools work without it.
 
         Raises:
             NoOracle: the family has none.
@@ -164,15 +188,15 @@ class Scenario(abc.ABC):
         return {}
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """The scene with its intended means taken away, by name in snake_case: there the witness must fail."""
+        """Scenes without the intended means, by name in snake_case. The witness must fail in each of them."""
         return {}
 
     def answer(self) -> Answer | None:
-        """What is asked for, as one number, if it can be told so: fixed guesses are tried on it."""
+        """The answer that the task asks for, if it can be stated as one number. Fixed guesses are tried on it."""
         return None
 
     def constraints(self) -> Iterator[Refutation | None]:
-        """What must hold of the parameters, one `require(...)` after the other; later ones may rely on earlier ones."""
+        """Constraints on the parameters, one `require(...)` after the other. Later ones may rely on earlier ones."""
         yield from ()
 
     def infeasible(self) -> Refutation | None:
@@ -180,25 +204,25 @@ class Scenario(abc.ABC):
         return next((refutation for refutation in self.constraints() if refutation), None)
 
     def features(self) -> Mapping[str, float]:
-        """What the physics depends on, by name in snake_case: ratios and heights rather than parameters.
+        """Quantities that the physics depends on, by name in snake_case: ratios and heights rather than parameters.
 
-        Proves and decides nothing. Scenes that differ in every parameter may be equal in these, and then it takes no
-        new insight to solve them. A certificate records them in its first check.
+        Features prove and decide nothing. Scenes that differ in every parameter may have equal features; then the same
+        behaviour solves them. A certificate records the features in its first check.
         """
         return {}
 
     @property
     def orientation(self) -> Orientation:
-        """How every picture of this scenario is held before a policy; people see it upright (`show`, `film`)."""
+        """Orientation in which a policy sees every picture of this scenario. `show` and `film` show it upright."""
         return UPRIGHT
 
     @property
     def material(self) -> str:
-        """Hashes of what the scene is made of besides parameters, such as scans; empty where parameters decide all."""
+        """Hashes of ingredients other than parameters, such as scans; empty if the parameters decide everything."""
         return ""
 
     @property
     def id(self) -> str:
-        """Twelve hex digits that depend on the family, every parameter and `material`, and on nothing else."""
+        """Id of twelve hex digits. It depends on the family, every parameter and `material`, and on nothing else."""
         text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}{self.material}"
         return hashlib.sha256(text.encode()).hexdigest()[:12]

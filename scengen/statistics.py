@@ -1,7 +1,7 @@
-"""Success rates and their differences, with intervals that know that rollouts of one scenario are not independent.
+"""Success rates and their differences, with cluster-robust intervals.
 
-Everything is computed from one number for each scenario, the share of its rollouts that succeed. Scenarios are
-independent draws, their rollouts are not, and no model is made of how they hang together.
+Everything is computed from one number per scenario, the share of its rollouts that succeed. Scenarios are independent
+draws; rollouts of one scenario count as dependent, and no model of their dependence is assumed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CONFIDENCE = 0.95
+"""Confidence of intervals."""
 Z = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 """Half width of a 95 % interval in standard errors."""
-DRAWS = 8192
-"""Random orderings from which Gaffke's bound takes its quantile: the confidence is exact within +-0.2 points."""
-KEPT = 500
-"""Scenarios up to which those orderings are kept for the next call: 33 MB."""
+ORDERINGS = 8192
+"""Number of random orderings from which Gaffke's bound takes its quantile: the confidence is exact within +-0.2
+points."""
+CACHED_SCENARIOS = 500
+"""Number of scenarios up to which those orderings are cached for the next call: 33 MB."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,15 @@ class Rate:
     """A success rate and its 95 % interval."""
 
     value: float
+    """Success rate."""
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
     scenarios: int
+    """Number of scenarios."""
     rollouts: int
+    """Number of rollouts."""
 
 
 @dataclass(frozen=True)
@@ -37,18 +44,21 @@ class Difference:
     """A difference between two success rates and its 95 % interval."""
 
     value: float
+    """Difference of the rates."""
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
     twins: int = 0
-    """How many pairs of twins it was taken over; 0 where the two sides are unpaired."""
+    """Number of pairs of twins; 0 if the two sides are unpaired."""
 
 
 def rate(successes: Sequence[Sequence[bool]], confidence: float = CONFIDENCE) -> Rate:
     """The success rate of several scenarios with one or more rollouts each: the mean over scenarios of their shares.
 
     Args:
-        successes: for every scenario the outcomes of its rollouts.
-        confidence: of the interval, see `mean_interval`.
+        successes: outcomes of the rollouts of every scenario.
+        confidence: confidence of the interval, see `mean_interval`.
     """
     shares = np.array([np.mean(s) for s in successes])
     low, high = mean_interval(shares, confidence)
@@ -60,7 +70,7 @@ def mean_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[fl
 
     The upper bound is the quantile, over ordered uniform numbers u, of 1 - sum_i u_i (x_(i+1) - x_i), with the values
     in order and x_(n+1) = 1 (Gaffke 2005; Learned-Miller and Thomas 2019, arXiv:1905.06208). For single rollouts it is
-    Clopper and Pearson's. No value that grows makes a bound smaller: a better policy never gets a worse one.
+    Clopper and Pearson's. A value that grows never makes a bound smaller: a better policy never gets a worse bound.
 
     Raises:
         ValueError: there is no value, or one is outside [0, 1].
@@ -69,50 +79,52 @@ def mean_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[fl
     if not len(x) or not (x[0] >= 0.0 and x[-1] <= 1.0):
         raise ValueError("an interval needs numbers in [0, 1]")
     tail = (1 + confidence) / 2
-    return 1.0 - _upper(np.sort(1.0 - x), tail), _upper(x, tail)
+    return 1.0 - _upper_bound(np.sort(1.0 - x), tail), _upper_bound(x, tail)
 
 
-def _upper(ordered: NDArray[np.float64], tail: float) -> float:
+def _upper_bound(ordered: NDArray[np.float64], tail: float) -> float:
+    """Upper bound of the mean of ordered values in [0, 1]."""
     steps = np.diff(np.append(ordered, 1.0))
     means = np.concatenate([1.0 - block @ steps for block in _uniforms(len(ordered))])
     return float(np.clip(np.quantile(means, tail), ordered.mean(), 1.0))
 
 
 def _uniforms(n: int) -> Iterator[NDArray[np.float64]]:
-    """`DRAWS` rows of n ordered uniform numbers, the same in every call, in blocks of some MB."""
-    if n <= KEPT:
-        yield _kept(n)
+    """`ORDERINGS` rows of n ordered uniform numbers, the same in every call, in blocks of some MB."""
+    if n <= CACHED_SCENARIOS:
+        yield _cached_uniforms(n)
         return
     random, rows = np.random.default_rng(n), max(1, 4_000_000 // n)
-    for start in range(0, DRAWS, rows):
-        yield np.sort(random.random((min(rows, DRAWS - start), n)), axis=1)
+    for start in range(0, ORDERINGS, rows):
+        yield np.sort(random.random((min(rows, ORDERINGS - start), n)), axis=1)
 
 
 @lru_cache(maxsize=16)
-def _kept(n: int) -> NDArray[np.float64]:
-    return np.sort(np.random.default_rng(n).random((DRAWS, n)), axis=1)
+def _cached_uniforms(n: int) -> NDArray[np.float64]:
+    """The rows of `_uniforms` in one cached block."""
+    return np.sort(np.random.default_rng(n).random((ORDERINGS, n)), axis=1)
 
 
 def difference(a: Rate, b: Rate) -> Difference:
-    """`a` minus `b`, of two independent sets of scenarios: Newcombe's hybrid of their intervals."""
-    return Difference(*_apart(a, b, 0.0))
+    """`a` minus `b`, for two independent sets of scenarios: Newcombe's hybrid of their intervals."""
+    return Difference(*_difference_interval(a, b, 0.0))
 
 
 def paired(a: Sequence[Sequence[bool]], b: Sequence[Sequence[bool]], confidence: float = CONFIDENCE) -> Difference:
-    """`a` minus `b` over twins: number i of both sides is the same scenario but for what the axis moves.
+    """`a` minus `b` over twins: scenario i of both sides is the same except for the parameters that the axis moves.
 
-    The hybrid of their intervals with the correlation of their shares (Zou and Donner 2008). Where one side always
-    ends alike the correlation cannot be estimated and is taken as 0, as if there were no twins.
+    The hybrid of their intervals with the correlation of their shares (Zou and Donner 2008). If one side always ends
+    alike, the correlation cannot be estimated and is taken as 0, as for unpaired scenarios.
     """
     one, other = (np.array([np.mean(s) for s in side]) for side in (a, b))
     if len(one) != len(other):
         raise ValueError("twins come in pairs")
     spread = one.std() * other.std()
     correlation = float(((one - one.mean()) * (other - other.mean())).mean() / spread) if spread > 0 else 0.0
-    return Difference(*_apart(rate(a, confidence), rate(b, confidence), correlation), len(one))
+    return Difference(*_difference_interval(rate(a, confidence), rate(b, confidence), correlation), len(one))
 
 
-def _apart(a: Rate, b: Rate, correlation: float) -> tuple[float, float, float]:
+def _difference_interval(a: Rate, b: Rate, correlation: float) -> tuple[float, float, float]:
     """Value and interval of a - b by the method of variance estimates recovery."""
     value = a.value - b.value
     down = _hypot(a.value - a.low, b.high - b.value, correlation)
@@ -121,6 +133,7 @@ def _apart(a: Rate, b: Rate, correlation: float) -> tuple[float, float, float]:
 
 
 def _hypot(a: float, b: float, correlation: float) -> float:
+    """Length of the hypotenuse of two correlated half widths."""
     return float(np.sqrt(max(0.0, a**2 + b**2 - 2 * correlation * a * b)))
 
 
@@ -137,6 +150,7 @@ def mean_difference(differences: Sequence[Difference]) -> Difference:
 
 
 def _mean(parts: Sequence[Rate] | Sequence[Difference]) -> tuple[float, float, float]:
+    """Value and interval of the mean of independent estimates with equal weights."""
     value = float(np.mean([p.value for p in parts]))
     down = np.sqrt(sum((p.value - p.low) ** 2 for p in parts)) / len(parts)
     up = np.sqrt(sum((p.high - p.value) ** 2 for p in parts)) / len(parts)
@@ -146,7 +160,7 @@ def _mean(parts: Sequence[Rate] | Sequence[Difference]) -> tuple[float, float, f
 def correlation(successes: Sequence[Sequence[bool]]) -> float:
     """Intra-cluster correlation of binary outcomes, by one-way analysis of variance, within [0, 1].
 
-    What the power analysis asks for; no interval depends on it. 1 where it cannot be estimated: with one scenario,
+    The power analysis needs it; no interval depends on it. It is 1 where it cannot be estimated: with one scenario,
     with one rollout each, or when all end alike.
     """
     counts = np.array([len(s) for s in successes], float)

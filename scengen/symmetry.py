@@ -1,4 +1,4 @@
-"""Symmetries of a family: changes of its parameters that give the same scene again."""
+"""Symmetries of a family: changes of its parameters that give the same scene."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -9,33 +9,34 @@ from .errors import BadConfig
 
 T = TypeVar("T")
 
-MOST = 10_000
-"""Images after which symmetries are taken for a mistake: seven identical things have 5040."""
+MAX_IMAGES = 10_000
+"""Number of images above which symmetries are taken for a mistake. Seven identical objects have 5040."""
 
 
 @dataclass(frozen=True)
 class Symmetry:
-    """Two things change places, or the scene is seen in a mirror, or both.
+    """Two objects change places, or the scene is mirrored, or both.
 
     `Symmetry("identical cubes", swap=("cube_0", "cube_1"))` exchanges all parameters below the two names;
-    `Symmetry("mirror", reflect={"y": 0.0, "heading": 0.0})` turns the signs of two parameters.
+    `Symmetry("mirror", reflect={"y": 0.0, "heading": 0.0})` changes the signs of two parameters.
     """
 
     name: str
+    """Name of the symmetry in messages."""
     swap: tuple[str, str] | None = None
     """Two parameters, or two groups of parameters, that change places."""
     reflect: Mapping[str, float] = field(default_factory=dict)
-    """Parameters that are mirrored, and the value about which; done after the swap."""
+    """Parameters that are mirrored, each with the value about which; applied after the swap."""
 
     def source(self, name: str) -> str:
-        """The parameter whose value goes to `name`."""
+        """Parameter whose value goes to `name`."""
         for one, other in (self.swap, self.swap[::-1]) if self.swap else ():
             if name == one or name.startswith(one + "."):
                 return other + name[len(one) :]
         return name
 
     def check(self, known: Iterable[str]) -> None:
-        """Raise unless every parameter that it speaks of exists."""
+        """Raise unless every parameter of the symmetry exists."""
         names = set(known)
         missing = [n for n in self.reflect if n not in names]
         missing += [n for n in names if self.source(n) not in names]
@@ -45,22 +46,25 @@ class Symmetry:
 
 @dataclass(frozen=True)
 class Moved:
-    """A value that stands where another one stood: `sign * values[source] + offset`."""
+    """Value of a parameter after a symmetry: `sign * values[source] + offset`."""
 
     source: str
+    """Parameter that the value comes from."""
     sign: float = 1.0
+    """Factor of that value, 1 or -1."""
     offset: float = 0.0
+    """Summand [unit]."""
 
     def reflected(self, about: float) -> "Moved":
-        """Its mirror image about a value."""
+        """Mirror image about a value."""
         return Moved(self.source, -self.sign, 2 * about - self.offset)
 
 
 def motions(names: Iterable[str], symmetries: Sequence[Symmetry]) -> Iterator[dict[str, Moved]]:
-    """What symmetries and their combinations do to any parameter values: first nothing, then every image.
+    """Effects of symmetries and their combinations on any parameter values: first the identity, then every image.
 
     Raises:
-        BadConfig: there is no end to it.
+        BadConfig: there are more than `MAX_IMAGES`.
     """
     return images({name: Moved(name) for name in names}, symmetries, Moved.reflected)
 
@@ -68,14 +72,15 @@ def motions(names: Iterable[str], symmetries: Sequence[Symmetry]) -> Iterator[di
 def images(
     point: Mapping[str, T], symmetries: Sequence[Symmetry], reflect: Callable[[T, float], T]
 ) -> Iterator[dict[str, T]]:
-    """The point itself, then everything that the symmetries and their combinations make of it.
+    """The point itself, then every image of it under the symmetries and their combinations.
 
     Args:
         point: parameter values, or their supports, by name.
-        reflect: the mirror image of one of them about a value.
+        symmetries: the symmetries.
+        reflect: function that mirrors one of the values about a value.
 
     Raises:
-        BadConfig: there is no end to it.
+        BadConfig: there are more than `MAX_IMAGES`.
     """
     todo, seen = [dict(point)], {_key(point)}
     while todo:
@@ -87,16 +92,19 @@ def images(
             if (key := _key(there)) not in seen:
                 seen.add(key)
                 todo.append(there)
-        if len(seen) > MOST:
-            raise BadConfig(f"the symmetries {', '.join(s.name for s in symmetries)} have more than {MOST} images")
+        if len(seen) > MAX_IMAGES:
+            raise BadConfig(
+                f"the symmetries {', '.join(s.name for s in symmetries)} have more than {MAX_IMAGES} images"
+            )
 
 
 def _key(point: Mapping[str, Any]) -> str:
-    """Equal for points that differ by rounding only."""
+    """Key that is equal for points that differ by rounding only."""
     return json.dumps({name: _rounded(point[name]) for name in sorted(point)})
 
 
 def _rounded(x: Any) -> Any:
+    """A value or support with its numbers rounded."""
     if isinstance(x, (int, float)):
         return round(float(x), 9) + 0.0  # -0.0 and 0.0 are one number
     if isinstance(x, Moved):

@@ -1,6 +1,7 @@
-"""Where configuration lies, and what task files say without a look at their families: for what has to be quick.
+"""Locations of configuration files, and the contents of task files without an import of their families.
 
-Files of tasks lie in conf/task, in installed packages that offer some, and in folders that a command line names.
+This is the fast path for commands that must answer quickly. Task files are in conf/task, in installed packages that
+offer tasks, and in folders that a command line names.
 """
 
 import re
@@ -17,14 +18,14 @@ import yaml
 from .errors import BadConfig, UnknownName, cut
 
 PACKAGES = "scengen.tasks"
-"""Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder
-in it that holds `task/<task>.yaml`."""
+"""Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder in
+it that holds `task/<task>.yaml`."""
 ID = "id"
-"""Name of the split that policies train on."""
+"""Name of the training split."""
 EMBODIMENT = "panda_jaw"
-"""The robot of a task whose file names none: one arm with a jaw."""
+"""Default robot of a task: one arm with a jaw."""
 ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
-"""What Hydra's --info tells here: which file gives what, in order or as a tree; the folders; and all of it."""
+"""Topics of Hydra's --info that are supported: the files in order or as a tree, the folders, and everything."""
 
 
 @cache
@@ -37,7 +38,7 @@ def shipped(name: str) -> Path:
     """A folder that comes with scengen: inside an installed package, beside it in a checkout.
 
     Raises:
-        BadConfig: it is missing.
+        BadConfig: the folder is missing.
     """
     here = Path(__file__).parent
     found = next((d for d in (here / name, here.parent / name) if d.is_dir()), None)
@@ -48,10 +49,10 @@ def shipped(name: str) -> Path:
 
 @cache
 def packages() -> tuple[str, ...]:
-    """Folders of configuration of installed packages that offer tasks (`PACKAGES`), as Hydra writes them.
+    """Configuration folders of installed packages that offer tasks (`PACKAGES`), in Hydra's spelling.
 
     Raises:
-        BadConfig: a package offers a folder that is not there.
+        BadConfig: a package offers a folder that does not exist.
     """
     return tuple(sorted(f"file://{_offered(point)}" for point in entry_points(group=PACKAGES)))
 
@@ -76,45 +77,51 @@ def groups(verb: str) -> list[str]:
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
-    """Those overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`."""
+    """The overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`."""
     return tuple(o for o in overrides if o.startswith("hydra.searchpath="))
 
 
 def tasks(search: Sequence[str] = ()) -> list[str]:
-    """Names of all task files, those of other packages included (`packages`, `search_path`)."""
+    """Names of all task files, including those of other packages (`packages`, `search_path`)."""
     return sorted(_files(tuple(search)))
 
 
 def splits(name: str, search: Sequence[str] = ()) -> tuple[str, ...]:
-    """The splits that the file of a task names.
+    """The splits that a task file names.
 
     Raises:
         UnknownName: there is no such file.
-        BadConfig: it is no YAML.
+        BadConfig: the file is not YAML.
     """
     return (ID, *(_head(name, tuple(search)).get("axes") or ()))
 
 
 @dataclass(frozen=True)
 class About:
-    """What the file of a task says of it in words; fields as in `samplers.task.Task`."""
+    """Description of a task in its file; fields as in `samplers.task.Task`."""
 
     name: str
+    """Name of the task."""
     code: str
+    """Number in the paper, such as T17."""
     category: str
+    """Category, P1 to P7 or M."""
     instruction: str
+    """Instruction for a policy."""
     embodiment: str
+    """Robot of the task, one of `sim.world.EMBODIMENTS`."""
     axes: tuple[str, ...]
+    """Names of its OOD axes."""
     paper_axes: tuple[str, ...]
-    """Those of them that are the paper's, see `paper_source`."""
+    """Names of those axes that are the paper's, see `paper_source`."""
 
 
 def about(name: str, search: Sequence[str] = ()) -> About:
-    """What the file of a task says of it. Whether that makes sense, shows when the task is loaded.
+    """Read the description of a task from its file. It is validated only when the task is loaded.
 
     Raises:
         UnknownName: there is no such file.
-        BadConfig: it is no YAML, or lacks something.
+        BadConfig: the file is not YAML, or lacks a key.
     """
     head = _head(name, tuple(search))
     words = {key: head.get(key) for key in ("code", "category", "instruction")}
@@ -132,28 +139,28 @@ def about(name: str, search: Sequence[str] = ()) -> About:
 
 
 def paper_source(name: str, category: str) -> str:
-    """The source of an axis that the paper's table of OOD conditions (App. I) has for a task."""
+    """Source of an axis that the paper's table of OOD conditions (App. I) has for a task."""
     return f"paper, App. I, {category} {name.replace('_', '-')}"
 
 
 def category(name: str) -> str:
-    """The category of a task, as its file names it."""
+    """Category of a task, from its file."""
     return str(_head(name).get("category"))
 
 
 def certified() -> dict[str, dict[str, dict[str, Any]]]:
-    """What certification came to when the tasks were measured: conf/certified.yaml.
+    """Certification rates measured for the tasks: conf/certified.yaml.
 
     Returns:
-        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] for each that was, and what
-        else the head of the file tells.
+        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] per certified scenario, and
+        the other columns that the head of the file lists.
     """
     found: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
     return found
 
 
 def _files(search: tuple[str, ...]) -> dict[str, Path]:
-    """The file of each task; of several with the same name the one that Hydra takes."""
+    """The file of each task. Among files of the same name, the one that Hydra uses."""
     named = [_plain(each) for text in search_path(search) for each in text.partition("=")[2].strip("[]").split(",")]
     offered = [folder.removeprefix("file://") for folder in packages()]
     folders = [conf_dir(), *(Path(folder) for folder in [*named, *offered] if folder)]
@@ -161,7 +168,7 @@ def _files(search: tuple[str, ...]) -> dict[str, Path]:
 
 
 def _plain(folder: str) -> str:
-    """A folder as a path, of which Hydra is told with its scheme; nothing if there is none."""
+    """Path of a folder that Hydra spells with a scheme; empty if the folder does not exist."""
     scheme, _, rest = folder.strip(" '\"").partition("://")
     if scheme != "pkg":
         return rest
@@ -171,7 +178,7 @@ def _plain(folder: str) -> str:
 
 @cache
 def _head(name: str, search: tuple[str, ...] = ()) -> Mapping[str, Any]:
-    """What a task file says, as it stands there."""
+    """Contents of a task file."""
     files = _files(search)
     if name not in files:
         raise UnknownName("task", name, files)
@@ -179,4 +186,4 @@ def _head(name: str, search: tuple[str, ...] = ()) -> Mapping[str, Any]:
         plain = yaml.load(files[name].read_text(), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
         return dict(plain)
     except (yaml.YAMLError, TypeError, ValueError) as error:
-        raise BadConfig(f"{files[name]} is no YAML: {' '.join(str(error).split())[:300]}; correct it") from None
+        raise BadConfig(f"{files[name]} is not YAML: {' '.join(str(error).split())[:300]}; correct it") from None

@@ -1,4 +1,4 @@
-"""Versions of what is installed, told without importing any of it."""
+"""Versions of installed packages, read without importing the packages."""
 
 import importlib.metadata
 import platform
@@ -7,6 +7,6 @@ from functools import cache
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of everything that the physics depends on."""
+    """Versions of every package that the physics depends on, and the platform."""
     packages = {p: importlib.metadata.version(p) for p in ("scengen", "mujoco", "robosuite", "numpy")}
     return {**packages, "platform": f"{platform.system()}-{platform.machine()}"}

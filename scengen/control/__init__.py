@@ -1,1 +1,1 @@
-"""The control loop, compiled: operational-space controller, teleoperation filter, MuJoCo called directly."""
+"""Control: the compiled loop that runs robosuite's controller, and the teleoperation filter before it."""

@@ -1,20 +1,26 @@
-"""The first compilation of the control loop takes seconds in which nothing else happens: people are told why."""
+"""Notice about the first compilation of the control loop, which takes some seconds without any other output."""
 
 import sys
 from functools import cache
 
 from numba.core import event
 
-TOLD = "scengen: compiling the control loop, once after an installation; it takes some seconds"
+NOTICE = "scengen: compiling the control loop, once after an installation; it takes some seconds"
+"""Text of the notice."""
 
 
 @cache
 def announce() -> None:
-    """Say on standard error, once, when the control loop is compiled from now on, and not read from numba's cache."""
+    """From now on, print a notice to standard error, once, when the control loop is compiled.
+
+    Nothing is printed if the loop is read from numba's cache.
+    """
     event.register("numba:compile", _Announcement())
 
 
 class _Announcement(event.Listener):
+    """Listener that prints the notice at the first compilation."""
+
     def __init__(self) -> None:
         self._told = False
 
@@ -22,7 +28,7 @@ class _Announcement(event.Listener):
         what = (event.data or {})["dispatcher"].py_func.__module__
         if not self._told and what.startswith(f"{__package__}."):
             self._told = True
-            print(TOLD, file=sys.stderr, flush=True)
+            print(NOTICE, file=sys.stderr, flush=True)
 
     def on_end(self, event: event.Event) -> None:
         pass

@@ -1,4 +1,4 @@
-"""The control loop of one or two Pandas with jaw or suction cup, compiled: actions in, physics and contacts out."""
+"""The compiled control loop of one or two Pandas with jaw or suction cup: actions in, physics and contacts out."""
 
 import hashlib
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from ..robots.panda import FINGERS, HOME, JOINTS
 from . import native, osc
 
 ACTION = 7
-"""Numbers in the action of one arm: translation (3), rotation vector (3), gripper, each in [-1, 1]. An action of the
+"""Length of the action of one arm: translation (3), rotation vector (3), gripper, each in [-1, 1]. An action of the
 robot holds them for each arm, one after the other."""
 
 SCENE = np.dtype(
@@ -33,11 +33,12 @@ SCENE = np.dtype(
         ("substeps", np.int64),
     ]
 )
-"""Addresses of the structs, of their fields (`native.Layout`), and physics steps in one control period."""
+"""Addresses of the structs and of their fields (`native.Layout`), and the number of physics steps in one control
+period."""
 
 
 def _sources() -> str:
-    """A digest of every file that goes into the compiled entry points."""
+    """Digest of every file that goes into the compiled entry points."""
     files = [str(module.__file__) for module in (osc, panda, native)]
     return hashlib.sha256(b"".join(Path(file).read_bytes() for file in [__file__, *files])).hexdigest()[:16]
 
@@ -50,33 +51,34 @@ ARM = np.dtype(
         (f"sources_{_sources()}", np.int64),
     ]
 )
-"""What the controller of one arm needs.
+"""Record of one arm's controller.
 
-The last field is never used. numba's disk cache looks at the types of the arguments and at the file of the
-entry point alone, and would take machine code of an older `osc` for the present one; its name forbids that.
+The last field is never used. numba's disk cache compares only the types of the arguments and the file of the entry
+point. It would take machine code of an older `osc` for the present one. The field's name prevents that.
 """
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
+"""Part of MuJoCo's state that the future depends on."""
 
 
 class Loop:
-    """The control loop of all arms over one (model, data): the robot of the model is found by its names.
+    """The control loop of all arms over one (model, data). It finds the robot of the model by its names.
 
-    After every call the poses in `data` (xpos, xquat, site_xpos ...) are those of the current qpos;
-    velocities, sensors and contacts in it are those of the last physics step, 2 ms before, as in robosuite.
-    It is safe to change `data` between two periods: each begins with a fresh mj_step1.
+    After every call, the poses in `data` (xpos, xquat, site_xpos ...) are those of the current qpos. Velocities,
+    sensors and contacts in it are those of the last physics step, 2 ms before, as in robosuite. `data` may be changed
+    between two periods, because each begins with a fresh mj_step1.
     """
 
     PERIOD = 0.01
     """Control period [s]: the paper's 100 Hz."""
 
     touched: NDArray[np.uint8]
-    """1 where two bodies were in contact (dist <= 0) at any physics step since the reset. Symmetric, shape
-    (nbody + arms + 1, nbody + arms + 1). After the rows and columns of the bodies comes one for each arm, which stands
-    for any body of it, mount and gripper included; the last one stands for any body of any arm. The robot may touch
-    itself: the fingertips of an empty closed jaw are in the last row."""
+    """Contact table: 1 where two bodies were in contact (dist <= 0) at any physics step since the reset. Symmetric,
+    shape (nbody + arms + 1, nbody + arms + 1). After the bodies comes one row and column for each arm, which stands for
+    any body of it, mount and gripper included. The last one stands for any body of any arm. Contacts of the robot with
+    itself count: the fingertips of an empty closed jaw are in the last row."""
     touching: NDArray[np.uint8]
-    """The same for the last control period alone."""
+    """Contact table of the last control period alone, in the form of `touched`."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, home: ArrayLike = HOME):
         """Take over `data` and reset it.
@@ -87,7 +89,7 @@ class Loop:
             home: joint angles of every arm after a reset [rad], shape (7,); or of each, shape (arms, 7).
 
         Raises:
-            ValueError: there is no arm in the model, or its options do not allow for control.
+            ValueError: the model has no arm, or its options do not allow control.
         """
         steps = self.PERIOD / model.opt.timestep
         self.substeps = round(steps)
@@ -101,7 +103,7 @@ class Loop:
         self.model, self.data = model, data
         names = panda.arms(model) or [panda.Names()]
         self.size = ACTION * len(names)
-        """Numbers in an action of the robot."""
+        """Length of an action of the robot."""
         given = np.array(home, dtype=np.float64)
         if given.shape not in ((JOINTS,), (len(names), JOINTS)):
             raise ValueError(f"home must be {JOINTS} joint angles of each arm, not an array of shape {given.shape}")
@@ -122,7 +124,10 @@ class Loop:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: `home`, jaw half open or suction off, nothing touched. The same bits as a fresh loop."""
+        """Return to the start: `home`, jaw half open or suction off, no contacts.
+
+        The bits equal those of a new loop.
+        """
         mujoco.mj_resetData(self.model, self.data)
         for arm, home, fingers in zip(self._arms, self.home, self._fingers, strict=True):
             self.data.qpos[arm["at"]["angle"]] = home
@@ -134,9 +139,9 @@ class Loop:
     def step(self, action: ArrayLike) -> int:
         """Simulate one control period under an action of shape (size,).
 
-        Returns the number of MuJoCo warnings since the reset; 0 is sound.
+        Returns the number of MuJoCo warnings since the reset; it is 0 for a sound simulation.
 
-        Warnings matter: MuJoCo silently starts an unstable simulation afresh, and only the warning remains.
+        Warnings matter: MuJoCo resets an unstable simulation silently, and only the warning shows it.
         """
         given = np.asarray(action, np.float32)
         if given.shape != (self.size,):
@@ -148,7 +153,7 @@ class Loop:
         return warnings
 
     def replay(self, actions: ArrayLike, ctrl_out: NDArray[np.float64] | None = None) -> int:
-        """Simulate one period per row of `actions`, shape (n, size): the same bits as n ticks, in one call.
+        """Simulate one period per row of `actions`, shape (n, size): the same bits as n calls of `step`, in one call.
 
         `ctrl_out`, shape (n * substeps, nu), receives the controls of every physics step.
         """
@@ -166,23 +171,23 @@ class Loop:
         return _replay(self._scene, self._arms, self._owner, self._tight, self._latches, actions, record)
 
     def watch(self, first: bool) -> None:
-        """Latch the contacts of a physics step that somebody else makes, between its mj_step1 and mj_step2.
+        """Record the contacts of a physics step that another simulator makes, between its mj_step1 and mj_step2.
 
-        A suction cup that is switched on but not sealed is switched off for this step, and a jammed gripper opened.
+        A suction cup that is switched on but not sealed is switched off for this step, and a jammed gripper is opened.
         `first`: whether the step begins a control period.
         """
         _watch(self._scene, self._arms, self._owner, self._tight, self._latches, first)
 
     def jam(self, arm: int, on: bool) -> None:
-        """Force the gripper of an arm open from the next physics step on, or leave it to its commands again.
+        """Force the gripper of an arm open from the next physics step on, or return it to its commands.
 
-        A jaw is driven to its open end, a suction cup shut off. The commands that come meanwhile are followed below:
-        what a jaw does afterwards is what it would do without the jam, from where it is.
+        A jaw is driven to its open end; a suction cup is shut off. Commands still advance the jaw's ramp meanwhile:
+        after the jam, the jaw does from its position what it would do without the jam.
         """
         self._arms[arm]["state"]["jammed"] = float(on)
 
     def state(self) -> NDArray[np.float64]:
-        """All that the future depends on, in one vector: integration state, controller, latches, warnings."""
+        """Everything that the future depends on: integration state, controllers, contact tables and warnings."""
         physics = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))
         mujoco.mj_getState(self.model, self.data, physics, INTEGRATION)
         parts = [physics, self._controllers().ravel(), np.packbits(self._latches), self._warnings()]
@@ -203,7 +208,7 @@ class Loop:
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, physics, INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
-        # Forward dynamics may leave its own mark on the warm start; the state has the last word.
+        # Forward dynamics may change the warm start, so the state is set again.
         mujoco.mj_setState(self.model, self.data, physics, INTEGRATION)
         self._arms["state"] = controllers.view(osc.STATE)
         bits = np.unpackbits(latches.astype(np.uint8), count=self._latches.size)
@@ -211,11 +216,11 @@ class Loop:
         warnings[:] = counts.astype(np.int32)
 
     def _controllers(self) -> NDArray[np.float64]:
-        """What the controllers remember, a row for each arm."""
+        """States of the controllers, one row per arm."""
         return np.ascontiguousarray(self._arms["state"]).view(np.float64).reshape(len(self._arms), -1)
 
     def _warnings(self) -> NDArray[np.int32]:
-        """MuJoCo's warning counters, one for each kind, not a copy."""
+        """MuJoCo's warning counters, one per kind, as a view."""
         return self.data.warning.number
 
 
@@ -230,7 +235,10 @@ def _fill_scene(scene: NDArray[np.void], model: mujoco.MjModel, data: mujoco.MjD
 
 
 def _owners(model: mujoco.MjModel, names: Sequence[panda.Names]) -> NDArray[np.int32]:
-    """Labels of every geom: its body, its arm, and the robot, the latter two `osc.NONE` in the scene; (ngeom, 3)."""
+    """Labels of every geom: its body, its arm and the robot; the latter two are `osc.NONE` in the scene.
+
+    Shape (ngeom, 3).
+    """
     labels = np.full((model.nbody, 3), osc.NONE)
     labels[:, 0] = np.arange(model.nbody)
     for number, name in enumerate(names):
@@ -239,7 +247,10 @@ def _owners(model: mujoco.MjModel, names: Sequence[panda.Names]) -> NDArray[np.i
 
 
 def _tight(model: mujoco.MjModel) -> NDArray[np.uint8]:
-    """1 for every geom on which the lip of a suction cup closes, 0 for those that are `suction.LEAKY`; (ngeom,)."""
+    """1 for every geom on which the lip of a suction cup closes, 0 for those that are `suction.LEAKY`.
+
+    Shape (ngeom,).
+    """
     if model.nuser_geom == 0:
         return np.ones(model.ngeom, np.uint8)
     return (model.geom_user[:, 0] != suction.LEAKY).astype(np.uint8)
@@ -247,7 +258,7 @@ def _tight(model: mujoco.MjModel) -> NDArray[np.uint8]:
 
 @njit(nogil=True, cache=True)
 def _step(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, action: NDArray) -> int:
-    """One control period; the number of warnings, or -1 and nothing done for an action that is not finite."""
+    """One control period. Returns the number of warnings, or -1, with nothing done, if the action is not finite."""
     for i in range(action.shape[0]):
         if not np.isfinite(action[i]):
             return -1
@@ -263,7 +274,7 @@ def _step(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latche
 def _replay(
     scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, actions: NDArray, record: NDArray
 ) -> int:
-    """One control period per row of `actions`, filling `record` with the controls unless it has no rows."""
+    """One control period per row of `actions`. Fills `record` with the controls unless it has no rows."""
     scene = scenes[0]
     ctrl = native.float64s(scene.ctrl, record.shape[1])
     for t in range(actions.shape[0]):
@@ -272,14 +283,14 @@ def _replay(
             _substep(scene, arms, owner, tight, latches, actions[t], k == 0)
             if record.shape[0] > 0:
                 record[t * scene.substeps + k] = ctrl
-        # Not needed for the physics, but the same bits as ticks under any integrator are promised.
+        # The physics does not need this. It makes the bits equal those of `step` under any integrator.
         native.kinematics(scene.model, scene.data)
     return native.warnings(scene.warning, scene.warning_stride, scene.warning_kinds)
 
 
 @njit(nogil=True, cache=True)
 def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, first: bool) -> None:
-    """What `_substep` does besides controlling the arms."""
+    """The work of `_substep` other than controlling the arms."""
     scene = scenes[0]
     if first:
         _begin(latches)
@@ -288,7 +299,7 @@ def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latch
         at = arms[i].at
         if at.cup == osc.NONE:
             osc.force_open(at, arms[i].state)
-        elif arms[i].state.jammed != 0.0 or _pads_in_contact(scene, tight, at.pad) < osc.SEAL:
+        elif arms[i].state.jammed != 0.0 or _pads_in_contact(scene, tight, at.pad) < osc.MIN_SEALED_PADS:
             native.float64s(at.ctrl + 8 * at.cup, 1)[0] = 0.0
 
 
@@ -296,7 +307,7 @@ def _watch(scenes: NDArray, arms: NDArray, owner: NDArray, tight: NDArray, latch
 def _substep(
     scene: np.record, arms: NDArray, owner: NDArray, tight: NDArray, latches: NDArray, action: NDArray, first: bool
 ) -> None:
-    """One physics step under control. The first of a period moves the goals, from the poses just computed."""
+    """One physics step under control. The first step of a period moves the goals, from the poses just computed."""
     native.step1(scene.model, scene.data)
     for i in range(arms.shape[0]):
         at, state, work = arms[i].at, arms[i].state, arms[i].work
@@ -313,13 +324,13 @@ def _substep(
 
 @njit
 def _begin(latches: NDArray) -> None:
-    """Forget the contacts of the last period."""
+    """Clear the contact table of the last period."""
     latches[1] = 0
 
 
 @njit
 def _latch(scene: np.record, owner: NDArray, latches: NDArray) -> None:
-    """Remember which bodies are in contact now. The array of contacts may move at every step."""
+    """Record the bodies in contact now. The array of contacts may move at every step."""
     count = native.int32s(scene.ncon, 1)[0]
     contact = native.int64s(scene.contact, 1)[0]
     for _ in range(count):
@@ -332,7 +343,7 @@ def _latch(scene: np.record, owner: NDArray, latches: NDArray) -> None:
 
 @njit
 def _pads_in_contact(scene: np.record, tight: NDArray, first: int) -> int:
-    """How many of the four geoms from `first` on touch something tight now."""
+    """Number of the four geoms from `first` on that touch a tight geom now."""
     count = native.int32s(scene.ncon, 1)[0]
     contact = native.int64s(scene.contact, 1)[0]
     seen = 0
@@ -348,7 +359,7 @@ def _pads_in_contact(scene: np.record, tight: NDArray, first: int) -> int:
 
 @njit
 def _mark(one: NDArray, other: NDArray, latches: NDArray) -> None:
-    """Latch the contact of two rows of `_owners`: every label of the one with every label of the other."""
+    """Record the contact of two rows of `_owners`: every label of one with every label of the other."""
     for a in one:
         for b in other:
             if a != osc.NONE and b != osc.NONE:

@@ -1,10 +1,9 @@
-"""libmujoco called from compiled code: the only module that knows raw addresses.
+"""libmujoco called from compiled code: the only module that handles raw addresses.
 
-numba resolves `mj_step1` and friends as plain external symbols, so that a whole control period runs without
-the interpreter and without its lock, and the result is cached on disk like any other compiled function. The
-price is that an address must stay valid: keep model and data alive, and take addresses anew for every new
-MjData. The arrays of mjData have fixed addresses, except what lives in its arena (contacts, constraints),
-which moves.
+numba resolves `mj_step1` and similar functions as plain external symbols, so that a whole control period runs without
+the interpreter and its lock, and the result is cached on disk like any other compiled function. The price is that
+addresses must stay valid: keep model and data alive, and take new addresses for every new MjData. The arrays of mjData
+have fixed addresses, except those in its arena (contacts, constraints), which move.
 """
 
 import ctypes
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 
 
 def _library() -> Path:
-    """The shared library that the bindings have already loaded."""
+    """Path of the shared library that the bindings have already loaded."""
     found = sorted(Path(mujoco.__file__).parent.glob("libmujoco.so*"))
     if not found:
         raise RuntimeError("mujoco has no libmujoco.so beside it; install its Linux wheel, mujoco==3.5.0")
@@ -33,7 +32,7 @@ def _library() -> Path:
 llvm.load_library_permanently(str(_library()))
 
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
-"""Two pointers passed as integers: the same registers in the C ABI of x86-64 and aarch64."""
+"""Signature of two pointers passed as integers: the same registers in the C ABI of x86-64 and aarch64."""
 step = ExternalFunction("mj_step", _MODEL_AND_DATA)
 step1 = ExternalFunction("mj_step1", _MODEL_AND_DATA)
 step2 = ExternalFunction("mj_step2", _MODEL_AND_DATA)
@@ -41,7 +40,7 @@ kinematics = ExternalFunction("mj_kinematics", _MODEL_AND_DATA)
 
 
 def _pointer_to(kind: types.Type) -> Callable:
-    """An intrinsic that turns an integer address into a pointer to `kind`."""
+    """Intrinsic that turns an integer address into a pointer to `kind`."""
 
     @intrinsic
     def cast(typingctx, address):
@@ -62,24 +61,24 @@ _int64_pointer = _pointer_to(types.int64)
 
 @njit
 def float64s(address, shape):
-    """The C-ordered float64 array of `shape` at `address`, not a copy."""
+    """View of the C-ordered float64 array of `shape` at `address`."""
     return carray(_float64_pointer(address), shape)
 
 
 @njit
 def int32s(address, shape):
-    """The C-ordered int32 array of `shape` at `address`, not a copy."""
+    """View of the C-ordered int32 array of `shape` at `address`."""
     return carray(_int32_pointer(address), shape)
 
 
 @njit
 def int64s(address, shape):
-    """The C-ordered int64 array of `shape` at `address`, not a copy."""
+    """View of the C-ordered int64 array of `shape` at `address`."""
     return carray(_int64_pointer(address), shape)
 
 
 class Layout(NamedTuple):
-    """Where compiled code finds contacts [bytes]."""
+    """Location of the contacts in memory, for compiled code [bytes]."""
 
     ncon: int
     """Offset in mjData of the number of contacts (int32)."""
@@ -95,10 +94,10 @@ class Layout(NamedTuple):
 
 @functools.cache
 def layout() -> Layout:
-    """The layout of this version of MuJoCo, found by experiment once per process.
+    """The memory layout of this version of MuJoCo, found by experiment once per process.
 
-    Two scenes with different numbers of contacts must agree. The number of contacts is the word that the
-    bindings follow when it is changed for a moment, the pointer the one that libmujoco follows.
+    Two scenes with different numbers of contacts must agree. The number of contacts is the word that the bindings
+    follow when it is changed for a moment; the pointer is the word that libmujoco follows.
     """
     first, second = _locate(*_sunken_balls(2)), _locate(*_sunken_balls(3))
     if first != second:
@@ -114,7 +113,7 @@ def warning_counts(data: mujoco.MjData) -> tuple[int, int, int]:
 
 @njit
 def warnings(address, stride, kinds):
-    """Total of the warnings raised since the last reset, with the values of `warning_counts`."""
+    """Total number of warnings since the last reset, from the values of `warning_counts`."""
     total = 0
     for kind in range(kinds):
         total += int32s(address + kind * stride, 1)[0]
@@ -122,18 +121,19 @@ def warnings(address, stride, kinds):
 
 
 def silence() -> None:
-    """Stop MuJoCo, process-wide, from printing warnings and writing MUJOCO_LOG.TXT; they stay counted."""
-    # The handler takes a C string and its result is ignored: strlen does that, and nothing else.
+    """Stop MuJoCo, process-wide, from printing warnings and writing MUJOCO_LOG.TXT. The warnings stay counted."""
+    # The handler takes a C string and its result is ignored: strlen fits and has no side effect.
     handler = ctypes.cast(ctypes.CDLL(None).strlen, ctypes.c_void_p)
     ctypes.c_void_p.in_dll(ctypes.CDLL(str(_library())), "mju_user_warning").value = handler.value
 
 
 def _unknown(detail: str) -> str:
+    """Message of the error for an unknown memory layout."""
     return f"no contacts found in mjData of mujoco {mujoco.__version__} ({detail}); install mujoco==3.5.0"
 
 
 def _sunken_balls(n: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A tiny world with n contacts of different depths: n balls pressed into a plane."""
+    """A small world with n contacts of different depths: n balls pressed into a plane."""
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
     for i in range(n):
@@ -150,7 +150,7 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
     """The layout seen in one MjData that has at least two contacts of different force."""
     dist, geom = data.contact.dist, data.contact.geom
     stride = dist.strides[0]
-    # The first contact may begin with any field; its `dist` lies less than one stride after the start.
+    # Which field a contact begins with is unknown. Its `dist` lies less than one stride after the start.
     near = dist.ctypes.data
     force = np.zeros(6)
 
@@ -173,7 +173,7 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
 
 
 def _words(data: mujoco.MjData, kind: np.dtype) -> NDArray:
-    """The struct mjData itself as an array of words, not a copy; its length is that of its allocation."""
+    """View of the struct mjData itself as an array of words, as long as its allocation."""
     usable = ctypes.CDLL(None).malloc_usable_size
     usable.argtypes, usable.restype = [ctypes.c_void_p], ctypes.c_size_t
     size = usable(data._address) // kind.itemsize * kind.itemsize

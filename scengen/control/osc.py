@@ -1,10 +1,9 @@
 """robosuite's OSC_POSE and PandaGripper as compiled functions over MuJoCo's own arrays.
 
-Operational space control (Khatib 1987) as configured by robosuite's default BASIC controller of the Panda
-(controllers/config/robots/default_panda.json): the action moves a goal pose relative to the pose reached so
-far, and joint torques pull the grip site to it. Once per control period `set_goal`, once per physics step
-`apply`, between mj_step1 and mj_step2. Formulas and their order follow robosuite, float32 rounding of the
-rotation included.
+Operational space control (Khatib 1987), configured as robosuite's default BASIC controller of the Panda
+(controllers/config/robots/default_panda.json): the action moves a goal pose relative to the current pose, and joint
+torques pull the grip site to it. `set_goal` runs once per control period, `apply` once per physics step, between
+mj_step1 and mj_step2. Formulas and their order follow robosuite, including the float32 rounding of the rotation.
 
 Symbols: J Jacobian of the grip site, M joint-space inertia, Lambda = (J M^-1 J^T)^-1 inertia at the site.
 """
@@ -24,21 +23,23 @@ STEP = 0.05
 TURN = 0.5
 """Rotation of the goal at full action [rad]: default_panda.json, output_max."""
 KP = 150.0
-"""Stiffness of the goal, of translation and rotation alike [1/s^2]: default_panda.json, kp."""
+"""Stiffness of the goal, for translation and rotation [1/s^2]: default_panda.json, kp."""
 KD = 2.0 * math.sqrt(KP)
-"""Damping of the same [1/s], critical: default_panda.json, damping_ratio 1."""
+"""Damping of the goal [1/s], critical: default_panda.json, damping_ratio 1."""
 POSTURE_KP = 10.0
 """Stiffness of the pull to the initial posture [1/s^2]: control_utils.nullspace_torques, joint_kp."""
 POSTURE_KD = 2.0 * math.sqrt(POSTURE_KP)
-"""Damping of the same [1/s], critical."""
+"""Damping of the pull to the initial posture [1/s], critical."""
 JAW_SPEED = 0.2
 """Change of the jaw command in one control period: PandaGripper.speed."""
-SEAL = 3
-"""Pads of a suction cup, of four, that must touch something before it pulls: with two it would hang on an edge."""
+MIN_SEALED_PADS = 3
+"""Number of a suction cup's four pads that must touch something before it pulls. With two it would hold on to an
+edge."""
 NONE = -1
-"""Stands for the index of what this robot does not have, jaw or suction cup."""
-FLOOR = 1e-18
-"""Pivots below this are raised to it, so that a singular posture gives finite torques, later clipped."""
+"""Index of a part that this robot does not have, jaw or suction cup."""
+MIN_PIVOT = 1e-18
+"""Smallest pivot. Smaller ones are raised to it, so that a singular posture gives finite torques, which are clipped
+later."""
 
 PLACES = np.dtype(
     [
@@ -62,10 +63,10 @@ PLACES = np.dtype(
         ("pad", np.int64),
     ]
 )
-"""Where things are. Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first
-arm joint on; qM whole; subtree_com of the robot; position and rotation of the grip site and of the
-controller's base site. Indices: joint angles in qpos, arm rows in qM, arm motors, jaw motors and suction cup in
-ctrl, first of the cup's four pads among the geoms."""
+"""Locations in memory. Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first arm
+joint on; qM whole; subtree_com of the robot; position and rotation of the grip site and of the controller's base site.
+Indices: joint angles in qpos, arm rows in qM, arm motors, jaw motors and suction cup in ctrl, first of the cup's four
+pads among the geoms."""
 
 STATE = np.dtype(
     [
@@ -76,8 +77,8 @@ STATE = np.dtype(
         ("posture", np.float64, (JOINTS,)),
     ]
 )
-"""What the controller remembers: goal in the base frame [m], jaw command in [-1, 1] or, in its first place, suction
-off (0) or on (1), whether the gripper is forced open (1) whatever is commanded, initial angles [rad]."""
+"""State of the controller: goal in the base frame [m], jaw command in [-1, 1] (or, in its first element, suction off
+(0) or on (1)), whether the gripper is forced open (1) whatever is commanded, initial angles [rad]."""
 
 WORK = np.dtype(
     [
@@ -97,13 +98,13 @@ WORK = np.dtype(
         ("world_rot", np.float64, (3, 3)),
     ]
 )
-"""Scratch of one control step; nothing in it outlives the step. A `root` is a lower Cholesky factor."""
+"""Scratch memory of one control step. Nothing in it outlives the step. A `root` is a lower Cholesky factor."""
 
 
 def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[np.void]:
     """Addresses and indices of the arm in one model and its data, `PLACES` of shape ().
 
-    Raises ValueError if the model has no Panda, or one whose arm is not a chain of its own on the ground.
+    Raises ValueError if the model has no Panda, or one whose arm is not a separate chain on the ground.
     """
     found = np.zeros((), PLACES)
     try:
@@ -140,16 +141,16 @@ def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[
 
 
 def start(state: NDArray[np.void], posture: ArrayLike) -> None:
-    """Put the controller's memory into the condition after a reset, with the initial joint angles [rad]."""
+    """Set the controller's state as after a reset, with the initial joint angles [rad]."""
     state["goal_pos"] = state["goal_rot"] = 0.0  # set by the first action, before its first use
-    state["jaw"] = 0.0  # PandaGripper.current_action: half open until told otherwise; a cup's suction is off
+    state["jaw"] = 0.0  # PandaGripper.current_action: half open until commanded; a cup's suction is off
     state["jammed"] = 0.0
     state["posture"] = posture
 
 
 @njit
 def set_goal(at: np.record, state: np.record, work: np.record, action: NDArray[np.float32]) -> None:
-    """Move goal and jaw by `action`, shape (7,), once per control period, relative to the pose reached."""
+    """Move goal and jaw by `action`, shape (7,), once per control period, relative to the current pose."""
     grip_pos, grip_rot = float64s(at.grip_pos, 3), float64s(at.grip_rot, (3, 3))
     base_pos, base_rot = float64s(at.base_pos, 3), float64s(at.base_rot, (3, 3))
     for i in range(3):
@@ -177,7 +178,7 @@ def set_goal(at: np.record, state: np.record, work: np.record, action: NDArray[n
 def apply(at: np.record, state: np.record, work: np.record) -> None:
     """Write torques and jaw commands of this physics step into ctrl, between mj_step1 and mj_step2.
 
-    A suction cup waits for `suck`, because it depends on the contacts.
+    A suction cup depends on the contacts and is left to `suck`.
     """
     _jacobian(at, work.J)
     _joint_inertia(at, work.M)
@@ -194,14 +195,14 @@ def apply(at: np.record, state: np.record, work: np.record) -> None:
 
 @njit
 def suck(at: np.record, state: np.record, touching: int) -> None:
-    """Write the suction of this physics step into ctrl: what is asked for, if `touching` pads close the lip."""
+    """Write the suction of this physics step into ctrl: the commanded one if `touching` pads close the lip, else 0."""
     pull = float64s(at.ctrl + 8 * at.cup, 1)
-    pull[0] = state.jaw[0] if touching >= SEAL and state.jammed == 0.0 else 0.0
+    pull[0] = state.jaw[0] if touching >= MIN_SEALED_PADS and state.jammed == 0.0 else 0.0
 
 
 @njit
 def force_open(at: np.record, state: np.record) -> None:
-    """Write into ctrl what opens a jammed jaw: the ends of the ranges that full opening stands for."""
+    """Write into ctrl the command that opens a jammed jaw: the ends of the ranges that correspond to full opening."""
     if state.jammed != 0.0:
         left, right = float64s(at.ctrlrange + 16 * at.jaw[0], 2), float64s(at.ctrlrange + 16 * at.jaw[1], 2)
         float64s(at.ctrl + 8 * at.jaw[0], 1)[0] = left[1]
@@ -212,7 +213,7 @@ def force_open(at: np.record, state: np.record) -> None:
 def _rotation(x: float, y: float, z: float, out: NDArray[np.float64]) -> None:
     """Rotation matrix, shape (3, 3), of a rotation vector [rad]: robosuite's axisangle2quat and quat2mat.
 
-    robosuite rounds the quaternion to float32 and multiplies it in float32; so does this.
+    Like robosuite, it rounds the quaternion to float32 and multiplies it in float32.
     """
     angle = math.sqrt(x * x + y * y + z * z)
     q = np.zeros(4, np.float32)
@@ -306,7 +307,7 @@ def _whiten(root: NDArray[np.float64], J: NDArray[np.float64], W: NDArray[np.flo
 
 @njit
 def _task_acceleration(at: np.record, state: np.record, work: np.record) -> None:
-    """Wanted acceleration of the grip site [m/s^2, rad/s^2], world, shape (6,): kp error - kd velocity."""
+    """Desired acceleration of the grip site [m/s^2, rad/s^2], world, shape (6,): kp error - kd velocity."""
     grip_pos, grip_rot = float64s(at.grip_pos, 3), float64s(at.grip_rot, (3, 3))
     base_pos, base_rot = float64s(at.base_pos, 3), float64s(at.base_rot, (3, 3))
     _multiply(base_rot, state.goal_rot, work.world_rot)
@@ -333,10 +334,9 @@ def _turn_error(actual: NDArray[np.float64], wanted: NDArray[np.float64], axis: 
 
 @njit
 def _posture_acceleration(at: np.record, state: np.record, work: np.record) -> None:
-    """Joint accelerations a back to the initial posture [rad/s^2], shape (7,), without effect on the grip
-    site.
+    """Joint accelerations a back to the initial posture [rad/s^2], shape (7,), without effect on the grip site.
 
-    N^T M a = M a - J^T Lambda J a (control_utils.nullspace_torques): Lambda J a is taken from the wrench.
+    N^T M a = M a - J^T Lambda J a (control_utils.nullspace_torques): Lambda J a is subtracted from the wrench.
     """
     qpos = float64s(at.qpos, at.angle[JOINTS - 1] + 1)
     velocity = float64s(at.qvel, JOINTS)
@@ -374,7 +374,7 @@ def _write_jaw(at: np.record, state: np.record) -> None:
 
 @njit
 def clip(value: float, low: float, high: float) -> float:
-    """`value`, or the bound it lies beyond."""
+    """`value`, or the bound that it exceeds."""
     return min(max(value, low), high)
 
 
@@ -409,7 +409,7 @@ def cholesky(A: NDArray[np.float64], root: NDArray[np.float64]) -> None:
             rest = A[i, j]
             for k in range(j):
                 rest -= root[i, k] * root[j, k]
-            root[i, j] = math.sqrt(max(rest, FLOOR)) if i == j else rest / root[j, j]
+            root[i, j] = math.sqrt(max(rest, MIN_PIVOT)) if i == j else rest / root[j, j]
 
 
 @njit

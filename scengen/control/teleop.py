@@ -1,4 +1,4 @@
-"""The paper's teleoperation filter: what stands between a plan, or a person, and the controller."""
+"""The paper's teleoperation filter, which acts between a plan, or a person, and the controller."""
 
 import numpy as np
 from numba import njit
@@ -9,25 +9,29 @@ from ..errors import UnknownName
 ALPHA = 0.8
 """Weight of the new value in the moving average: paper, appendix "Teleoperation hardware and protocol"."""
 LARGEST_CHANGE = 0.15
-"""Largest change of a channel in one control step, applied after the average: same place."""
+"""Largest change of a channel in one control period, applied after the average: same appendix."""
 MOTION = 6
-"""Channels of an arm that are filtered, translation and rotation; the gripper behind them passes through."""
+"""Number of filtered channels of an arm, translation and rotation. The gripper channel after them is not filtered."""
 
 
 class Filter:
-    """Exponential moving average of the six motion channels of each arm, then a limit on the change per step.
+    """Exponential moving average of the six motion channels of each arm, followed by a limit on the change per period.
 
-    Both look back at the same value, the previous filtered one, which is 0 after a reset. Inputs are clipped
-    to [-1, 1] first, so that outputs never leave it. One object filters one stream of actions.
+    Both refer to the same value, the previous filtered one, which is 0 after a reset. Inputs are clipped to [-1, 1]
+    first, so that outputs stay in that range. One object filters one stream of actions.
     """
 
     def __init__(self, arms: int = 1) -> None:
-        """`arms`: for how many an action holds seven numbers each."""
+        """Make a filter at rest.
+
+        Args:
+            arms: number of arms; an action holds seven numbers for each.
+        """
         self._state = np.zeros(MOTION * arms)
         self._input = np.zeros((MOTION + 1) * arms)
 
     def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
-        """The filtered action, shape (7 * arms,), float32: exactly what controller and witness get."""
+        """The filtered action, shape (7 * arms,), float32. Controller and witness get exactly this."""
         given = np.asarray(action, np.float64)
         if given.shape != self._input.shape:
             raise ValueError(f"an action has shape {self._input.shape}, not {given.shape}")
@@ -38,7 +42,7 @@ class Filter:
         return filtered
 
     def reset(self) -> None:
-        """Forget the past: the previous action is at rest."""
+        """Return to the state after a reset, in which the previous action is at rest."""
         self._state[:] = 0.0
 
     @property
@@ -48,6 +52,7 @@ class Filter:
 
     @state.setter
     def state(self, motion: ArrayLike) -> None:
+        """Previous filtered motion, shape (6 * arms,), a copy. Assign it to continue from there."""
         given = np.asarray(motion, np.float64)
         if given.shape != self._state.shape or not (np.abs(given) <= 1.0).all():
             raise ValueError(f"a filter's state is {len(self._state)} numbers in [-1, 1], not {given.tolist()}")
@@ -55,26 +60,30 @@ class Filter:
 
 
 TELEOP = "teleop"
-"""Name of the filter for environments, which otherwise pass actions on as they are.
+"""Name of the filter for environments, which by default pass actions on unfiltered.
 
-The paper's interface for policies is without it: the filter smooths what people and scripted solutions ask for, and the
-recorded actions that policies learn from are those behind it. Filtered a second time they would come out slower."""
+The paper's interface for policies has no filter. The filter smooths the commands of people and scripted solutions, and
+the recorded actions that policies learn from are its outputs. A second filter would slow them down.
+"""
 
 
 def check_filter(name: str | None) -> None:
-    """Raise `UnknownName` unless this is what environments know: `TELEOP`, or None for no filter."""
+    """Raise `UnknownName` unless `name` is a filter that environments accept: `TELEOP`, or None for no filter."""
     if name not in (None, TELEOP):
         raise UnknownName("action_filter", str(name), [TELEOP, "None"])
 
 
 def unfiltered(action: ArrayLike) -> NDArray[np.float32]:
-    """An action as the controller gets it without the filter: clipped to [-1, 1], nothing else."""
+    """An action as the controller gets it without the filter: clipped to [-1, 1]."""
     return np.clip(np.asarray(action, np.float32), -1.0, 1.0)
 
 
 @njit(nogil=True, cache=True)
 def _filter(state: NDArray[np.float64], action: NDArray[np.float64], out: NDArray[np.float32]) -> bool:
-    """Advance `state` by one action and write the result; False, and nothing done, if it is not finite."""
+    """Advance `state` by one action and write the result.
+
+    Return False, and do nothing, if the action is not finite.
+    """
     for i in range(len(action)):
         if not np.isfinite(action[i]):
             return False

@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.special import ndtr
 
 from ..errors import BadConfig, at_least
-from ..statistics import DRAWS
+from ..statistics import ORDERINGS
 
 EXPERIMENTS = 1000
 """Simulated experiments: a chance of 0.8 comes out within 3 points at 95 % confidence."""
@@ -97,7 +97,7 @@ class _Experiments:
 
     def __init__(self, analysis: PowerAnalysis):
         self.analysis = analysis
-        orderings = max(DRAWS, round(IN_TAIL / analysis.tail))
+        orderings = max(ORDERINGS, round(IN_TAIL / analysis.tail))
         count = min(EXPERIMENTS, LARGEST // analysis.seeds)
         random = np.random.default_rng(0)
         self.normal = random.standard_normal((2, count, analysis.seeds))

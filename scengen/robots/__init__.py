@@ -1,1 +1,1 @@
-"""Embodiments: the robot that is put into a scene, its controller, and the filter before the controller."""
+"""Robots: the Panda arm in robosuite's layout, its hands, and its inverse kinematics."""

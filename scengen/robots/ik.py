@@ -1,9 +1,10 @@
-"""How near the Panda's grip site can come to a place: inverse kinematics within joint limits, from fixed starts.
+"""Distance between the Panda's grip site and a target: inverse kinematics within joint limits, from fixed starts.
 
-A residual found here is attained by a posture, so it can only be too large, never too small: it proves reach, and
-suggests its absence. `shortfall` proves absence: it is too small everywhere, never too large. Where the two are close
-to each other nothing is left to doubt. Neither knows of collisions, gravity or torque: the arm may pass through the
-table and itself, so what is out of reach here is out of reach for good.
+A posture attains every residual that `reach` finds. The residual can therefore only be too large, never too small: it
+proves that a target is reachable, and only suggests that it is not. `shortfall` proves that a target is out of reach:
+it can only be too small, never too large. Where the two are close to each other, the answer is certain. Both ignore
+collisions, gravity and torque. The arm may pass through the table and itself, so a target that is out of reach here is
+out of reach in the simulation.
 """
 
 import functools
@@ -19,16 +20,16 @@ from ..geometry import between
 from . import panda
 
 GRIPPER_REACH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088 + 0.0545, 0.2127)
-"""No posture takes any point of the gripper farther than this from `panda.SHOULDER` [m].
+"""Distance from `panda.SHOULDER` that no posture exceeds for any point of the gripper [m].
 
-The first two stretches are those of `panda.REACH`; the third ends at the tip of an open finger, 0.0545 across the axis
+The first two stretches are those of `panda.REACH`. The third ends at the tip of an open finger, 0.0545 across the axis
 of joint 7 and 0.2127 along it, measured on the collision meshes.
 """
 LEVER = 0.1
-"""A turn of 1 rad counts as much as this distance [m]: about the length of the hand."""
-EXACT = 1e-6
-"""A posture this close to what is asked for ends the search [m]."""
-STARTS: NDArray[np.float64] = np.array(
+"""Distance that counts as much as a turn of 1 rad [m]: about the length of the hand."""
+SEARCH_TOLERANCE = 1e-6
+"""Residual at which the search ends [m]."""
+START_POSTURES: NDArray[np.float64] = np.array(
     [
         panda.HOME,
         [0.0, 0.9, 0.0, -0.6, 0.0, 1.5, 0.8],
@@ -40,24 +41,24 @@ STARTS: NDArray[np.float64] = np.array(
         [0.0, 1.2, 0.0, -0.6, 0.0, 3.0, 0.8],
     ]
 )
-"""Joint angles from which a search sets out [rad], shape (n, 7): home, leaning and stretched, wrist and elbow to
-either side, wrist up. Joint 1 is turned towards the target first."""
+"""Joint angles from which a search starts [rad], shape (n, 7): home, leaning and stretched, wrist and elbow to either
+side, wrist up. Joint 1 is turned towards the target first."""
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """The best posture of a search."""
+    """Best posture of a search."""
 
     angles: NDArray[np.float64]
     """Joint angles [rad], shape (7,)."""
     residual: float
-    """Distance left between grip site and target [m]."""
+    """Distance between grip site and target [m]."""
     turn: float
-    """Angle left between the hand and the asked orientation [rad]; 0 where any orientation will do."""
+    """Angle between the hand and the requested orientation [rad]; 0 if any orientation is accepted."""
 
     @property
-    def left(self) -> float:
-        """Both in one [m]: what a search makes small."""
+    def error(self) -> float:
+        """Combined residual of distance and angle [m], which the search minimizes."""
         return self.residual + LEVER * self.turn
 
 
@@ -66,26 +67,28 @@ def reach(target: ArrayLike, rot: NDArray[np.float64] | None = None) -> Nearest:
 
     Args:
         target: world position [m], shape (3,).
-        rot: orientation of the grip site, shape (3, 3); any orientation will do by default.
+        rot: orientation of the grip site, shape (3, 3); by default any orientation is accepted.
     """
     goal, best = np.asarray(target, float), None
-    for start in STARTS:
+    for start in START_POSTURES:
         found = _descend(goal, rot, start)
-        if best is None or found.left < best.left:
+        if best is None or found.error < best.error:
             best = found
-        if best.left < EXACT:
+        if best.error < SEARCH_TOLERANCE:
             break
     assert best is not None
     return best
 
 
 def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
-    """A distance [m] by which the robot misses `target` in every posture: the triangle inequality.
+    """Distance by which the robot misses `target` in every posture [m], by the triangle inequality.
 
-    Not positive where the bound says nothing. It ignores joint limits, and so is smaller than `reach` finds.
+    It is zero or negative where the bound proves nothing. It ignores joint limits, and is therefore smaller than the
+    residual of `reach`.
 
     Args:
-        length: `panda.REACH` to ask about the grip site, `GRIPPER_REACH` to ask about any point of the gripper [m].
+        target: world position [m], shape (3,).
+        length: `panda.REACH` for the grip site, `GRIPPER_REACH` for any point of the gripper [m].
     """
     return float(np.linalg.norm(np.asarray(target, float) - panda.SHOULDER)) - length
 
@@ -93,9 +96,11 @@ def shortfall(target: ArrayLike, length: float = panda.REACH) -> float:
 def box_shortfall(
     centre: NDArray[np.float64], rot: NDArray[np.float64], half: ArrayLike, length: float = panda.REACH
 ) -> float:
-    """`shortfall` of the point of a box that is nearest to the shoulder, and so of every point of it [m].
+    """`shortfall` of the point of a box that is nearest to the shoulder, and so of every point of the box [m].
 
     Args:
+        centre: middle of the box [m].
+        rot: orientation of the box.
         half: half its edges, shape (3,), or half the edge of a cube [m].
         length: as for `shortfall`.
     """
@@ -104,6 +109,7 @@ def box_shortfall(
 
 
 def _descend(goal: NDArray[np.float64], rot: NDArray[np.float64] | None, start: NDArray[np.float64]) -> Nearest:
+    """The best posture of one search."""
     arm = _arm()
     low, high = arm.limits
     angles = start.copy()
@@ -154,4 +160,5 @@ class _Arm:
 
 @functools.cache
 def _arm() -> _Arm:
+    """The bare arm, compiled once."""
     return _Arm()

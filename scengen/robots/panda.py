@@ -1,8 +1,7 @@
 """robosuite's Panda on its mount, composed with MjSpec from the files of the installed robosuite package.
 
-robosuite itself is never imported: that is slow and wants GL libraries. Names, masses, poses and everything
-that robosuite sets in Python instead of XML are the same as in its compiled environments; a test compares
-them all.
+robosuite itself is never imported: its import is slow and needs GL libraries. Names, masses, poses and everything that
+robosuite sets in Python instead of XML are the same as in its compiled environments. A test compares them all.
 """
 
 import functools
@@ -16,43 +15,43 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 JOINTS = 7
-"""Joints of the arm."""
+"""Number of joints of the arm."""
 
 HOME: NDArray[np.float64] = np.array([0, np.pi / 16, 0, -np.pi / 2 - np.pi / 3, 0, np.pi - 0.2, np.pi / 4])
-"""Joint angles after a reset [rad], shape (7,): robosuite Panda.init_qpos, without its noise."""
+"""Joint angles after a reset [rad], shape (7,): robosuite's Panda.init_qpos, without its noise."""
 WRIST_MIDDLE = math.pi / 4
-"""Yaw of a hand that points down in front of the robot, joint 7 in the middle of its range [rad]: after a reset the yaw
-is 0 and that joint at pi / 4, and it turns back as the yaw grows. 160 deg are left each way."""
+"""Yaw at which a hand that points down in front of the robot has joint 7 in the middle of its range [rad]. After a
+reset the yaw is 0 and that joint is at pi / 4. It turns back as the yaw grows; 160 deg remain each way."""
 FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
-"""Finger positions after a reset [m], shape (2,): robosuite PandaGripper.init_qpos."""
+"""Finger positions after a reset [m], shape (2,): robosuite's PandaGripper.init_qpos."""
 
 BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
 """Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), mounted."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
-"""Base orientation (wxyz): robosuite leaves a single arm, and two parallel ones, unturned, facing +x."""
+"""Base orientation (wxyz). robosuite leaves a single arm, and two parallel ones, unturned, facing +x."""
 ARM_OFFSET = 0.25
-"""How far to the right of `BASE` the first of two arms stands, and the second to the left [m]: the layout "parallel" of
-robosuite's two-arm environments."""
+"""Distance to the right of `BASE` at which the first of two arms stands, and to the left for the second [m]: the layout
+"parallel" of robosuite's two-arm environments."""
 MAX_ARMS = 2
-"""Arms of a robot, at most: robosuite has no layout for more."""
+"""Largest number of arms of a robot: robosuite has no layout for more."""
 CONTACT_FREE_LINKS = (("link0", "link1"), ("link2", "link4"), ("link3", "link5"))
-"""Links of an arm that lie so close that MuJoCo would look for contacts between their hulls at every step, though no
-posture within the joints' ranges, nor 0.3 rad beyond, makes them touch: contacts between them are left out, which
-changes no bit and saves some 5 % of a step."""
+"""Pairs of links of an arm whose contacts are left out. Their hulls are so close that MuJoCo would look for contacts at
+every step, but no posture within the joints' ranges, nor 0.3 rad beyond, makes them touch. Leaving them out changes no
+bit and saves some 5 % of a step."""
 MOUNT: NDArray[np.float64] = np.array([0.0, 0.0, 0.01])
 """Position of the mount in the base's frame [m], shape (3,): minus RethinkMount.top_offset."""
 
 ARMATURE = tuple(5.0 / (i + 1) for i in range(JOINTS))
-"""Rotor inertia of each joint [kg m^2]: robosuite RobotModel.__init__."""
+"""Rotor inertia of each joint [kg m^2]: robosuite's RobotModel.__init__."""
 FRICTIONLOSS = 0.1
-"""Dry friction of each joint [N m]: robosuite RobotModel.__init__."""
+"""Dry friction of each joint [N m]: robosuite's RobotModel.__init__."""
 DAMPING = (0.1, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01)
-"""Viscous friction of each joint [N m s/rad]: robosuite Panda.__init__."""
+"""Viscous friction of each joint [N m s/rad]: robosuite's Panda.__init__."""
 
 SHOULDER: NDArray[np.float64] = BASE + np.array([0.0, 0.0, 0.333])
 """World point about which the arm swings [m], shape (3,): joints 1 and 2 meet there (link1 in robot.xml)."""
 REACH = math.hypot(0.316, 0.0825) + math.hypot(0.0825, 0.384) + math.hypot(0.088, 0.1065 + 0.097)
-"""No posture takes the grip site farther than this from `SHOULDER` [m].
+"""Distance from `SHOULDER` that no posture exceeds for the grip site [m].
 
 Triangle inequality over three rigid stretches, with the link offsets of robot.xml and panda_gripper.xml.
 Turning joint 3, 5 or 7 moves nothing along its own axis, so each of these stretches has a fixed length:
@@ -61,30 +60,30 @@ Turning joint 3, 5 or 7 moves nothing along its own axis, so each of these stret
 * elbow to wrist (link6): 0.0825 across the axis of joint 5, then 0.384 along it;
 * wrist to grip site: 0.088 across the axis of joint 7, then 0.1065 (hand) + 0.097 (eef) along it.
 
-Joint limits are ignored, so the bound is not attained. It speaks of the grip site; the fingertips are 1 cm
-farther.
+Joint limits are ignored, so the bound is not attained. It holds for the grip site; the fingertips are 1 cm farther.
 """
 
 
 @dataclass(frozen=True)
 class Names:
-    """How robosuite names the parts of one robot and its hand."""
+    """robosuite's names for the parts of one robot and its hand."""
 
     number: int = 0
+    """Number of the arm, from 0."""
 
     @property
     def arm(self) -> str:
-        """What the name of every part of the arm begins with."""
+        """Prefix of the names of the arm's parts."""
         return f"robot{self.number}_"
 
     @property
     def hand(self) -> str:
-        """What the name of every part of the hand begins with."""
+        """Prefix of the names of the hand's parts."""
         return f"gripper{self.number}_right_"
 
     @property
     def mount(self) -> str:
-        """What the name of every part of the pedestal begins with."""
+        """Prefix of the names of the pedestal's parts."""
         return f"fixed_mount{self.number}_"
 
     @property
@@ -109,37 +108,37 @@ class Names:
 
     @property
     def base(self) -> str:
-        """The body that stands on the mount."""
+        """Body that stands on the mount."""
         return f"{self.arm}base"
 
     @property
     def controller_site(self) -> str:
-        """The site whose axes are the controller's."""
+        """Site whose axes are the controller's."""
         return f"{self.arm}right_center"
 
     @property
     def grip_site(self) -> str:
-        """The site that the controller moves: between the finger tips, or in the middle of a cup's lip."""
+        """Site that the controller moves: between the finger tips, or in the middle of a cup's lip."""
         return f"{self.hand}grip_site"
 
     @property
     def wrist_site(self) -> str:
-        """The site of the force and torque sensors."""
+        """Site of the force and torque sensors."""
         return f"{self.hand}ft_frame"
 
     @property
     def cup(self) -> str:
-        """The actuator of a suction cup."""
+        """Actuator of a suction cup."""
         return f"{self.hand}suction"
 
     @property
     def first_pad(self) -> str:
-        """The first of a suction cup's four pads."""
+        """First of a suction cup's four pads."""
         return f"{self.hand}pad0_collision"
 
 
 def bases(arms: int) -> NDArray[np.float64]:
-    """Base positions [m], shape (arms, 3), in the order of the arms: one in the middle, or two side by side."""
+    """Base positions in the order of the arms [m], shape (arms, 3): one in the middle, or two side by side."""
     sides = (0.0,) if arms == 1 else (-ARM_OFFSET, ARM_OFFSET)
     return BASE + np.array([[0.0, side, 0.0] for side in sides])
 
@@ -153,19 +152,19 @@ def attach(
 ) -> None:
     """Add an arm to `scene`, named and placed as in robosuite's table environments.
 
-    Args:
-        scene: what it is added to.
-        visual: with visual geometry.
-        hand: instead of the two-finger jaw, a spec with a body "right_gripper" (see `suction`).
-        number: of the arm, which its names tell; arms are added in the order of their numbers.
-        base: where it stands [m], see `bases`.
+    Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times faster. It
+    also lacks the wrist's force and torque sensors, which cost 4 % of a step and influence nothing. Sites and cameras
+    have no measurable cost and stay.
 
-    Without `visual` the robot is bare collision geometry: the same physics to the bit, compiled 20 times
-    faster. It then lacks the wrist's force and torque sensors too, which cost 4 % of a step and influence
-    nothing; sites and cameras cost nothing that can be measured, and stay.
+    Args:
+        scene: the scene that the arm is added to.
+        visual: add visual geometry.
+        hand: a spec with a body "right_gripper" that replaces the two-finger jaw (see `suction`).
+        number: number of the arm, which its names contain; arms are added in the order of their numbers.
+        base: position of the arm's base [m], see `bases`.
     """
     arm, mount, hand = _arm(visual).copy(), _mount(visual).copy(), (hand or _jaw(visual)).copy()
-    # Arm first: what is attached to it before it is in the scene gets its prefix too (robot0_gripper0_ ...).
+    # Arm first: a part that is attached to it earlier gets its prefix too (robot0_gripper0_ ...).
     place = scene.worldbody.add_frame(pos=np.asarray(base, float).tolist(), quat=BASE_QUAT.tolist())
     names = Names(number)
     place.attach_body(arm.body("base"), names.arm, "")
@@ -177,20 +176,20 @@ def attach(
 
 
 def arms(model: mujoco.MjModel) -> list[Names]:
-    """The arms in a model, in their order."""
+    """Names of the arms in a model, in their order."""
     every = (Names(number) for number in range(MAX_ARMS))
     return [names for names in every if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, names.base) >= 0]
 
 
 def fingers(model: mujoco.MjModel, names: Names) -> list[int]:
-    """Places of the finger joints in qpos; none for a hand without a jaw."""
+    """Indices of the finger joints in qpos; empty for a hand without a jaw."""
     found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names.finger_joints]
     return [int(model.jnt_qposadr[joint]) for joint in found if joint >= 0]
 
 
 @functools.cache
 def _arm(visual: bool) -> mujoco.MjSpec:
-    """The seven links, as robosuite's Python leaves them."""
+    """The seven links, as robosuite's Python code sets them."""
     arm = _load("robots/panda/robot.xml", visual)
     for i in range(JOINTS):
         joint = arm.joint(f"joint{i + 1}")
@@ -202,7 +201,7 @@ def _arm(visual: bool) -> mujoco.MjSpec:
 
 @functools.cache
 def _mount(visual: bool) -> mujoco.MjSpec:
-    """The pedestal below the arm; robosuite overwrites the position in the file by `MOUNT`."""
+    """The pedestal below the arm. robosuite overwrites the position in the file by `MOUNT`."""
     mount = _load("bases/rethink_mount.xml", visual)
     mount.body("base").pos = MOUNT
     return mount
@@ -219,7 +218,7 @@ def _jaw(visual: bool) -> mujoco.MjSpec:
 
 
 def _load(path: str, visual: bool) -> mujoco.MjSpec:
-    """Parse one of robosuite's asset files, in radians as all of them are included by robosuite."""
+    """Parse one of robosuite's asset files, in radians, because robosuite includes all of them in radians."""
     spec = mujoco.MjSpec.from_file(str(_assets() / path))
     spec.compiler.degree = False
     if not visual:
@@ -241,19 +240,24 @@ FOLDERS = {
     for names in map(Names, range(MAX_ARMS))
     for prefix, folder in ((names.hand, "grippers"), (names.mount, "bases"), (names.arm, "robots/panda"))
 }
-"""Where the meshes of each part lie in robosuite's asset folder, by the beginning of their names."""
+"""Folder of the meshes of each part inside robosuite's asset folder, by the prefix of their names."""
 
 
 def mesh_file(name: str, file: str) -> Path:
-    """Where one of the robot's meshes lies on this machine, from its name and the file that its MJCF gives."""
+    """Path of one of the robot's meshes on this machine.
+
+    Args:
+        name: name of the mesh.
+        file: the file that its MJCF names.
+    """
     folder = next(folder for prefix, folder in FOLDERS.items() if name.startswith(prefix))
     return _assets() / folder / file
 
 
 def strip_visual(spec: mujoco.MjSpec) -> None:
-    """Delete geoms that are only looked at (group 1, no collisions) and the assets that nothing uses then.
+    """Delete visual geoms (group 1, no collisions), and the assets that nothing uses afterwards.
 
-    Raises ValueError where such a geom gives its body inertia, because then the physics would change.
+    Raises ValueError if such a geom gives its body inertia, because then the physics would change.
     """
     for geom in list(spec.geoms):
         if geom.group == 1 and geom.contype == 0 and geom.conaffinity == 0:
@@ -272,7 +276,7 @@ def strip_visual(spec: mujoco.MjSpec) -> None:
 
 
 def _weighs(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
-    """Whether the compiler would count `geom` when it computes the inertia of its body."""
+    """Whether the compiler would count `geom` in the inertia of its body."""
     low, high = spec.compiler.inertiagrouprange
     inferred = geom.parent.name != "world" and not geom.parent.explicitinertial
     massless = geom.mass == 0 or (math.isnan(geom.mass) and geom.density == 0)

@@ -1,1 +1,1 @@
-"""Distributions, keyed random streams, and what leads from a task file to scenario number i."""
+"""Sampling: keyed random numbers, distributions, designs, OOD axes and task files."""

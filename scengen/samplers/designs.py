@@ -1,8 +1,8 @@
-"""Designs: where the numbers come from that distributions turn into values. All are keyed like `keyed.unit`.
+"""Designs: the sources of the numbers that distributions turn into values. All are keyed like `keyed.unit`.
 
-A design answers with a number in (0, 1) for each parameter of each index. Whichever it is, index 731 can be made alone,
-an axis moves what it names and nothing else, and another parameter or worker moves no number. A later try at an index,
-after an infeasible one, is independent of the first in every design: only first tries have a place in it.
+A design gives a number in (0, 1) for each parameter of each index. In every design, index 731 can be made alone, an
+axis moves only the parameters that it names, and another parameter or worker changes no number. A later try at an
+index, after an infeasible one, is independent of the first: only first tries belong to the design.
 """
 
 import math
@@ -19,22 +19,29 @@ from .dists import Choice, Dist, Fixed, Integer
 from .keyed import unit
 
 TRIES = 100
-"""Draws of one index before the distribution is called infeasible."""
+"""Number of draws of one index before the distribution is called infeasible."""
 
 
 @dataclass(frozen=True)
 class Independent:
-    """Every number by itself: the design that a statement about a whole distribution needs."""
+    """Independent numbers: the design for statements about a whole distribution."""
 
     key: str
     """Name of the task."""
     tries: ClassVar[int] = TRIES
-    """Draws of one index before it is called infeasible."""
+    """Number of draws of one index before it is called infeasible."""
     size: ClassVar[None] = None
-    """How many indices there are; None if there is no end."""
+    """Number of indices; None if there is no limit."""
 
     def number(self, name: str, seed: int, index: int, attempt: int) -> float:
-        """The number in (0, 1) for parameter `name` in try `attempt` at scenario `index`."""
+        """The number in (0, 1) for a parameter.
+
+        Args:
+            name: name of the parameter.
+            seed: seed of the run.
+            index: index of the scenario.
+            attempt: number of the try, from 0.
+        """
         return unit(self.key, name, seed, index, attempt)
 
 
@@ -42,17 +49,22 @@ class Independent:
 class Sobol:
     """A Sobol sequence, shifted by parameter and seed: even in all parameters together, best at 2^k indices.
 
-    A parameter's dimension is its place in the family, not among those that vary: to let one more vary moves no other.
-    With 8 of 40 parameters and 128 indices the discrepancy is a third of that of independent draws, instead of a sixth.
+    The dimension of a parameter is its place in the family, not among those that vary, so that one more varying
+    parameter changes no other. With 8 of 40 parameters and 128 indices the discrepancy is a third of that of
+    independent draws; with dimensions of the varying parameters alone it would be a sixth.
     """
 
     key: str
+    """Name of the task."""
     names: tuple[str, ...]
     """All parameters of the family, in its order."""
     tries: ClassVar[int] = TRIES
+    """Number of draws of one index before it is called infeasible."""
     size: ClassVar[None] = None
+    """Number of indices; None if there is no limit."""
 
     def number(self, name: str, seed: int, index: int, attempt: int) -> float:
+        """See `Independent.number`."""
         if attempt:
             return unit(self.key, name, seed, index, attempt)
         block, place = divmod(index, _BLOCK)
@@ -63,14 +75,19 @@ class Sobol:
 
 @dataclass(frozen=True)
 class Latin:
-    """Latin hypercubes of n indices, one after the other: in each, every n-th part of a range is met exactly once."""
+    """Latin hypercubes of n indices, one after the other. Each takes every n-th part of a range exactly once."""
 
     key: str
+    """Name of the task."""
     strata: int
+    """Number of indices in a hypercube, n."""
     tries: ClassVar[int] = TRIES
+    """Number of draws of one index before it is called infeasible."""
     size: ClassVar[None] = None
+    """Number of indices; None if there is no limit."""
 
     def number(self, name: str, seed: int, index: int, attempt: int) -> float:
+        """See `Independent.number`."""
         inside = unit(self.key, name, seed, index, attempt)
         if attempt:
             return inside
@@ -82,22 +99,27 @@ class Latin:
 class Grid:
     """Every combination of a few values of each parameter that varies in training, once, in a shuffled order.
 
-    An infeasible combination is not replaced by another. A parameter that only an axis lets vary takes its values in
-    turn. An axis that fixes a parameter which training varies makes equal scenarios of combinations that differ in it.
+    An infeasible combination is not replaced by another one. A parameter that varies only on an axis takes its values
+    in turn. If an axis fixes a parameter that varies in training, combinations that differ only in it give equal
+    scenarios.
     """
 
     key: str
+    """Name of the task."""
     sizes: Mapping[str, int]
     """Number of values of each parameter that varies in training."""
     values: int
-    """Number of values of any other."""
+    """Number of values of any other parameter."""
     tries: ClassVar[int] = 1
+    """Number of draws of one index before it is called infeasible."""
 
     @property
     def size(self) -> int:
+        """Number of indices: all combinations."""
         return math.prod(self.sizes.values())
 
     def number(self, name: str, seed: int, index: int, attempt: int) -> float:
+        """See `Independent.number`."""
         if index >= self.size:
             raise BadConfig(f"the grid of {self.key} has {self.size} points, numbered from 0; there is none at {index}")
         if name not in self.sizes:
@@ -111,14 +133,18 @@ class Grid:
 
 
 Design = Independent | Sobol | Latin | Grid
+"""Source of the numbers."""
 
 
 NUMBERED = ("lhs", "grid")
+"""Designs with a number in their spelling."""
 SOBOL = 128
-"""Points from which a Sobol set is one: below, pairs of parameters correlate, up to 0.95 at 32 and 0.76 at 50 points,
-and nothing can be told about one of them alone; Latin hypercubes stay below 0.5."""
+"""Number of points from which on a Sobol set is useful. Below it, pairs of parameters correlate, up to 0.95 at 32 and
+0.76 at 50 points, and the effect of one of them alone cannot be estimated. Latin hypercubes stay below 0.5."""
 KINDS = ("iid", "sobol", *NUMBERED)
+"""Names of the designs."""
 SPELLED = "iid, sobol, lhs:STRATA (such as lhs:50), grid:VALUES (such as grid:3)"
+"""Spellings of the designs, for error messages."""
 
 
 def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
@@ -130,7 +156,7 @@ def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
         training: the ID distribution of every parameter of the family, in its order.
 
     Raises:
-        BadConfig: it is none of these.
+        BadConfig: it is not a design.
     """
     kind, _, number = spelled.partition(":")
     count = int(number) if number.isdecimal() else 0
@@ -148,23 +174,25 @@ def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
 
 
 def _values(dist: Dist, count: int) -> int:
-    """How many values of a distribution a grid takes: all if they can be listed."""
+    """Number of values of a distribution on a grid: all of them if they can be listed."""
     if isinstance(dist, Choice):
         return len(dist.options)
     return dist.high - dist.low + 1 if isinstance(dist, Integer) else count
 
 
 _BLOCK = 1024
-"""Points of a Sobol sequence that are made at a time."""
+"""Number of points of a Sobol sequence that are made at a time."""
 
 
 @cache
 def _sobol(dimensions: int, block: int) -> NDArray[np.int64]:
-    """Points `block * _BLOCK` and following of the plain sequence as whole numbers of 53 bits, (_BLOCK, dimensions)."""
-    from scipy.stats import qmc  # whose import takes as long as all else that a command needs
+    """Points `block * _BLOCK` and following of the plain sequence, as whole numbers of 53 bits, shape (_BLOCK,
+    dimensions).
+    """
+    from scipy.stats import qmc  # its import takes as long as everything else that a command needs
 
     sequence = qmc.Sobol(dimensions, scramble=False, bits=30)
-    if block:  # scipy cannot go forward by nothing
+    if block:  # scipy cannot forward by 0
         sequence.fast_forward(block * _BLOCK)
     return (sequence.random(_BLOCK) * 2**53).astype(np.int64)
 
@@ -177,6 +205,9 @@ def _ranks(count: int, *key: str | int) -> Sequence[int]:
 
 @cache
 def _stride(size: int) -> int:
-    """A step round a circle of `size` places that meets all of them; near the golden section: a few are even."""
+    """A step round a circle of `size` places that visits all of them.
+
+    It is near the golden section, so that the first few places are spread evenly.
+    """
     start = max(1, round(size * (math.sqrt(5) - 1) / 2))
     return next(s for s in range(start, start + size + 1) if math.gcd(s, size) == 1)

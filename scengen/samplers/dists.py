@@ -1,4 +1,4 @@
-"""Distributions of one parameter. A closed set: to add one, add a class and a line in `KINDS`."""
+"""Distributions of one parameter. The set is closed: to add one, add a class and a line in `KINDS`."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,9 +11,10 @@ from .support import Interval, Support
 
 @dataclass(frozen=True)
 class Fixed:
-    """Always the same value."""
+    """A constant."""
 
     value: Value
+    """Its value."""
 
     def quantile(self, u: float) -> Value:
         """The value below which a share `u` of the draws lies."""
@@ -21,12 +22,14 @@ class Fixed:
 
     @property
     def support(self) -> Support:
+        """The value as a point."""
         return (Interval(self.value, self.value),)
 
 
 CLOSED = "[]"
+"""Ends of a range of which both belong to it."""
 ENDS = (CLOSED, "[)", "(]", "()")
-"""Which ends of a range belong to it: a square bracket is closed, a round one open."""
+"""Spellings of the ends of a range: a square bracket is closed, a round one open."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,14 @@ class Uniform:
     """Real numbers from low to high, equally likely."""
 
     low: float
+    """Lower end."""
     high: float
+    """Upper end."""
     ends: str = field(default=CLOSED, kw_only=True)
+    """Ends that belong to the range, one of `ENDS`."""
 
     def __post_init__(self) -> None:
-        _ordered(self.low, self.high, self.ends)
+        _check_ends(self.low, self.high, self.ends)
 
     def quantile(self, u: float) -> float:
         """The value below which a share `u` of the draws lies."""
@@ -46,19 +52,23 @@ class Uniform:
 
     @property
     def support(self) -> Support:
+        """The range as one interval."""
         return (Interval(self.low, self.high, self.ends[0] == "(", self.ends[1] == ")"),)
 
 
 @dataclass(frozen=True)
 class LogUniform:
-    """Positive real numbers from low to high, every factor equally likely."""
+    """Positive real numbers from low to high, uniform in their logarithm."""
 
     low: float
+    """Lower end."""
     high: float
+    """Upper end."""
     ends: str = field(default=CLOSED, kw_only=True)
+    """Ends that belong to the range, one of `ENDS`."""
 
     def __post_init__(self) -> None:
-        _ordered(self.low, self.high, self.ends)
+        _check_ends(self.low, self.high, self.ends)
         if self.low <= 0:
             raise ValueError("both ends must be positive")
 
@@ -68,6 +78,7 @@ class LogUniform:
 
     @property
     def support(self) -> Support:
+        """The range as one interval."""
         return (Interval(self.low, self.high, self.ends[0] == "(", self.ends[1] == ")"),)
 
 
@@ -76,10 +87,12 @@ class Integer:
     """Whole numbers low, low + 1, ..., high, equally likely."""
 
     low: int
+    """Smallest number."""
     high: int
+    """Largest number."""
 
     def __post_init__(self) -> None:
-        _ordered(self.low, self.high)
+        _check_ends(self.low, self.high)
         if not (isinstance(self.low, int) and isinstance(self.high, int)):
             raise ValueError("both ends must be whole numbers")
 
@@ -89,14 +102,16 @@ class Integer:
 
     @property
     def support(self) -> Support:
+        """The numbers as points."""
         return tuple(Interval(v, v) for v in range(self.low, self.high + 1))
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One of the listed values, equally likely; a value listed twice is twice as likely."""
+    """One of the listed values, equally likely. A value listed twice is twice as likely."""
 
     options: tuple[Value, ...]
+    """Values in the order of the task file."""
 
     def quantile(self, u: float) -> Value:
         """The option at share `u` of the list, in the order of the list."""
@@ -104,26 +119,30 @@ class Choice:
 
     @property
     def support(self) -> Support:
+        """The values as points."""
         return tuple(Interval(v, v) for v in sorted(set(self.options)))
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """One of several distributions, equally likely; one that is listed twice is twice as likely."""
+    """One of several distributions, equally likely. A distribution listed twice is twice as likely."""
 
     parts: tuple["Dist", ...]
+    """Distributions in the order of the task file."""
 
     def quantile(self, u: float) -> Value:
-        """The part at share `u` of the list, and the value at what remains of `u` in that part."""
+        """The value of the part at share `u` of the list, at the remaining share of `u` in that part."""
         place = u * len(self.parts)
         return self.parts[int(place)].quantile(place % 1.0)
 
     @property
     def support(self) -> Support:
+        """The supports of all parts."""
         return tuple(interval for part in self.parts for interval in part.support)
 
 
 Dist = Fixed | Uniform | LogUniform | Integer | Choice | Mixture
+"""Distribution of a parameter."""
 
 
 KINDS: dict[str, tuple[type[Dist], str]] = {
@@ -134,18 +153,18 @@ KINDS: dict[str, tuple[type[Dist], str]] = {
     "choice": (Choice, "value, value, ..."),
     "mixture": (Mixture, "distribution, distribution, ..."),
 }
-"""The spelling of each distribution in a task file, and its arguments."""
+"""Class and arguments of each distribution, by its spelling in a task file."""
 
 
 def parse(where: str, node: Any) -> Dist:
     """Read `[uniform, 0.1, 0.2]`, or a bare number for a constant, from a task file.
 
-    A third argument of a range, such as `"[)"`, says which of its ends belong to it; both do without it.
+    A third argument of a range, such as `"[)"`, says which of its ends belong to it. By default both do.
 
     Raises:
         BadConfig: the node is neither a number nor a list that names a distribution and its arguments.
     """
-    if _number(node):
+    if _is_number(node):
         return Fixed(node)
     spelled = "; ".join(f"[{k}, {args}]" for k, (_, args) in KINDS.items())
     if not (isinstance(node, list) and node and isinstance(node[0], str)):
@@ -158,7 +177,7 @@ def parse(where: str, node: Any) -> Dist:
         return Mixture(tuple(parse(f"{where}[{i}]", part) for i, part in enumerate(args, 1)))
     real = family in (Uniform, LogUniform)
     ends = args.pop() if real and len(args) == 3 and args[-1] in ENDS else CLOSED
-    if not (args and all(map(_number, args))):
+    if not (args and all(map(_is_number, args))):
         raise BadConfig(f"{where} = {node!r}; [{kind}, {expected}] takes finite numbers")
     try:
         if family is Choice:
@@ -169,11 +188,13 @@ def parse(where: str, node: Any) -> Dist:
         raise BadConfig(f"{where} = {node!r}; expected [{kind}, {expected}]: {why}") from None
 
 
-def _number(x: Any) -> bool:
+def _is_number(x: Any) -> bool:
+    """Whether a node is a finite number."""
     return isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x)
 
 
-def _ordered(low: float, high: float, ends: str = CLOSED) -> None:
+def _check_ends(low: float, high: float, ends: str = CLOSED) -> None:
+    """Raise unless the ends of a range are in order."""
     if low > high:
         raise ValueError("the low end lies above the high end")
     if low == high and ends != CLOSED:
@@ -181,7 +202,7 @@ def _ordered(low: float, high: float, ends: str = CLOSED) -> None:
 
 
 def _within(value: float, range_: Interval) -> float:
-    """The value, or the last one before an end that rounding has reached."""
+    """The value, or the last number before an open end that rounding has reached."""
     low = math.nextafter(range_.low, math.inf) if range_.open_low else range_.low
     high = math.nextafter(range_.high, -math.inf) if range_.open_high else range_.high
     return min(max(value, low), high)

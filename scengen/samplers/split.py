@@ -1,4 +1,7 @@
-"""Splits: where scenarios are drawn from. Spelled `id`, `wide_gaps`, `wide_gaps@3`, `diagonal+wide_gaps@3`."""
+"""Splits: the distributions that scenarios are drawn from.
+
+Spelled `id`, `wide_gaps`, `wide_gaps@3`, `diagonal+wide_gaps@3`.
+"""
 
 from dataclasses import dataclass
 from typing import Self
@@ -12,8 +15,9 @@ class Part:
     """One axis of a split."""
 
     axis: str
+    """Name of the axis."""
     severity: int | None = None
-    """Which of the axis' severities; None for the whole axis."""
+    """Severity of the axis; None for the whole axis."""
 
     def __str__(self) -> str:
         return self.axis if self.severity is None else f"{self.axis}@{self.severity}"
@@ -23,7 +27,7 @@ class Part:
         """Read `axis` or `axis@3`.
 
         Raises:
-            BadConfig: the severity is no whole number.
+            BadConfig: the severity is not a whole number.
         """
         axis, at, severity = text.partition("@")
         if at and not (severity.isascii() and severity.isdecimal()):
@@ -33,28 +37,30 @@ class Part:
 
 @dataclass(frozen=True)
 class Split:
-    """The axes along which scenarios leave training; without any, the training split itself."""
+    """The axes along which scenarios leave training. Without axes it is the training split itself."""
 
     parts: tuple[Part, ...] = ()
+    """Axes of the split with their severities."""
 
     def __str__(self) -> str:
         return "+".join(self.axes) or ID
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Every part as it is spelled."""
+        """Spelling of every part."""
         return tuple(map(str, self.parts))
 
     @property
     def is_training(self) -> bool:
+        """Whether this is the training split."""
         return not self.parts
 
     @classmethod
     def parse(cls, text: "str | Split") -> "Split":
-        """Read a split. Whether a task has such axes is for the task to say.
+        """Read a split. It does not check whether a task has such axes; the task does.
 
         Raises:
-            BadConfig: a severity is no whole number, or training is composed with an axis.
+            BadConfig: a severity is not a whole number, or training is composed with an axis.
         """
         if isinstance(text, Split):
             return text

@@ -1,4 +1,4 @@
-"""Supports of distributions as unions of intervals, and how far apart two of them are."""
+"""Supports of distributions as unions of intervals, and the distance between two of them."""
 
 import math
 from dataclasses import dataclass
@@ -6,26 +6,31 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """The numbers from low to high; a point when both ends agree. An open end does not belong to it."""
+    """The numbers from low to high; a point if both ends are equal. An open end does not belong to it."""
 
     low: float
+    """Lower end."""
     high: float
+    """Upper end."""
     open_low: bool = False
+    """Whether the lower end is excluded."""
     open_high: bool = False
+    """Whether the upper end is excluded."""
 
     def __contains__(self, value: float) -> bool:
         above = self.low < value if self.open_low else self.low <= value
         return above and (value < self.high if self.open_high else value <= self.high)
 
     def shifted(self, by: float) -> "Interval":
+        """The interval moved by `by`."""
         return Interval(self.low + by, self.high + by, self.open_low, self.open_high)
 
     def reflected(self, about: float) -> "Interval":
-        """Its mirror image about a value."""
+        """Mirror image about a value."""
         return Interval(2 * about - self.high, 2 * about - self.low, self.open_high, self.open_low)
 
     def distance(self, other: "Interval") -> float:
-        """Free space between two intervals; 0 when they touch or overlap, whether their ends are open or closed."""
+        """Distance between two intervals; 0 if they touch or overlap, whether their ends are open or closed."""
         return max(0.0, other.low - self.high, self.low - other.high)
 
     def meets(self, other: "Interval") -> bool:
@@ -39,16 +44,16 @@ class Interval:
 
 
 Support = tuple[Interval, ...]
-"""A non-empty union of intervals."""
+"""Non-empty union of intervals."""
 
 TOLERANCE = 1e-9
-"""Gaps smaller than this share of the largest end are rounding: 0.1 * 3 touches a range that ends at 0.3."""
+"""Share of the largest end below which a gap is rounding: 0.1 * 3 touches a range that ends at 0.3."""
 
 
 def distance(a: Support, b: Support, period: float | None = None) -> float:
     """Smallest distance between a value of `a` and a value of `b`, on a circle if there is a period.
 
-    The same from `b` to `a`, and 0 where it is no more than rounding (`TOLERANCE`).
+    It is symmetric, and 0 if it is no more than rounding (`TOLERANCE`).
     """
     there = min(x.distance(z) for x in a for y in b for z in turned(y, x, period))
     back = min(y.distance(z) for y in b for x in a for z in turned(x, y, period))
@@ -61,7 +66,7 @@ def meet(a: Support, b: Support, period: float | None = None) -> bool:
     """Whether some value belongs to both.
 
     Supports that do not meet may still touch: `[0, 1)` and `[1, 2]` share no value, but training comes arbitrarily
-    close to one, so that there is no gap to speak of.
+    close to one, so the gap is 0.
     """
     return any(x.meets(z) for x in a for y in b for z in turned(y, x, period))
 
@@ -79,7 +84,7 @@ def width(support: Support) -> float:
 
 
 def turned(interval: Interval, towards: Interval, period: float | None) -> list[Interval]:
-    """The interval, and with a period all its copies that can be nearest to another one."""
+    """The interval, or with a period all its copies that can be nearest to another interval."""
     if period is None:
         return [interval]
     first = math.floor((towards.low - interval.high) / period)

@@ -1,1 +1,1 @@
-"""Simulation: the compiled control loop over one model, and the only module that knows raw addresses."""
+"""Simulation: scenes as text, worlds that run them, and their memory."""

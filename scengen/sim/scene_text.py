@@ -6,7 +6,7 @@ import mujoco
 
 from ..errors import BadConfig
 
-COUNTED = (
+COUNTED_KINDS = (
     "bodies",
     "geoms",
     "joints",
@@ -20,14 +20,14 @@ COUNTED = (
     "excludes",
     "tendons",
 )
-"""Kinds of elements that must survive writing and reading."""
+"""Kinds of elements whose number must not change by writing and reading a scene."""
 
 
 def emit(spec: mujoco.MjSpec) -> tuple[str, dict[str, str]]:
-    """Write a scene as MJCF, and read it back.
+    """Write a scene as MJCF and read it back.
 
     Returns:
-        The text, and for each kind of element whose number changed on the way: "before -> after".
+        The text, and for each kind of element whose number changed: "before -> after".
 
     Raises:
         ValueError: MuJoCo cannot compile the scene.
@@ -36,7 +36,7 @@ def emit(spec: mujoco.MjSpec) -> tuple[str, dict[str, str]]:
     text = spec.to_xml()
     check(text)
     again = mujoco.MjSpec.from_string(text)
-    counts = {kind: (len(getattr(spec, kind)), len(getattr(again, kind))) for kind in COUNTED}
+    counts = {kind: (len(getattr(spec, kind)), len(getattr(again, kind))) for kind in COUNTED_KINDS}
     return text, {kind: f"{a} -> {b}" for kind, (a, b) in counts.items() if a != b}
 
 
@@ -44,14 +44,14 @@ def check(text: str) -> None:
     """Refuse a scene that could read files, load code or expand entities.
 
     Raises:
-        BadConfig: the text is no MJCF, or refers to something outside itself.
+        BadConfig: the text is not MJCF, or refers to something outside itself.
     """
     if "<!" in text.replace("<!--", ""):
         raise BadConfig("the scene declares a document type or entities; a scene is plain MJCF without them")
     try:
         root = ET.fromstring(text)
     except ET.ParseError as error:
-        raise BadConfig(f"the scene is no well-formed XML: {error}") from None
+        raise BadConfig(f"the scene is not well-formed XML: {error}") from None
     if root.tag != "mujoco":
         raise BadConfig(f"the scene's root element is <{root.tag}>; expected <mujoco>")
     for element in root.iter():

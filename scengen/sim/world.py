@@ -1,4 +1,4 @@
-"""World: a running simulation seen through names. SI units, world frame, wxyz quaternions."""
+"""A world: a running simulation accessed by names. SI units, world frame, wxyz quaternions."""
 
 import functools
 import hashlib
@@ -24,33 +24,37 @@ from . import scene_text
 from .memory import Memory
 
 ROBOT = "robot"
-"""Stands for any body of the robot in questions about contact, whichever arm."""
+"""Name that stands for any body of any arm in questions about contact."""
 IDLE: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0])
-"""No motion of an arm, gripper open: what doing nothing means from the start."""
+"""Action of one arm without motion and with the gripper open, as an arm gets it if nothing is commanded from the
+start."""
 
 
 JAW = "panda_jaw"
+"""Name of an arm with the two-finger jaw."""
 SUCTION = "panda_suction"
+"""Name of an arm with the suction cup."""
 HANDS: dict[str, Callable[[mujoco.MjSpec, bool, int, NDArray[np.float64]], None]] = {
     JAW: lambda scene, visual, number, base: panda.attach(scene, visual, None, number, base),
     SUCTION: suction.attach,
 }
-"""Arms by their hands, and how each is added to a scene: with or without visual geometry, its number, its place."""
+"""Functions that add an arm to a scene, by the name of its hand. Arguments: scene, visual geometry or not, number, base
+position [m]."""
 SCRIPTED = "scripted_"
-"""What the name of a hand begins with whose arm belongs to the scene: its events move it, and no action does."""
+"""Prefix of the name of a hand whose arm belongs to the scene: its events move the arm, and no action does."""
 EMBODIMENTS = (
     *("+".join(hands) for arms in range(1, MAX_ARMS + 1) for hands in product(HANDS, repeat=arms)),
     *(f"{driven}+{SCRIPTED}{partner}" for driven, partner in product(HANDS, repeat=MAX_ARMS)),
 )
-"""The robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one
-on the right. What is scripted comes last."""
+"""Robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one on
+the right. A scripted arm comes last."""
 
 
 def all_hands(embodiment: str) -> tuple[str, ...]:
-    """The hands of all arms in a scene with that robot, in their order, scripted ones included.
+    """The hands of all arms of an embodiment in their order, scripted ones included.
 
     Raises:
-        UnknownName: it is none of `EMBODIMENTS`.
+        UnknownName: the embodiment is not one of `EMBODIMENTS`.
     """
     if embodiment not in EMBODIMENTS:
         raise UnknownName("embodiment", embodiment, EMBODIMENTS)
@@ -58,23 +62,23 @@ def all_hands(embodiment: str) -> tuple[str, ...]:
 
 
 def hands(embodiment: str) -> tuple[str, ...]:
-    """The hands that actions drive, in the order of their arms: what a policy has.
+    """The hands that actions drive, in the order of their arms. A policy controls these.
 
     Raises:
-        UnknownName: it is none of `EMBODIMENTS`.
+        UnknownName: the embodiment is not one of `EMBODIMENTS`.
     """
     return all_hands(embodiment)[: len(all_hands(embodiment)) - embodiment.count(SCRIPTED)]
 
 
 def action_size(embodiment: str) -> int:
-    """Numbers in an action of a robot: seven for each arm that actions drive."""
+    """Length of an action of an embodiment: seven numbers for each arm that actions drive."""
     return ACTION * len(hands(embodiment))
 
 
 def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjSpec:
-    """The scene of a pool with its robot added; without visual geometry unless asked for.
+    """A scene from a pool with its robot added, by default without visual geometry.
 
-    The text is what counts: it is parsed anew, so that exactly the scene on disk is simulated.
+    The text is parsed anew, so that exactly the scene on disk is simulated.
     """
     scene_text.check(scene_xml)
     scene = mujoco.MjSpec.from_string(scene_xml)
@@ -87,16 +91,16 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
 
 
 class Arm:
-    """One arm of a world with its hand: what a move looks at, and steers."""
+    """One arm of a world with its hand: everything that a move reads and steers."""
 
     def __init__(self, world: "World", number: int):
         model, names = world.model, Names(number)
-        self.world: World = weakref.proxy(world)  # no circle: a world that nobody holds must free its memory at once
+        self.world: World = weakref.proxy(world)  # a cycle would delay freeing a world's memory
         self.number, self.data = number, world.data
         self.grip = -1.0
-        """The gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
+        """Gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
         self.told: NDArray[np.float64] = IDLE
-        """What a scripted arm does in the coming control period, shape (7,)."""
+        """Action of a scripted arm in the coming control period, shape (7,)."""
         joints = [model.joint(name) for name in names.joints]
         self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
         self._fingers = panda.fingers(model, names)
@@ -105,17 +109,17 @@ class Arm:
 
     @property
     def label(self) -> str:
-        """The arm in questions about contact: `robot0`, `robot1`."""
+        """Name of the arm in questions about contact: `robot0`, `robot1`."""
         return f"{ROBOT}{self.number}"
 
     @property
     def hand(self) -> Vec3:
-        """Position of the grip site, between the finger tips or in the middle of the suction cup's lip [m]."""
+        """Position of the grip site [m], between the finger tips or in the middle of the suction cup's lip."""
         return self.data.site_xpos[self._site].copy()
 
     @property
     def hand_rot(self) -> Mat3:
-        """Orientation of the grip site; its z axis points out of the hand."""
+        """Orientation of the grip site. Its z axis points out of the hand."""
         return self.data.site_xmat[self._site].reshape(3, 3).copy()
 
     @property
@@ -135,7 +139,7 @@ class Arm:
 
     @property
     def gap(self) -> float:
-        """Distance of the two pads of a jaw [m]: nothing but air where they touch nothing."""
+        """Distance between the two pads of a jaw [m]."""
         one, other = self.finger_pos
         return float(one - other) - OVERLAP
 
@@ -146,34 +150,35 @@ class Arm:
 
     @property
     def sealed(self) -> bool:
-        """Whether the suction cup pulled at the last physics step: switched on, with its lip closed."""
+        """Whether the suction cup pulled at the last physics step: it was switched on, and its lip was closed."""
         return bool(self.data.ctrl[self._cup] > 0.0)
 
     @property
     def idle(self) -> NDArray[np.float64]:
-        """The action without motion that keeps the gripper command, shape (7,)."""
+        """Action without motion that keeps the gripper command, shape (7,)."""
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.grip])
 
     def jam(self, on: bool) -> None:
-        """Force the gripper open, or switch the suction off, whatever is commanded, until it is told `jam(False)`.
+        """Force the gripper open, or switch the suction off, whatever is commanded, until `jam(False)` is called.
 
-        Acts in every physics step and belongs to the state.
+        The jam acts in every physics step and belongs to the state.
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
+            NoEvent: the caller is not a scenario's `events`.
         """
         self.world.check_event("jamming a gripper")
         self.world.loop.jam(self.number, on)
 
     def tell(self, action: ArrayLike) -> None:
-        """Say what a scripted arm does in the coming control period and no longer; else it stays where it is, open.
+        """Set the action of a scripted arm for the coming control period only. Without a call the arm stays in place,
+        open.
 
         Args:
-            action: seven numbers, for the controller as they are: no filter is in between.
+            action: seven numbers, which the controller gets unfiltered.
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
-            UnknownName: actions drive the arm.
+            NoEvent: the caller is not a scenario's `events`.
+            UnknownName: the arm is driven by actions.
         """
         if self not in self.world.partners:
             raise UnknownName("scripted arm", self.label, [arm.label for arm in self.world.partners])
@@ -182,10 +187,10 @@ class Arm:
         self.grip = float(self.told[-1])
 
     def wrench(self) -> NDArray[np.float64]:
-        """Force [N] and torque [N m] between hand and wrist, axes of the wrist's sensor frame, shape (6,).
+        """Force [N] and torque [N m] between hand and wrist in the axes of the wrist's sensor frame, shape (6,).
 
-        The same numbers as robosuite's force and torque sensors; computed on demand, since sensors in the model would
-        cost time in every step. A hand at rest reads what supports it: a force that points up.
+        The numbers equal those of robosuite's force and torque sensors. They are computed on demand, because sensors in
+        the model would cost time in every step. A hand at rest reads the force that supports it, which points up.
         """
         model, data = self.world.model, self.data
         mujoco.mj_rnePostConstraint(model, data)
@@ -196,9 +201,9 @@ class Arm:
         return np.concatenate([frame.T @ force, frame.T @ (moment - np.cross(lever, force))])
 
     def load(self) -> NDArray[np.float64]:
-        """Force [N] and torque about the grip site [N m] that support what the hand holds, world axes, shape (6,).
+        """Force [N] and torque about the grip site [N m] that support the held object, world axes, shape (6,).
 
-        By Newton's law this is what the wrist reads, less what gravity and its own motion take of the hand itself.
+        By Newton's law this is the wrist's reading minus the hand's own weight and inertial forces.
         """
         model, data = self.world.model, self.data
         mujoco.mj_rnePostConstraint(model, data)
@@ -229,25 +234,31 @@ class Arm:
 
     @functools.cached_property
     def _cup(self) -> int:
+        """Index of the suction cup's actuator."""
         return self.world.model.actuator(Names(self.number).cup).id
 
 
 @dataclass
 class World:
-    """Names -> numbers. Holds no task logic. Made by `World.load`, driven by `step`."""
+    """Simulation that maps names to numbers. It holds no task logic. `World.load` makes it, `step` drives it."""
 
     model: mujoco.MjModel
+    """Compiled model of the scene with the robot."""
     data: mujoco.MjData
+    """State of the simulation."""
     loop: Loop
+    """Control loop of all arms."""
     scripted: int = 0
-    """How many arms, the last ones, the scene's events move instead of actions."""
+    """Number of arms, counted from the last, that the scene's events move instead of actions."""
     filter: Filter = field(init=False)
+    """Teleoperation filter of the actions."""
     arms: tuple[Arm, ...] = field(init=False)
-    """The arms that actions drive; an action holds seven numbers for each, in this order."""
+    """Arms that actions drive. An action holds seven numbers for each, in this order."""
     partners: tuple[Arm, ...] = field(init=False)
-    """The arms that events move (`Arm.tell`)."""
+    """Arms that events move (`Arm.tell`)."""
     memory: Memory = field(init=False)
-    """What has happened in the episode, by the names that the scene was told to `remember`; all 0 at the start."""
+    """Numbers that record the episode's history, by the names that the scene was told to `remember`; all 0 at the
+    start."""
     _happening: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
@@ -262,10 +273,10 @@ class World:
         """Compile a scene text with the robot and put everything at its start.
 
         Args:
-            scene_xml: MJCF of the scene, robot not included.
+            scene_xml: MJCF of the scene, without the robot.
             embodiment: one of `EMBODIMENTS`.
-            visual: keep visual geometry, for rendering; the physics is the same, bit by bit.
-            substeps: physics steps in a control period of 10 ms, instead of the scene's own time step.
+            visual: keep visual geometry for rendering; the physics is the same bit by bit.
+            substeps: physics steps in a control period of 10 ms; by default the scene's own time step decides.
         """
         spec = compose(scene_xml, embodiment, visual)
         if substeps is not None:
@@ -277,7 +288,7 @@ class World:
         """A world at its start, around a compiled scene with robot.
 
         Args:
-            scripted: how many arms, the last ones, the scene's events move.
+            scripted: number of arms, counted from the last, that the scene's events move.
         """
         data = mujoco.MjData(model)
         world = cls(model, data, Loop(model, data), scripted)
@@ -285,7 +296,7 @@ class World:
         return world
 
     def reset(self) -> None:
-        """Back to the start; a used world then behaves bit by bit like a fresh one."""
+        """Return to the start. A used world then behaves bit by bit like a fresh one."""
         self.loop.reset()
         self.filter.reset()
         for arm in (*self.arms, *self.partners):
@@ -293,14 +304,14 @@ class World:
 
     @property
     def size(self) -> int:
-        """Numbers in an action."""
+        """Length of an action."""
         return ACTION * len(self.arms)
 
     def step(self, action: ArrayLike) -> NDArray[np.float32]:
         """Pass an action through the teleoperation filter and advance one control period (10 ms).
 
         Returns:
-            What the controller received, shape (7 * arms,).
+            The action that the controller received, shape (7 * arms,).
 
         Raises:
             Unstable: MuJoCo raised a warning.
@@ -310,10 +321,10 @@ class World:
         return filtered
 
     def apply(self, filtered: NDArray[np.float32]) -> None:
-        """Advance one control period under an action that has passed the filter already, shape (7 * arms,).
+        """Advance one control period under an action that has already passed the filter, shape (7 * arms,).
 
         Raises:
-            ValueError: the action has another shape, or is not finite.
+            ValueError: the action has another shape or is not finite.
             Unstable: MuJoCo raised a warning.
         """
         warnings = self.loop.step(self.joined(filtered))
@@ -322,7 +333,7 @@ class World:
             raise Unstable(f"MuJoCo raised a warning at t = {self.time:.3f} s: {', '.join(self.warnings)}")
 
     def joined(self, action: NDArray[np.floating]) -> NDArray[np.floating]:
-        """An action, shape (7 * arms,), and behind it what the partners do: what the controllers of all arms get."""
+        """An action, shape (7 * arms,), followed by the partners' actions: the input of the controllers of all arms."""
         if not self.partners:
             return action
         if np.shape(action) != (self.size,):
@@ -330,7 +341,7 @@ class World:
         return np.concatenate([action, *(arm.told for arm in self.partners)], dtype=np.float32)
 
     def command(self, action: NDArray[np.floating]) -> None:
-        """Remember the gripper commands of an action, shape (7 * arms,), that has been simulated, here or elsewhere."""
+        """Record the gripper commands of an action, shape (7 * arms,), that this or another simulator has simulated."""
         for arm in self.arms:
             arm.grip = float(action[ACTION * arm.number + ACTION - 1])
 
@@ -338,9 +349,9 @@ class World:
 
     @contextmanager
     def events(self) -> Iterator[None]:
-        """The moment before a control period in which a scenario's events happen; an `Episode` opens it.
+        """The moment before a control period in which a scenario's events happen. An `Episode` opens it.
 
-        Forces of the period that has passed (`force`) end with it, and so does what partners were told.
+        Forces (`force`) and partners' actions (`Arm.tell`) of the previous period end here.
         """
         self._happening = True
         self.data.xfrc_applied[:] = 0.0
@@ -352,22 +363,26 @@ class World:
             self._happening = False
 
     def check_event(self, what: str) -> None:
-        """Raise `NoEvent` unless events happen now. `what` names what is done."""
+        """Raise `NoEvent` unless events happen now.
+
+        Args:
+            what: the attempted change, for the error message.
+        """
         if not self._happening:
             raise NoEvent(what)
 
     def move(self, body: str, pos: ArrayLike, turn: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> None:
-        """Put a mocap body, such as a patch that marks the goal, elsewhere, from the coming control period on.
+        """Place a mocap body, such as a patch that marks the goal, elsewhere from the coming control period on.
 
-        It pushes nothing away: such bodies are for being looked at. Belongs to the state.
+        Such a body is visual only and pushes nothing away. Its place belongs to the state.
 
         Args:
-            pos: of its origin [m].
+            pos: position of its origin [m].
             turn: its orientation (wxyz).
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
-            UnknownName: there is no mocap body of that name.
+            NoEvent: the caller is not a scenario's `events`.
+            UnknownName: no mocap body has that name.
         """
         self.check_event(f"moving {body}")
         mocap = self.model.body_mocapid
@@ -377,19 +392,19 @@ class World:
         self.data.mocap_quat[mocap[self.body(body)]] = turn
 
     def passes(self, moment: float) -> bool:
-        """Whether the control period that begins now is the one in which `moment` [s] is due, to the nearest period."""
+        """Whether `moment` [s] falls into the control period that begins now, to the nearest period."""
         return abs(self.time - moment) < Loop.PERIOD / 2
 
     def launch(self, body: str, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Give a free body a velocity, as by a blow.
 
         Args:
-            linear: of its origin [m/s], world axes, shape (3,).
-            angular: of the body [rad/s], world axes, shape (3,).
+            linear: velocity of its origin [m/s], world axes, shape (3,).
+            angular: angular velocity of the body [rad/s], world axes, shape (3,).
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
-            UnknownName: there is no such free body.
+            NoEvent: the caller is not a scenario's `events`.
+            UnknownName: no free body has that name.
         """
         self.check_event(f"launching {body}")
         if body not in self.free_bodies:
@@ -399,24 +414,24 @@ class World:
         self.data.qvel[dof + 3 : dof + 6] = self.rot(body).T @ np.asarray(angular, float)
 
     def force(self, body: str, force: ArrayLike) -> None:
-        """Push a body at its centre of mass, for the coming control period and no longer: an impulse of force * 10 ms.
+        """Push a body at its centre of mass for the coming control period only: an impulse of force * 10 ms.
 
         Args:
             force: in world axes [N], shape (3,).
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
+            NoEvent: the caller is not a scenario's `events`.
         """
         self.check_event(f"pushing {body}")
         self.data.xfrc_applied[self.body(body), :3] = force
 
     def drive(self, joint: str, goal: float) -> None:
-        """Let a joint with a servo (`prop.servo`) go to `goal` [rad or m], from the coming control period on.
+        """Send a joint with a servo (`prop.servo`) to `goal` [rad or m] from the coming control period on.
 
         The goal belongs to the state; it is 0 at the start.
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
+            NoEvent: the caller is not a scenario's `events`.
             UnknownName: the joint has no servo.
         """
         self.check_event(f"driving {joint}")
@@ -426,38 +441,38 @@ class World:
         self.data.ctrl[servos[joint]] = goal
 
     def spin(self, joint: str, rate: float) -> None:
-        """Give a hinge a rate [rad/s].
+        """Set the rate of a hinge [rad/s].
 
         Raises:
-            NoEvent: called by anything but a scenario's `events`.
+            NoEvent: the caller is not a scenario's `events`.
         """
         self.check_event(f"spinning {joint}")
         self.data.qvel[self.model.joint(joint).dofadr[0]] = rate
 
-    # --- questions ------------------------------------------------------------------------
+    # --- queries --------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
-        """Seconds since the start."""
+        """Time since the start [s]."""
         return self.data.time
 
     @property
     def arm(self) -> Arm:
-        """The only arm of a world that has one."""
+        """The arm of a world with a single arm."""
         (arm,) = self.arms
         return arm
 
     @property
     def idle(self) -> NDArray[np.float64]:
-        """The action without motion that keeps all gripper commands, shape (7 * arms,)."""
+        """Action without motion that keeps all gripper commands, shape (7 * arms,)."""
         return np.concatenate([arm.idle for arm in self.arms])
 
     def pos(self, body: str) -> Vec3:
-        """Origin of a body [m]."""
+        """Position of a body's origin [m]."""
         return self.data.xpos[self.body(body)].copy()
 
     def com(self, body: str) -> Vec3:
-        """Centre of mass of a body [m]."""
+        """Position of a body's centre of mass [m]."""
         return self.data.xipos[self.body(body)].copy()
 
     def rot(self, body: str) -> Mat3:
@@ -482,48 +497,48 @@ class World:
     def touching(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step of the last control period.
 
-        A body may also be `ROBOT`, or the `label` of an arm.
+        `ROBOT` and the `label` of an arm are accepted in the place of a body.
         """
         return bool(self.loop.touching[self._label(a), self._label(b)])
 
     def touched(self, a: str, b: str) -> bool:
-        """Whether two bodies were in contact at any physics step since the start; names as for `touching`."""
+        """Whether two bodies were in contact at any physics step since the start. Names as for `touching`."""
         return bool(self.loop.touched[self._label(a), self._label(b)])
 
     def touching_bodies(self, body: str) -> set[str]:
-        """Names of the bodies that a body touched in the last control period; `ROBOT` stands for the robot's own."""
+        """Names of the bodies that touched a body in the last control period. `ROBOT` stands for the robot's bodies."""
         others = self.loop.touching[self._label(body)]
         scene = {self.model.body(int(i)).name for i in np.flatnonzero(others[: self.model.nbody]) if i not in self.own}
         return scene | {ROBOT} if others[-1] and body != ROBOT else scene
 
     @property
     def free_bodies(self) -> tuple[str, ...]:
-        """Names of all bodies that hang on a free joint."""
+        """Names of all bodies with a free joint."""
         return self._free
 
     @property
     def warnings(self) -> list[str]:
-        """Kinds of warnings that MuJoCo raised since the start."""
+        """Kinds of warnings that MuJoCo has raised since the start."""
         kinds = mujoco.mjtWarning
         return [kinds(i).name for i in range(kinds.mjNWARNING) if self.data.warning[i].number]
 
     def state(self) -> NDArray[np.float64]:
-        """Everything that the future depends on, in one vector."""
+        """Everything that the future depends on, as one vector."""
         return np.concatenate([self.loop.state(), self.filter.state, [arm.grip for arm in self.arms]])
 
     def restore(self, state: NDArray[np.float64]) -> None:
-        """Continue from `state()` of a world of the same scene, bit by bit."""
+        """Continue bit by bit from the `state()` of a world of the same scene."""
         loop, motion, grips = np.split(state, [-len(self.filter.state) - len(self.arms), -len(self.arms)])
         self.loop.restore(loop)
         self.filter.state = motion
         for arm, grip in zip(self.arms, grips, strict=True):
             arm.grip = float(grip)
         for arm in self.partners:
-            arm.grip, arm.told = -1.0, IDLE  # until the events of the coming period tell it again
+            arm.grip, arm.told = -1.0, IDLE  # the events of the coming period set it again
 
     @property
     def digest(self) -> str:
-        """Sixteen hex digits of the full physics state: equal digests mean bit-identical states."""
+        """Hash of the full physics state, sixteen hex digits: equal digests mean bit-identical states."""
         kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, state, kind)
@@ -539,24 +554,27 @@ class World:
 
     @functools.cached_property
     def _bodies(self) -> dict[str, int]:
+        """Indices of all bodies by name."""
         return {self.model.body(i).name: i for i in range(self.model.nbody)}
 
     @functools.cached_property
     def own(self) -> frozenset[int]:
-        """Indices of the bodies of the robot."""
+        """Indices of the robot's bodies."""
         roots = [self.model.body(names.base).id for names in panda.arms(self.model)]
         return frozenset(np.flatnonzero(np.isin(self.model.body_rootid, roots)).tolist())
 
     @functools.cached_property
     def _labels(self) -> dict[str, int]:
-        """Rows of the loop's table of contacts that stand for more than one body."""
+        """Rows of the loop's contact table that stand for more than one body."""
         names = [*(arm.label for arm in (*self.arms, *self.partners)), ROBOT]
         return {name: self.model.nbody + k for k, name in enumerate(names)}
 
     @functools.cached_property
     def _free(self) -> tuple[str, ...]:
+        """Names of all bodies with a free joint."""
         joints = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         return tuple(self.model.body(int(self.model.jnt_bodyid[j])).name for j in joints)
 
     def _label(self, name: str) -> int:
+        """Row of the loop's contact table for a name."""
         return self._labels[name] if name in self._labels else self.body(name)

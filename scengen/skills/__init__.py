@@ -1,1 +1,1 @@
-"""Moves that oracles and shortcuts are made of, one arm at a time."""
+"""Skills: moves that oracles and shortcuts are made of."""

@@ -1,4 +1,4 @@
-"""Take hold of a thing with a jaw that points down, however it lies: widths come from the shapes that collide."""
+"""Grasps of an object by a jaw that points down, in any pose of the object. Widths come from the collision shapes."""
 
 import math
 from dataclasses import dataclass
@@ -15,13 +15,12 @@ from ..sim.world import Arm, World
 from .jaw import pick
 from .motion import OPEN, go_to, hand_yaw
 
-WIDEST = 0.072
-"""Widest thing that is taken hold of [m]: of the 77 mm to which the fingers open, what a hand and a thing that are each
-2 mm out of place leave."""
-UNDER_THE_PALM = 0.003
-"""Air between the palm and the highest point of a tall thing [m]."""
-LEVEL = 0.7
-"""An axis of a shape is a direction to close along if so much of it is level."""
+MAX_WIDTH = 0.072
+"""Largest width of a grasp [m]: the fingers open to 77 mm, and hand and object may each be 2 mm out of place."""
+PALM_CLEARANCE = 0.003
+"""Clearance between the palm and the highest point of a tall object, and between finger tips and table [m]."""
+MIN_LEVEL_SHARE = 0.7
+"""Least horizontal share of a shape's axis for the axis to serve as a closing direction."""
 
 
 @dataclass(frozen=True)
@@ -29,53 +28,59 @@ class Grip:
     """A top-down grasp."""
 
     at: Vec3
-    """Where the grip site is to be [m]."""
+    """Position of the grip site [m]."""
     closing: Vec3
     """Level direction along which the fingers close."""
     width: float
-    """Of the thing along that [m]."""
+    """Width of the object along that direction [m]."""
 
 
 def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
-    """Take hold of a thing wherever and however it lies, and lift it. See `jaw.pick`.
+    """Grasp an object in whatever pose it lies, and lift it. See `jaw.pick`.
+
+    Args:
+        arm: the arm.
+        body: the object's body.
+        above: height from which the hand comes down [m].
+        lift: height by which the object is lifted [m].
 
     Raises:
-        GaveUp: it is too wide in every direction, or a move took too long.
+        GaveUp: the object is too wide in every direction, or a move took too long.
     """
     grip = best_grip(arm, body)
     if grip is None:
         raise GaveUp(f"{body} lies so that no jaw can take it")
-    yield from go_to(arm, grip.at + above * UP, grip=OPEN)  # there it is seen which way the wrist can turn
+    yield from go_to(arm, grip.at + above * UP, grip=OPEN)  # the wrist angle is chosen from there
     yield from pick(arm, grip.at, grip.closing, above=above, lift=lift)
 
 
 def best_grip(arm: Arm, body: str) -> Grip | None:
-    """The narrowest way to take hold of a thing as it lies now, of equal ones that which turns the hand least.
+    """The narrowest grasp of an object as it lies now; among equal ones the one that turns the hand least.
 
-    None if it is too wide in every direction.
+    None if the object is too wide in every direction.
     """
     found = grips(arm.world, body)
     return min(found, key=lambda grip: (round(grip.width, 3), abs(_turn(arm, grip.closing))), default=None)
 
 
 def grips(world: World, body: str) -> list[Grip]:
-    """Every way to take hold of a thing as it lies now, along and across its axes; none if it is too wide for all.
+    """All grasps of an object as it lies now, along and across its axes; empty if it is too wide for each of them.
 
-    Taken at the middle of its height, or as low as the palm allows.
+    Each is at the middle of the object's height, or as low as the palm allows.
     """
     low, high = extent(world, body, UP)
-    height = max((low + high) / 2, high - PALM_ABOVE + UNDER_THE_PALM, TABLE_TOP + TIP_BELOW + UNDER_THE_PALM)
+    height = max((low + high) / 2, high - PALM_ABOVE + PALM_CLEARANCE, TABLE_TOP + TIP_BELOW + PALM_CLEARANCE)
     found = []
     for closing in directions(world, body):
         beside = np.array([-closing[1], closing[0], 0.0])
         (near, far), (left, right) = extent(world, body, closing), extent(world, body, beside)
         at = (near + far) / 2 * closing + (left + right) / 2 * beside + height * UP
         found.append(Grip(at, closing, far - near))
-    return [grip for grip in found if grip.width <= WIDEST]
+    return [grip for grip in found if grip.width <= MAX_WIDTH]
 
 
 def extent(world: World, body: str, direction: Vec3) -> tuple[float, float]:
-    """Where a body begins and ends along a direction, a unit vector: its lowest and highest coordinate [m]."""
+    """Lowest and highest coordinate of a body along a direction, a unit vector [m]."""
     reaches = [_reach(world, geom, direction) for geom in _geoms(world, body)]
     return min(low for low, _ in reaches), max(high for _, high in reaches)
 
@@ -86,7 +91,7 @@ def directions(world: World, body: str) -> list[Vec3]:
     for geom in _geoms(world, body):
         for axis in world.data.geom_xmat[geom].reshape(3, 3).T:
             size = math.hypot(axis[0], axis[1])
-            if size < LEVEL:
+            if size < MIN_LEVEL_SHARE:
                 continue
             along = np.array([axis[0], axis[1], 0.0]) / size
             for one in (along, np.array([-along[1], along[0], 0.0])):
@@ -96,13 +101,14 @@ def directions(world: World, body: str) -> list[Vec3]:
 
 
 def _geoms(world: World, body: str) -> list[int]:
+    """Indices of a body's collision geoms."""
     model = world.model
     geoms = np.flatnonzero((model.geom_bodyid == world.body(body)) & (model.geom_contype > 0))
     return geoms.tolist()
 
 
 def _reach(world: World, geom: int, direction: Vec3) -> tuple[float, float]:
-    """As `extent`, of one geom."""
+    """Lowest and highest coordinate of a geom along a direction [m]."""
     model, data, kinds = world.model, world.data, mujoco.mjtGeom
     middle = float(data.geom_xpos[geom] @ direction)
     x, y, z = np.abs(data.geom_xmat[geom].reshape(3, 3).T @ direction)
@@ -123,11 +129,12 @@ def _reach(world: World, geom: int, direction: Vec3) -> tuple[float, float]:
 
 
 def _vertices(world: World, geom: int) -> slice:
+    """Rows of the vertices of a mesh geom in the model's table."""
     mesh = world.model.geom_dataid[geom]
     first = world.model.mesh_vertadr[mesh]
     return slice(first, first + world.model.mesh_vertnum[mesh])
 
 
 def _turn(arm: Arm, closing: Vec3) -> float:
-    """Least angle by which the hand turns to close along a direction [rad]."""
+    """Smallest angle by which the hand must turn to close along a direction [rad]."""
     return math.remainder(math.atan2(-closing[0], closing[1]) - hand_yaw(arm), math.pi)

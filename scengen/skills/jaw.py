@@ -27,20 +27,20 @@ from .motion import (
 Wrench = NDArray[np.float64]
 """Force [N] and torque [N m], shape (6,)."""
 
-SQUEEZE = 0.3
-"""How long the fingers need to close and to build up force [s]: enough, by `robots.jaw.time_to_grip` from the widest
-gap, for things 13 mm wide and wider. A thinner one takes as long as that function says, up to 0.51 s at 2 mm."""
-LET_GO = 0.15
-"""How long they need to let go of anything [s]: `robots.jaw.time_to_free` of the widest thing, 0.12 s, and latency."""
+GRASP_TIME = 0.3
+"""Time for the fingers to close and build up force [s]. By `robots.jaw.time_to_grip` from the widest gap it is enough
+for objects 13 mm wide and wider. A thinner one takes as long as that function says, up to 0.51 s at 2 mm."""
+RELEASE_TIME = 0.15
+"""Time for the fingers to release any object [s]: `robots.jaw.time_to_free` of the widest one, 0.12 s, and latency."""
 
 
-def grasp(arm: Arm, seconds: float = SQUEEZE) -> Plan:
-    """Close the jaw where the hand is."""
+def grasp(arm: Arm, seconds: float = GRASP_TIME) -> Plan:
+    """Close the jaw in place."""
     yield from hold(arm, seconds, CLOSED)
 
 
-def release(arm: Arm, seconds: float = LET_GO) -> Plan:
-    """Open the jaw where the hand is."""
+def release(arm: Arm, seconds: float = RELEASE_TIME) -> Plan:
+    """Open the jaw in place."""
     yield from hold(arm, seconds, OPEN)
 
 
@@ -50,18 +50,19 @@ def pick(
     closing: ArrayLike,
     above: float = 0.10,
     lift: float = 0.12,
-    squeeze: float = SQUEEZE,
+    squeeze: float = GRASP_TIME,
     pace: Pace = FINE,
 ) -> Plan:
-    """Come down on a thing from above with the open jaw, grasp it, lift it.
+    """Come down on an object from above with the open jaw, grasp it, lift it.
 
     Args:
-        at: where the grip site is to be [m].
-        closing: level direction along which the fingers close; of the two wrist turns it is the nearer one.
+        arm: the arm.
+        at: position of the grip site for the grasp [m].
+        closing: level direction along which the fingers close. The nearer one of the two wrist angles is used.
         above: height from which the hand comes down [m].
-        lift: how far it goes up again [m].
-        squeeze: how long the jaw closes [s].
-        pace: of the way down.
+        lift: height by which the object is lifted [m].
+        squeeze: time for which the jaw closes [s].
+        pace: pace of the way down.
     """
     target, rot = np.asarray(at, float), closing_along(arm, closing)
     yield from go_to(arm, target + above * UP, rot, COARSE, OPEN)
@@ -80,14 +81,17 @@ def put(
     speed: float = 0.04,
     near: float = 0.01,
 ) -> Plan:
-    """Bring a held body over a place, lower it until it touches `on`, and let go.
+    """Carry a held body over a place, lower it until it touches `on`, and release it.
 
     Args:
-        at: where the body's centre of mass is to be [m].
-        hover: height at which it is brought there [m].
+        arm: the arm.
+        body: the held body.
+        at: final position of the body's centre of mass [m].
+        on: the body that it is put on.
+        hover: height above `at` to which it is carried first [m].
         down: unit vector of the last stretch.
-        speed: of the last stretch [m/s].
-        near: how long the last stretch is [m].
+        speed: speed on the last stretch [m/s].
+        near: length of the last stretch [m].
     """
     target, last = np.asarray(at, float), np.asarray(down, float)
     yield from carry(arm, body, target + hover * UP, pace=COARSE)
@@ -99,12 +103,15 @@ def put(
 def carry(
     arm: Arm, body: str, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = FINE, ends: Condition = lambda: False
 ) -> Plan:
-    """Take a held body in a straight line to a pose, wherever it sits in the jaw.
+    """Move a held body in a straight line to a pose, wherever it sits in the jaw.
 
     Args:
-        pos: where its centre of mass is to be [m].
-        rot: its orientation there; as it is now by default.
-        ends: the plan is broken off when this holds.
+        arm: the arm.
+        body: the held body.
+        pos: final position of its centre of mass [m].
+        rot: its final orientation; by default the current one.
+        pace: pace of the hand.
+        ends: condition that stops the plan early.
     """
     world, target = arm.world, np.asarray(pos, float)
     turn = np.eye(3) if rot is None else rot @ world.rot(body).T
@@ -112,14 +119,16 @@ def carry(
 
 
 def weigh(arm: Arm, seconds: float = 0.3, settle: float = 0.1) -> Generator[Action, None, Wrench]:
-    """Hold still and feel the weight of what is in the hand.
+    """Hold still and measure the weight of the held object.
 
     Args:
-        seconds: over which the readings are averaged [s].
-        settle: how long before that the hand is held still [s].
+        arm: the arm.
+        seconds: time over which the readings are averaged [s].
+        settle: time for which the hand is held still before that [s].
 
     Returns:
-        `Arm.load`, averaged: force [N] and torque about the grip site [N m] that support it, world axes, shape (6,).
+        `Arm.load`, averaged: force [N] and torque about the grip site [N m] that support the object, world axes, shape
+        (6,).
     """
     yield from hold(arm, settle)
     readings: list[Wrench] = []
@@ -139,15 +148,17 @@ def poke(
     rot: Mat3 | None = None,
     pace: Pace = STEADY,
 ) -> Plan:
-    """Come down beside a thing with closed fingers, move against it until something happens, step back.
+    """Come down beside an object with closed fingers, move against it until a condition holds, step back.
 
     Args:
-        start: where the grip site begins to move [m].
-        velocity: of the poke, level or not [m/s].
-        above: height from which the hand comes down to `start` [m].
-        back: how far it goes back and up in the end [m].
-        rot: orientation of the hand; by default it points down with its fingers side by side across the motion.
-        pace: of the way down.
+        arm: the arm.
+        start: position at which the grip site starts to move [m].
+        velocity: velocity of the poke, level or not [m/s].
+        until: condition that ends the poke.
+        above: height above `start` from which the hand comes down [m].
+        back: distance by which the hand then moves back and up [m].
+        rot: orientation of the hand. By default it points down with its fingers side by side across the motion.
+        pace: pace of the way down.
     """
     at, along = np.asarray(start, float), velocity / np.linalg.norm(velocity)
     rot = closing_along(arm, [-along[1], along[0], 0.0]) if rot is None else rot

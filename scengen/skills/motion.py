@@ -1,8 +1,8 @@
 """Moves of one arm. Each yields actions, one per control period, until a condition on the world holds.
 
-A move steers the hand by feedback: the action asks for the velocity of a setpoint that runs along a straight
-line, plus a correction towards it. Positions in [m], speeds in [m/s], orientations as 3 x 3 matrices. A move takes
-the arm that it steers; `together` joins the moves of several.
+A move steers the hand by feedback: the action asks for the velocity of a setpoint that moves along a straight line,
+plus a correction towards it. Positions in [m], speeds in [m/s], orientations as 3 x 3 matrices. A move takes the arm
+that it steers; `together` joins the moves of several arms.
 """
 
 import math
@@ -21,61 +21,71 @@ from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.world import Arm, World
 
-OPEN, CLOSED = -1.0, 1.0
-"""Gripper commands: jaw open or suction off, jaw closed or suction on."""
+OPEN = -1.0
+"""Gripper command: jaw open, or suction off."""
+CLOSED = 1.0
+"""Gripper command: jaw closed, or suction on."""
 
 STEP = np.array([osc.STEP] * 3 + [osc.TURN] * 3)
-"""What an action of 1 asks for [m, rad]: robosuite's OSC_POSE output range."""
+"""Displacement of an action of 1 [m, rad], shape (6,): robosuite's OSC_POSE output range."""
 RATE = math.sqrt(osc.KP) / 2
-"""Velocity [m/s] that the controller settles at per metre of asked displacement: kp / kd = sqrt(kp) / 2."""
+"""Steady velocity of the controller [m/s] per metre of commanded displacement: kp / kd = sqrt(kp) / 2."""
 STIFFNESS = 1.5
-"""Share of the distance to the setpoint that is asked for as displacement; above 2.5 the hand starts to ring."""
-ALIGNED = 0.05
-"""Angle at which the hand has the orientation that was asked for [rad]."""
+"""Share of the distance to the setpoint that is commanded as displacement. Above 2.5 the hand starts to oscillate."""
+ANGLE_TOLERANCE = 0.05
+"""Angle from the target orientation within which the hand has reached it [rad]."""
 WRIST_SPARE = math.radians(10.0)
-"""How far joint 7 stays away from its limits when a hand may be turned either way [rad]."""
+"""Angle that joint 7 keeps from its limits when a hand may be turned either way [rad]."""
 
-INTEGRAL_RATE, MAX_CORRECTION, INTEGRAL_RANGE, INTEGRAL_ANGLE = 4.0, 0.012, 0.03, 0.2
-"""How fast the error of a hand that stays somewhere adds up [1/s], to how much at most along each axis [m], and how far
-from there [m] or turned from its orientation [rad] a hand is on its way still, so that nothing adds up."""
+INTEGRAL_RATE = 4.0
+"""Rate at which `stay` adds up the position error [1/s]."""
+MAX_CORRECTION = 0.012
+"""Largest sum of that error along each axis [m]."""
+INTEGRAL_RANGE = 0.03
+"""Distance from the target within which the error adds up [m]. A hand farther away is still on its way."""
+INTEGRAL_ANGLE = 0.2
+"""Angle from the target orientation within which the error adds up [rad]."""
 ROLL_SWITCH_ANGLE = math.radians(10.0)
-"""How far to the right a hand may look and still close as it does after a reset [rad]."""
+"""Angle to the right up to which a hand keeps the roll that it has after a reset [rad]. See `facing`."""
 
 Condition = Callable[[], bool]
+"""Condition on the world, such as the end of a move."""
 S = TypeVar("S")
+"""Scenario family of a decorated method."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast the hand goes, how exactly it must arrive, and when a move gives up."""
+    """Speed, accuracy and time limit of a move."""
 
     speed: float
-    """[m/s]"""
+    """Largest speed of the hand [m/s]."""
     within: float
-    """Distance from the target at which it has arrived [m]."""
+    """Distance from the target at which the hand has arrived [m]."""
     give_up: float = 6.0
-    """[s]"""
+    """Time after which the move gives up [s]."""
 
 
 COARSE = Pace(0.30, 0.02)
-"""Transit through free space, as fast as an action of 1 goes."""
+"""Pace of transit through free space, as fast as an action of 1."""
 STEADY = Pace(0.25, 0.005)
-"""To a place beside things."""
+"""Pace of a move to a place beside objects."""
 FINE = Pace(0.15, 0.003)
-"""Up to a thing that is to be grasped, put down or touched."""
+"""Pace of a move up to an object that is to be grasped, put down or touched."""
 
 
 def facing_down(yaw: float = 0.0) -> Mat3:
-    """Orientation of a hand that points down; at `yaw` = 0 [rad], as after a reset, the fingers close along y."""
+    """Orientation of a hand that points down. At `yaw` = 0 [rad] the fingers close along y, as after a reset."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([[-s, c, 0.0], [c, s, 0.0], [0.0, 0.0, -1.0]])
 
 
 def facing(azimuth: float, tilt: float) -> Mat3:
-    """Orientation of a hand that looks along `azimuth`, `tilt` below the level [rad], and whose fingers close level.
+    """Orientation of a hand that looks along `azimuth`, `tilt` below the horizontal [rad], and whose fingers close
+    level.
 
-    Of the two rolls it is the one with which a hand gets there from above the table: with the other one, joint 6 or 7
-    ends on the way.
+    Two rolls are possible. This is the one that a hand can reach from above the table: with the other one, joint 6 or 7
+    reaches its limit on the way.
     """
     out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     closing = np.array([-out[1], out[0], 0.0]) * (1.0 if azimuth > -ROLL_SWITCH_ANGLE else -1.0)
@@ -84,7 +94,7 @@ def facing(azimuth: float, tilt: float) -> Mat3:
 
 
 def hand_yaw(arm: Arm) -> float:
-    """The `yaw` of `facing_down` for a hand that points about down [rad]."""
+    """Yaw of a hand that points approximately down, as for `facing_down` [rad]."""
     x = arm.hand_rot[:, 0]
     return math.atan2(-x[0], x[1])
 
@@ -92,7 +102,7 @@ def hand_yaw(arm: Arm) -> float:
 def closing_along(arm: Arm, direction: ArrayLike) -> Mat3:
     """Orientation of a hand that points down and whose fingers close along a level direction.
 
-    Two wrist turns look alike. It is the nearer one, unless it would take joint 7 to its limit.
+    Two wrist angles fit. The nearer one is chosen unless it would take joint 7 to its limit.
     """
     along = np.asarray(direction, float)
     turn = math.remainder(math.atan2(-along[0], along[1]) - hand_yaw(arm), math.pi)
@@ -102,29 +112,36 @@ def closing_along(arm: Arm, direction: ArrayLike) -> Mat3:
 
 
 def can_turn(arm: Arm, angle: float, spare: float = WRIST_SPARE) -> bool:
-    """Whether a hand that points about down may turn by `angle` [rad] on the spot.
+    """Whether a hand that points approximately down can turn by `angle` [rad] on the spot.
 
     Args:
-        spare: how far joint 7 must stay away from its limits [rad].
+        angle: the turn [rad].
+        spare: angle that joint 7 must keep from its limits [rad].
     """
     low, high = arm.wrist_range
     return low + spare < arm.joint_pos[6] - angle < high - spare
 
 
 def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY, grip: float | None = None) -> Plan:
-    """Take the hand in a straight line to `pos`, turning it to `rot` (default: as it is now).
+    """Move the hand in a straight line to `pos` and turn it to `rot`.
 
-    Ends when the hand has arrived and is within `ALIGNED` of the orientation.
+    It ends when the hand has arrived within the pace's distance and within `ANGLE_TOLERANCE`.
+
+    Args:
+        pos: target of the grip site [m].
+        rot: target orientation; by default the current one.
+        pace: speed, accuracy and time limit.
+        grip: gripper command; by default the last one.
 
     Raises:
-        GaveUp: that took too long.
+        GaveUp: the move took too long.
     """
     world, goal, setpoint = arm.world, np.asarray(pos, float), arm.hand
     end, rot = world.time + pace.give_up, arm.hand_rot if rot is None else rot
     while True:
         left = goal - arm.hand
         turn = between(arm.hand_rot, rot)
-        if math.sqrt(left @ left) < pace.within and math.sqrt(turn @ turn) < ALIGNED:
+        if math.sqrt(left @ left) < pace.within and math.sqrt(turn @ turn) < ANGLE_TOLERANCE:
             return
         if world.time > end:
             short = f"{1000 * math.sqrt(left @ left):.0f} mm and {math.degrees(math.sqrt(turn @ turn)):.0f} deg short"
@@ -138,9 +155,9 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
 
 
 def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STEADY, grip: float | None = None) -> Plan:
-    """Take the hand to `pos` as `go_to` does, and keep it there until something happens, however far it has come.
+    """Move the hand to `pos` as `go_to` does, and keep it there until a condition holds, whether it has arrived or not.
 
-    Near the end what is left of the way adds up, against the friction of the joints: without that a hand far from where
+    Near the target the remaining error adds up, against the friction of the joints. Without that, a hand far from where
     it started stays a centimetre off.
     """
     goal, setpoint, more = np.asarray(pos, float), arm.hand, np.zeros(3)
@@ -156,10 +173,10 @@ def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STE
 
 
 def push(arm: Arm, velocity: ArrayLike, until: Condition, grip: float | None = None, give_up: float = 3.0) -> Plan:
-    """Move at a constant `velocity`, orientation held, until something happens.
+    """Move at a constant `velocity` [m/s] with constant orientation until a condition holds.
 
     Raises:
-        GaveUp: it did not happen within `give_up` [s].
+        GaveUp: it did not hold within `give_up` [s].
     """
     world, along, setpoint, rot = arm.world, np.asarray(velocity, float), arm.hand, arm.hand_rot
     end = world.time + give_up
@@ -179,12 +196,20 @@ def turn_to(
     within: float = 0.03,
     give_up: float = 6.0,
 ) -> Plan:
-    """Turn the hand on the spot to `rot` at an even `rate` [rad/s], until it is there or something happens.
+    """Turn the hand on the spot to `rot`, until it is there or a condition holds.
 
-    Turns the shorter way; ends within `within` [rad].
+    The hand turns the shorter way.
+
+    Args:
+        rot: target orientation.
+        rate: constant rate of the turn [rad/s].
+        until: condition that ends the move early.
+        grip: gripper command; by default the last one.
+        within: angle at which the hand has arrived [rad].
+        give_up: time limit [s].
 
     Raises:
-        GaveUp: it was not there within `give_up` [s].
+        GaveUp: the hand was not there within `give_up` [s].
     """
     world, here, start = arm.world, arm.hand, arm.hand_rot
     end, way, turned = world.time + give_up, between(start, rot), 0.0
@@ -201,23 +226,23 @@ def turn_to(
 
 
 def turn_about_vertical(arm: Arm, angle: float, rate: float = 2.0) -> Plan:
-    """Turn the hand about the vertical by up to a full turn [rad], the way that the sign says."""
+    """Turn the hand about the vertical by up to a full turn [rad], in the direction of the sign."""
     for _ in range(2):  # each half is the shorter way
         yield from turn_to(arm, about_z(angle / 2) @ arm.hand_rot, rate)
 
 
 def hold(arm: Arm, seconds: float, grip: float | None = None) -> Plan:
-    """Keep the hand where it is, against whatever pulls at it."""
+    """Hold the hand in place against external forces."""
     end, here, rot = arm.world.time + seconds, arm.hand, arm.hand_rot
     while arm.world.time < end:
         yield steer(arm, here, np.zeros(3), between(arm.hand_rot, rot), grip)
 
 
 def wait(arm: Arm, until: Condition, give_up: float) -> Plan:
-    """Ask for nothing until something happens.
+    """Send actions without motion until a condition holds.
 
     Raises:
-        GaveUp: it did not happen within `give_up` [s].
+        GaveUp: it did not hold within `give_up` [s].
     """
     end = arm.world.time + give_up
     while not until():
@@ -227,12 +252,12 @@ def wait(arm: Arm, until: Condition, give_up: float) -> Plan:
 
 
 def retreat(arm: Arm, height: float = 0.10, pace: Pace = COARSE) -> Plan:
-    """Go straight up by `height` [m]."""
+    """Move straight up by `height` [m]."""
     yield from go_to(arm, arm.hand + height * UP, pace=pace)
 
 
 def until(plan: Plan, condition: Condition) -> Plan:
-    """A plan that is broken off as soon as the condition holds."""
+    """A plan that stops as soon as the condition holds."""
     while not condition():
         try:
             yield next(plan)
@@ -241,9 +266,9 @@ def until(plan: Plan, condition: Condition) -> Plan:
 
 
 def together(world: World, *plans: Plan | None) -> Plan:
-    """Plans of all arms at once, in their order: actions of shape (7 * arms,). Ends with the last plan.
+    """Run plans of all arms at once, in the order of the arms: actions of shape (7 * arms,). Ends with the last plan.
 
-    An arm without a plan, or whose plan has ended, is held still, with the gripper command that it has.
+    An arm without a plan, or whose plan has ended, is held still with its last gripper command.
     """
     if len(plans) != len(world.arms):
         raise ValueError(f"{len(plans)} plans for {len(world.arms)} arms; say None for an arm that is to be held still")
@@ -262,7 +287,7 @@ def together(world: World, *plans: Plan | None) -> Plan:
 
 
 def alone(arm: Arm, plan: Plan) -> Plan:
-    """A plan of one arm while all others are held still."""
+    """Run a plan of one arm while all others are held still."""
     plans = [plan if one is arm else None for one in arm.world.arms]
     yield from together(arm.world, *plans)
 
@@ -271,7 +296,7 @@ def with_arm(index: int) -> Callable[[Callable[[S, Arm], Plan]], Callable[[S, Wo
     """Turn a method that plans for one arm into one that plans for the world, in which all other arms hold still.
 
     Args:
-        index: of the arm in `world.arms`: 0 is the right one, 1 the left one.
+        index: index of the arm in `world.arms`: 0 is the right one, 1 the left one.
     """
 
     def decorate(plan: Callable[[S, Arm], Plan]) -> Callable[[S, World], Plan]:
@@ -286,7 +311,15 @@ def with_arm(index: int) -> Callable[[Callable[[S, Arm], Plan]], Callable[[S, Wo
 
 
 def steer(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3, grip: float | None) -> Action:
-    """The action that follows a moving setpoint and turns the hand by a rotation vector [rad]."""
+    """Action that follows a moving setpoint and turns the hand by a rotation vector.
+
+    Args:
+        arm: the arm.
+        setpoint: position that the hand follows [m].
+        velocity: velocity of the setpoint [m/s].
+        turn: rotation vector that remains to be turned [rad].
+        grip: gripper command; None keeps the last one.
+    """
     action = np.empty(7)
     action[:3] = velocity / RATE + STIFFNESS * (setpoint - arm.hand)
     action[3:6] = turn

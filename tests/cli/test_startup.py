@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from scengen import config, task_files
-from scengen.control.compilation import TOLD
+from scengen.control.compilation import NOTICE
 
 HEAVY = {"mujoco", "numba", "scipy", "numpy", "hydra", "pyarrow", "matplotlib", "robosuite", "gymnasium"}
 MOST = 250
@@ -59,5 +59,5 @@ def test_the_first_compilation_is_told_of_once(tmp_path):
         )
         for _ in range(2)
     )
-    assert first.stderr.splitlines() == [TOLD] and second.stderr == ""
+    assert first.stderr.splitlines() == [NOTICE] and second.stderr == ""
     assert first.stdout == second.stdout

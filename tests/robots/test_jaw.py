@@ -12,7 +12,7 @@ from scengen.control.osc import JAW_SPEED
 from scengen.robots import jaw, panda
 from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, World
-from scengen.skills.jaw import LET_GO, SQUEEZE, grasp, release
+from scengen.skills.jaw import GRASP_TIME, RELEASE_TIME, grasp, release
 
 NAMES = panda.Names()
 FINGERS = ("leftfinger", "finger_joint1_tip", "rightfinger", "finger_joint2_tip")
@@ -205,9 +205,9 @@ def test_an_empty_jaw_opens_as_fast_as_is_said_and_then_creeps():
 
 @pytest.mark.parametrize("width", [0.013, 0.070])
 def test_the_moves_squeeze_and_let_go_for_long_enough(width):
-    """`SQUEEZE` covers 13 mm, the thinnest thing that it is meant for, and `LET_GO` the widest that the jaw takes."""
-    assert jaw.time_to_grip(0.013) <= SQUEEZE < jaw.time_to_grip(0.011)
-    assert jaw.time_to_free(jaw.OPEN_GAP) + 2 * Loop.PERIOD <= LET_GO
+    """`GRASP_TIME` covers 13 mm, the thinnest object that it is meant for, and `RELEASE_TIME` the widest one."""
+    assert jaw.time_to_grip(0.013) <= GRASP_TIME < jaw.time_to_grip(0.011)
+    assert jaw.time_to_free(jaw.OPEN_GAP) + 2 * Loop.PERIOD <= RELEASE_TIME
     bench = Bench(width)
     bench.play(release(bench.arm, 1.0))
     bench.offer()

@@ -38,7 +38,7 @@ RINGS = {
     "take a block": indirect_push.HAND,
     "take what has fallen": (stack_collapse_recovery.NEAREST, stack_collapse_recovery.FARTHEST),
     "meet a ball": (launched_ball.NEAREST, launched_ball.FARTHEST),
-    "grasp a hook": (hook.NEAREST_HAND, tool_retrieve.ARM),
+    "grasp a hook": (hook.MIN_HAND_DISTANCE, tool_retrieve.ARM),
 }
 """Nearest and farthest distance from the first axis at which a hand points down [m]."""
 

@@ -8,7 +8,7 @@ import pytest
 from scengen.errors import NoEvent, UnknownName, Unstable
 from scengen.geometry import between
 from scengen.sim.world import IDLE, ROBOT, World
-from scengen.skills.motion import ALIGNED, FINE, facing_down, go_to
+from scengen.skills.motion import ANGLE_TOLERANCE, FINE, facing_down, go_to
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.rebuilt import rebuild
 
@@ -61,7 +61,7 @@ def test_the_hand_goes_where_it_is_sent_and_points_down(world):
     target = np.array([0.05, 0.15, 0.95])
     play(world, go_to(world.arm, target, facing_down(0.7), FINE))
     assert np.linalg.norm(world.arm.hand - target) < FINE.within
-    assert np.linalg.norm(between(world.arm.hand_rot, facing_down(0.7))) < ALIGNED
+    assert np.linalg.norm(between(world.arm.hand_rot, facing_down(0.7))) < ANGLE_TOLERANCE
     assert world.arm.hand_rot[2, 2] < -0.99 and world.time < 4.0
 
 

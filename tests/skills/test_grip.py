@@ -12,7 +12,7 @@ from scengen.errors import GaveUp
 from scengen.geometry import UP, heading, quat
 from scengen.sim import scene_text
 from scengen.sim.world import World
-from scengen.skills.grip import WIDEST, best_grip, extent, take
+from scengen.skills.grip import MAX_WIDTH, best_grip, extent, take
 
 CAN, TIN, PLATE, FOAM = 3, 8, 12, 15
 """Indices among the objects of the YCB set."""
@@ -83,7 +83,7 @@ def test_a_can_that_lies_is_taken_across_its_axis_however_far_it_has_rolled(roll
 
 def test_what_is_too_wide_every_way_has_no_grip():
     plate, flat = scene_with(PLATE), scene_with(TIN, turn=("y", math.pi / 2), height=0.026)
-    assert min(0.0835, 0.097) > WIDEST and best_grip(plate.arm, "thing") is best_grip(flat.arm, "thing") is None
+    assert min(0.0835, 0.097) > MAX_WIDTH and best_grip(plate.arm, "thing") is best_grip(flat.arm, "thing") is None
 
 
 @pytest.mark.parametrize("yaw", [20.0, 70.0])

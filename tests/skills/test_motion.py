@@ -14,7 +14,7 @@ from scengen.sim import scene_text
 from scengen.sim.world import ROBOT, World
 from scengen.skills.jaw import carry, pick, poke, put
 from scengen.skills.motion import (
-    ALIGNED,
+    ANGLE_TOLERANCE,
     CLOSED,
     COARSE,
     FINE,
@@ -122,7 +122,7 @@ def test_near_the_end_of_its_range_the_wrist_turns_the_longer_way(turned, more):
     along = about_z(math.radians(more)) @ w.arm.hand_rot[:, 0]
     play(w, turn_to(w.arm, closing_along(w.arm, along)))
     assert low + WRIST_SPARE < w.arm.joint_pos[6] < high - WRIST_SPARE
-    assert abs(w.arm.hand_rot[:, 0] @ along) > math.cos(ALIGNED)
+    assert abs(w.arm.hand_rot[:, 0] @ along) > math.cos(ANGLE_TOLERANCE)
 
 
 def test_a_broken_off_plan_ends_at_once_and_a_plan_that_ends_earlier_ends_by_itself():

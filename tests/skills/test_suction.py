@@ -103,8 +103,8 @@ def test_switched_off_it_does_not_stick():
 def test_it_pulls_only_while_three_of_its_four_pads_find_a_face(pads):
     world = put_on(pads)
     lifted = world.pos("piece")[2] - TABLE_TOP
-    assert world.arm.sealed == (pads >= osc.SEAL)
-    assert (lifted > 0.03) == (pads >= osc.SEAL)
+    assert world.arm.sealed == (pads >= osc.MIN_SEALED_PADS)
+    assert (lifted > 0.03) == (pads >= osc.MIN_SEALED_PADS)
     assert lifted > 0.03 or lifted < 0.001
 
 
