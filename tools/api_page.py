@@ -1,7 +1,7 @@
-"""docs/api.md: what the author of a task, an oracle or an axis calls, from signatures and docstrings. `make docs`
+"""Writes docs/api.md, what authors and users call, from signatures and docstrings. `make docs`
 
-`python tools/api_page.py` writes the page; `tests/test_api_page.py` fails when it is not what stands there. Modules are
-parsed, not imported, so that signatures stand as they were written.
+`tests/test_api_page.py` fails if the page is out of date. Modules are parsed, not imported, so that signatures
+appear as they were written.
 """
 
 import ast
@@ -26,23 +26,20 @@ MODULES = {
     ),
     "Playing and certifying": ("validate.rollout", "validate.certify", "validate.settings", "certificate"),
     "Checks and tests": ("conformance.rules", "conformance.frames", "errors"),
-    "Assets": (
-        "assets.prop",
-        *(f"assets.{path.stem}" for path in sorted((ROOT / "scengen" / "assets").glob("[a-z]*.py"))),
-    ),
+    "The base of assets": ("assets.prop",),
+    "Pools and environments": ("pool.pool", "envs.gym", "envs.lerobot"),
 }
-"""What stands on the page, by heading."""
-LEFT_OUT = ("assets.kits", "assets.mesh_prop")
-"""Modules that list and find assets for commands."""
-LONGEST = 80
-"""Letters of a constant's value; a longer one is told by its docstring alone."""
+"""Modules on the page, by heading. `scengen asset` lists the assets themselves."""
+MAX_VALUE_LENGTH = 80
+"""Longest value of a constant that is shown [characters]."""
 SECTIONS = ("Args", "Returns", "Raises", "Yields")
-HEAD = """# What authors of tasks call
+HEAD = """# API
 
-Written by `make docs` from signatures and docstrings. SI units and radians, unless brackets say otherwise; world axes,
-x away from the robot, y to its left, z up; quaternions wxyz. How the parts work together:
-[CONTRIBUTING](../CONTRIBUTING.md), and the task that `scengen new` writes. Parameters of a task: `scengen tasks
-task=NAME`; of all assets: `scengen asset`.
+Functions and classes that authors of tasks and axes call, and those for users of pools. `make docs` writes this
+page from signatures and docstrings. Units are SI and radians unless brackets say otherwise. In the world frame x
+points away from the robot, y to its left, and z up. Quaternions are wxyz. [CONTRIBUTING](../CONTRIBUTING.md) and
+the task that `scengen new` writes show how the parts work together. `scengen tasks task=NAME` lists the parameters
+of a task, `scengen asset` those of all assets.
 """
 
 
@@ -54,10 +51,7 @@ def main() -> None:
 
 def page() -> str:
     """The whole page."""
-    found = {
-        title: {name: _parsed(name) for name in dict.fromkeys(names) if name not in LEFT_OUT}
-        for title, names in MODULES.items()
-    }
+    found = {title: {name: _parsed(name) for name in names} for title, names in MODULES.items()}
     return "\n".join([HEAD, *_index(found), *_sections(found)])
 
 
@@ -75,7 +69,7 @@ def _index(found: dict[str, dict[str, ast.Module]]) -> Iterator[str]:
 
 
 def _anchor(name: str) -> str:
-    """The address that the heading of a module gets in Markdown."""
+    """Anchor of a module's heading in Markdown."""
     return re.sub(r"[^\w-]", "", f"scengen.{name}".lower())
 
 
@@ -85,14 +79,12 @@ def _sections(found: dict[str, dict[str, ast.Module]]) -> Iterator[str]:
         for name, module in modules.items():
             yield f"## `scengen.{name}`\n"
             yield f"{_text(module)}\n"
-            yield from _members(module.body, title == "Assets" and name != "assets.prop")
+            yield from _members(module.body)
 
 
-def _members(body: list[ast.stmt], classes_alone: bool) -> Iterator[str]:
-    """Public constants, functions and classes, in the order in which they stand."""
+def _members(body: list[ast.stmt]) -> Iterator[str]:
+    """Public constants, functions and classes, in the order of the file."""
     for statement, following in zip(body, [*body[1:], None], strict=True):
-        if classes_alone and not isinstance(statement, ast.ClassDef):
-            continue
         if isinstance(statement, ast.FunctionDef) and _public(statement.name):
             yield f"### `{statement.name}{_signature(statement)}`\n"
             yield f"{_text(statement)}\n"
@@ -133,18 +125,18 @@ def _field(statement: ast.stmt, following: ast.stmt | None) -> str | None:
     kind = f": {ast.unparse(statement.annotation)}" if isinstance(statement, ast.AnnAssign) else ""
     value = f" = {ast.unparse(statement.value)}" if statement.value is not None else ""
     told = _documents(following)
-    return f"- `{name}{kind}{value if len(value) < LONGEST else ''}`{f': {told}' if told else ''}"
+    return f"- `{name}{kind}{value if len(value) < MAX_VALUE_LENGTH else ''}`{f': {told}' if told else ''}"
 
 
 def _constant(statement: ast.stmt, following: ast.stmt | None) -> str | None:
-    """A documented constant of a module, or the name of a type."""
+    """A documented constant of a module, or a type alias."""
     if not isinstance(statement, (ast.AnnAssign, ast.Assign)) or (name := _target(statement)) is None:
         return None
     told, is_type = _documents(following), not name.isupper() and name[0].isupper() and len(name) > 1
     if not told and not is_type:
         return None
     value = f" = {ast.unparse(statement.value)}" if statement.value is not None else ""
-    return f"### `{name}{value if len(value) < LONGEST else ''}`\n\n{told}\n"
+    return f"### `{name}{value if len(value) < MAX_VALUE_LENGTH else ''}`\n\n{told}\n"
 
 
 def _target(statement: ast.Assign | ast.AnnAssign) -> str | None:
@@ -154,7 +146,7 @@ def _target(statement: ast.Assign | ast.AnnAssign) -> str | None:
 
 
 def _documents(statement: ast.stmt | None) -> str:
-    """The text below an assignment, in one line."""
+    """Docstring below an assignment, in one line."""
     if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
         if isinstance(statement.value.value, str):
             return " ".join(statement.value.value.split())
@@ -180,7 +172,7 @@ def _text(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
 
 
 def _list(text: str) -> str:
-    """What stands below `Args:` and the like: one entry for each line that is not indented further."""
+    """Entries below a heading such as `Args:`: one for each line that is not indented further."""
     entries: list[str] = []
     for line in inspect.cleandoc(text).splitlines():
         if line.startswith(" ") and entries:

@@ -1,4 +1,4 @@
-"""Certify fresh draws of every split of some tasks, and write what came of it into conf/certified.yaml.
+"""Certify fresh draws of every split of some tasks, and write the results into conf/certified.yaml.
 
     python tools/certified.py N [split=SPLIT,...] [draws=M] [replays=K] [TASK ...]
 
@@ -30,18 +30,18 @@ from scengen.task_files import certified
 from scengen.work.parallel import Limits
 
 FILE = Path(__file__).parent.parent / "conf" / "certified.yaml"
-HEAD = """# What certification came to, by task and split. Written by tools/certified.py.
+HEAD = """# Results of certification by task and split. Written by tools/certified.py.
 # indices: draws tried; certified among them at level quick; cpu: processor time of each that was [s], with every core
 # of the machine at work; lost: what became of the others; draws: other draws that the oracle was given undisturbed, and
 # solved among them; replays: witnesses played in robosuite, and same: those with the same verdict. Where indices,
 # certified and cpu stand alone they were measured under conjugate gradients, on one core of an idle machine.
 """
 OTHER_SEED = 1
-"""Of the draws for the oracle alone."""
+"""Seed of the draws that only the oracle plays."""
 
 
 def measured(task: Task, split: str, n: int, draws: int, replays: int) -> dict[str, Any]:
-    """What becomes of the draws of a split."""
+    """Results of the draws of a split."""
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(split=split, n=n, limit=3 * n, pool=f"{folder}/pool")
         made = generate(task, config.levels(task)["quick"], settings, lambda *_: None)
@@ -57,14 +57,14 @@ def measured(task: Task, split: str, n: int, draws: int, replays: int) -> dict[s
 
 
 def feasible(task: Task, split: str, draws: int) -> Iterator[Scenario]:
-    """Draws that no certificate speaks of; fewer than asked for where some have no feasible scenario."""
+    """Draws that were not certified. Fewer than requested if some indices have no feasible scenario."""
     for index in range(draws):
         with suppress(Infeasible):
             yield task.draw(split, OTHER_SEED, index).scenario
 
 
 def main(n: str, *others: str) -> None:
-    """Measure, and write after every split, so that several processes may share the tasks."""
+    """Measure the splits, and write after each one, so that several processes may share the tasks."""
     options = dict(other.split("=") for other in others if "=" in other)
     wanted, draws, replays = (options.pop(name, None) for name in ("split", "draws", "replays"))
     if options:
@@ -78,7 +78,7 @@ def main(n: str, *others: str) -> None:
 
 
 def write(task: str, split: str, found: dict[str, Any]) -> None:
-    """Add to the file, or replace."""
+    """Add results to the file, or replace them."""
     with FILE.open("r+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         every = certified()

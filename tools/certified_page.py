@@ -13,10 +13,12 @@ HEAD = """# Every split, certified
 Written by `make docs` from conf/certified.yaml, which holds the measurements of `tools/certified.py`.
 
 * **certified**: scenarios certified at level `quick`, of the first draws. The rejected ones are listed below the table.
-* **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its success rate.
+* **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its
+  success rate.
 * **robosuite**: witnesses with the same verdict in robosuite, of those replayed there.
-* **CPU s**: CPU time per certified scenario, rejected draws included, with all cores of the machine busy. Rows without an oracle figure are older: they
-  were measured on one core of an idle machine, with the conjugate-gradient solver.
+* **CPU s**: CPU time per certified scenario, rejected draws included, with all cores of the machine busy. Rows
+  without an oracle figure are older: they were measured on one core of an idle machine, with the conjugate-gradient
+  solver.
 
 | task | split | certified | oracle | robosuite | CPU s |
 |---|---|---|---|---|---|

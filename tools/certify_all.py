@@ -10,11 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 from scengen import task_files
 
 POOLS = 2
-"""How many are made at a time, each by a process of its own: a pool of one scenario keeps one core busy."""
+"""Number of pools that are made at a time, each by one process: a pool of one scenario keeps one core busy."""
 
 
 def shortfall(task: str, split: str, n: int) -> str:
-    """Make one pool, and print what came of it once it is done.
+    """Make one pool, and print its result when it is done.
 
     Returns:
         Which pool fell short, and the last thing that was said of it; empty where none did.
@@ -27,7 +27,7 @@ def shortfall(task: str, split: str, n: int) -> str:
 
 
 def main(n: str = "20", *names: str) -> None:
-    """Go through all tasks, or those that are named, and say at the end which pools fell short."""
+    """Certify all tasks, or the named ones, and list at the end the pools that fell short."""
     every = [(task, split) for task in task_files.tasks() for split in task_files.splits(task)]
     tasks, splits = ({pair[k] for pair in every}.intersection(names) for k in (0, 1))
     if unknown := [*([] if n.isdecimal() else [n]), *sorted(set(names) - tasks - splits)]:

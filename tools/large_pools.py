@@ -1,4 +1,4 @@
-"""What large pools cost: every command that reads pools, in a process of its own, as a table.
+"""Measure the cost of large pools: each command that reads pools, in a process of its own, as a table.
 
     python tools/large_pools.py POOL [POOL ...]
 
@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 from scengen.envs.gym import PoolEnv
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 
 COMMANDS = {
     "show": "show pool={pool}",
@@ -33,7 +33,7 @@ COMMANDS = {
     "verify sample=10 others=skip": "verify pool={pool} level=replay sample=10 others=skip expired=report",
 }
 ROWS = 100
-"""Rows that are asked for one by one."""
+"""Number of rows that are read one by one."""
 
 
 def measured(command: list[str]) -> tuple[float, float]:
@@ -47,7 +47,7 @@ def measured(command: list[str]) -> tuple[float, float]:
 
 
 def accesses(folder: str) -> dict[str, list[float]]:
-    """How long things take in a process that has the pool open [ms]."""
+    """Times of operations in a process that has the pool open [ms]."""
     chosen, found = random.Random(0), dict[str, list[float]]()
 
     def timed(what: str, of: object) -> object:
@@ -72,7 +72,7 @@ def accesses(folder: str) -> dict[str, list[float]]:
 
 
 def commands(folder: str) -> dict[str, str]:
-    """Every command in words: time, memory, and what it wrote."""
+    """Time, memory and output size of every command, in words."""
     found, id_ = {}, Pool.open(folder).directory.id(7)
     for what, command in COMMANDS.items():
         with tempfile.TemporaryDirectory() as scratch:
@@ -90,7 +90,7 @@ def commands(folder: str) -> dict[str, str]:
 def main(*folders: str) -> None:
     """Print the table."""
     sizes = [len(Pool.open(folder)) for folder in folders]
-    print("| |", " | ".join(str(size) for size in sizes), "| CPU s for 1000 more |\n|---|" + "---:|" * (len(sizes) + 1))
+    print("| |", " | ".join(str(size) for size in sizes), "| CPU s per 1000 more |\n|---|" + "---:|" * (len(sizes) + 1))
     told = [commands(folder) for folder in folders]
     for what in COMMANDS:
         slope = (told[-1][what][0] - told[0][what][0]) / max(1, sizes[-1] - sizes[0]) * 1000

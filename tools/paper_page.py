@@ -15,18 +15,19 @@ from scengen.samplers.task import Task
 PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
 HEAD = """# Differences from the paper
 
-The paper ([sources](../CONTRIBUTING.md#sources)) describes most tasks in a few sentences, gives few numbers, and contradicts itself in places.
-Each task states its decisions, and its differences from the paper, in the docstring of its family. `tools/paper_page.py` collects them here.
+The paper ([sources](../CONTRIBUTING.md#sources)) describes most tasks in a few sentences, gives few numbers, and
+contradicts itself in places. Each task states its decisions, and its differences from the paper, in the docstring
+of its family. `tools/paper_page.py` collects them here.
 
 Decisions that hold for all tasks:
 
-* Some tasks of the paper list two arms of which one is frozen. These tasks have one arm here, because the frozen arm would only add unused
-  dimensions.
+* Some tasks of the paper list two arms of which one is frozen. These tasks have one arm here, because the frozen
+  arm would only add unused dimensions.
 * Goals that the paper describes in words have numbers here, and a goal must hold for some time: `HOLD` of the family.
-* If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise by a rule that ends the
-  episode. The paper has few such rules.
-* The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are ours or follow another
-  statement of the paper; each names its source.
+* If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise
+  by a rule that ends the episode. The paper has few such rules.
+* The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are
+  ours or follow another statement of the paper; each names its source.
 * MuJoCo is 3.5 and robosuite is 1.5.2 (the paper: 3.1.2 and 1.5). Certificates name the versions for which they hold.
 """
 

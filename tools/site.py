@@ -1,7 +1,7 @@
-"""The documentation as plain HTML, for any web server or none: `make site`
+"""Writes the documentation as plain HTML, with or without a web server: `make site`
 
 `python tools/site.py [folder]`: README.md becomes index.html, every other page keeps its place. Axis cards (`make
-axes`) and reports (`scengen report`) that stand in generated/ are copied and listed.
+axes`) and reports (`scengen report`) in generated/ are copied and listed.
 """
 
 import os
@@ -15,9 +15,9 @@ import jinja2
 from markdown_it import MarkdownIt
 
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/*/*.md")
-FILES = ("docs/*.png", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff", "Dockerfile")
+FILES = ("docs/*.png", "docs/*.webp", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff", "Dockerfile")
 MADE = {"Axis cards": "generated/axes/*/card.html", "Reports": "generated/*.html"}
-"""Pages that commands have written, by heading."""
+"""Pages written by commands, by heading."""
 TEMPLATE = """<!doctype html>
 <html lang="en">
 <head>
@@ -54,9 +54,11 @@ def main(folder: str = "generated/site") -> None:
         shutil.copyfile(path, copy)
     menu = {
         "scengen": "index.html",
-        **{_title(page): str(_html(page)) for page in pages if page.parent == Path("docs")},
+        "Documentation": "docs/index.html",
+        "Tasks": "docs/tasks.html",
+        "Contributing": "CONTRIBUTING.html",
+        "Changes": "CHANGELOG.html",
     }
-    menu["Contributing"], menu["Changes"] = "CONTRIBUTING.html", "CHANGELOG.html"
     if any(made.values()):
         menu["Cards and reports"] = "made.html"
         _write(to / "made.html", "Cards and reports", "\n".join(_listed(made)), menu, "")
@@ -67,7 +69,7 @@ def main(folder: str = "generated/site") -> None:
 
 
 def _rendered(page: Path, pages: set[Path]) -> str:
-    """A page as HTML; its links to other pages lead to their HTML."""
+    """A page as HTML, with links to the HTML of other pages."""
     markdown = MarkdownIt("gfm-like", {"linkify": False})
     tokens = markdown.parse(page.read_text())
     for link in chain(*(token.children or [] for token in tokens)):
@@ -84,13 +86,13 @@ def _html(page: Path) -> Path:
 
 
 def _title(page: Path) -> str:
-    """The first heading of a page."""
+    """First heading of a page."""
     head = next(line for line in page.read_text().splitlines() if line.startswith("# "))
     return head.removeprefix("# ").strip()
 
 
 def _listed(made: dict[str, list[Path]]) -> Iterator[str]:
-    """Links to what commands have written."""
+    """Links to the pages written by commands."""
     for title, paths in made.items():
         if paths:
             links = "".join(f'<li><a href="{path}">{path.parent.name}/{path.stem}</a></li>' for path in paths)

@@ -1,7 +1,7 @@
-"""docs/tasks: a page for each task, from its family, its task file, one certificate and docs/axes.md. `make docs`
+"""Writes docs/tasks: a page for each task, from its family, its task file and one certificate. `make docs`
 
-`python tools/task_pages.py [task ...]`; pages of tasks that are not named stay as they are. docs/tasks.png shows the
-first scene of all tasks. Pictures need OpenGL.
+`python tools/task_pages.py [task ...]` writes the pages of the named tasks only. docs/tasks.png shows the first
+scene of all tasks. Pictures need OpenGL.
 """
 
 import inspect
@@ -28,9 +28,18 @@ AXES = Path("docs/axes.md")
 ATTACKS = Path("docs/attacks.md")
 SCENARIO = 0
 """Index of the training scenario that is shown."""
-FRAMES, WIDTH, HEIGHT = 8, 320, 240
-OVERVIEW, COLUMNS, SMALL = Path("docs/tasks.png"), 4, (300, 225)
-"""All tasks in one picture: scenes in a row, width and height of each [pixels]."""
+FRAMES = 8
+"""Number of pictures in a film strip."""
+WIDTH = 320
+"""Width of a picture in a film strip [pixels]."""
+HEIGHT = 240
+"""Height of a picture in a film strip [pixels]."""
+OVERVIEW = Path("docs/tasks.png")
+"""Picture that shows the first scene of all tasks."""
+COLUMNS = 4
+"""Scenes in a row of the overview."""
+SMALL = (300, 225)
+"""Width and height of a scene in the overview [pixels]."""
 
 
 def main(*names: str) -> None:
@@ -50,7 +59,7 @@ def main(*names: str) -> None:
 
 
 def overview() -> Picture:
-    """The start of the same training scenario of every task, side by side."""
+    """First states of one training scenario of every task, side by side."""
     scenes = []
     for task in map(config.task, config.tasks()):
         scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
@@ -66,9 +75,9 @@ def page(task: Task, certified: Certified, seconds: float) -> str:
     return "\n".join(
         [
             *_story(task),
-            f"![The witness of scenario {SCENARIO}: {FRAMES} pictures in {seconds:g} s]({task.name}.jpg)",
+            f"![Witness of scenario {SCENARIO}: {FRAMES} pictures in {seconds:g} s]({task.name}.jpg)",
             "",
-            f"*Witness of training scenario {SCENARIO}, {seconds:g} s from the upper left to the lower right.*",
+            f"*Witness of training scenario {SCENARIO}: {seconds:g} s, from the upper left to the lower right.*",
             "",
             *_facts(task),
             *_parameters(task),
@@ -81,7 +90,7 @@ def page(task: Task, certified: Certified, seconds: float) -> str:
 
 
 def _story(task: Task) -> Iterator[str]:
-    """The docstring of the family's module; its sketch is indented, and so stands as it is in Markdown too."""
+    """Docstring of the family's module. Its sketch is indented, so Markdown shows it as it is."""
     told = inspect.getdoc(inspect.getmodule(task.family)) or ""
     title, _, rest = told.partition("\n")
     yield from (f"# {title.rstrip('.')}", "", rest.strip("\n"), "")
@@ -104,47 +113,47 @@ def _parameters(task: Task) -> Iterator[str]:
         hidden = ", hidden" if p.hidden else ""
         rows.append((f"`{p.name}`{hidden}", p.unit, f"{p.low:g} to {p.high:g}", f"{p.nominal:g}", spread))
     yield from _table(("parameter", "unit", "bounds", "nominal", "training"), rows)
-    yield "Where nothing stands under *training*, the parameter has its nominal value there."
+    yield "If *training* is empty, the parameter has its nominal value in training."
     yield ""
 
 
 def _axes(task: Task) -> Iterator[str]:
-    """Every axis with where it goes, and its line of figures in docs/axes.md."""
+    """Every axis with its new distributions, and its figures in docs/axes.md."""
     yield from ("## OOD axes", "")
     rows = []
     for axis in task.axes.values():
         goes = "; ".join(f"`{name}`: {spell(dist)}" for name, dist in axis.replace.items())
         rows.append((f"`{axis.name}`", goes, " ".join(axis.why.split()), axis.source))
-    yield from _table(("axis", "goes to", "why", "source"), rows)
+    yield from _table(("axis", "new distributions", "why", "source"), rows)
     yield from _measured(AXES, task)
 
 
 def _attacks(task: Task) -> Iterator[str]:
-    """What the adversary came to."""
-    yield from ("## Attacked", "")
+    """Results of the adversary."""
+    yield from ("## Attacks", "")
     yield from _measured(ATTACKS, task)
 
 
 def _measured(page: Path, task: Task) -> Iterator[str]:
-    """The lines of a task in the table of another page, if there are any."""
+    """Lines of a task in the table of another page, if there are any."""
     lines = page.read_text().splitlines() if page.is_file() else []
     head = next((i for i, line in enumerate(lines) if line.startswith("| task |")), None)
     if head is not None and (mine := [line for line in lines if line.startswith(f"| {task.name} |")]):
-        yield f"Measured ([what the columns mean](../{page.name})):"
+        yield f"Measurements ([columns](../{page.name})):"
         yield ""
         yield from (*lines[head : head + 2], *mine, "")
 
 
 def _plans(certified: Certified) -> Iterator[str]:
-    """What came of shortcuts and ablations in the scenario that is shown."""
+    """Results of shortcuts and ablations in the scenario that is shown."""
     certificate = certified.certificate
     yield from ("## Shortcuts that must fail", "")
     told = certificate["shortcuts"].numbers
     rows = [(f"`{name}`", how, *_end(end)) for name, both in told.items() for how, end in both.items()]
-    yield from _table(("shortcut", "actions", "ends in", "because", "after"), rows)
+    yield from _table(("shortcut", "actions", "outcome", "reason", "after"), rows)
     yield from ("## Ablations in which the witness must fail", "")
     rows = [(f"`{name}`", *_end(end)) for name, end in certificate["ablations"].numbers.items()]
-    yield from _table(("without", "ends in", "because", "after"), rows)
+    yield from _table(("ablation", "outcome", "reason", "after"), rows)
 
 
 def _end(numbers: Mapping[str, Any]) -> tuple[str, ...]:
