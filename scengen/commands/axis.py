@@ -4,12 +4,13 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ..config import read_task
-from ..ood.axis_card import AxisCard, AxisSettings, make_axis_card
+from ..ood.axis_card import AxisCard, AxisSettings
+from ..ood.axis_evidence import make_axis_card
 from ..ood.behaviour import Baseline
 from ..runs.progress import ProgressBar
 from ..work.targets import try_folder
 from . import OK, Arguments, err, out, remark, say
+from .settings import read_task
 
 
 def command(arguments: Arguments) -> int:

@@ -1,15 +1,15 @@
-"""What memories of training are worth on an axis, each beside its control.
+"""Success of memorised motions on an axis, each with its control.
 
-That a memorised motion fails out of distribution says nothing as long as it fails within training too. So every kind
-of memory (a replay baseline) is played in two arms: in OOD twins, and in training scenarios that differ from what it
-remembers as much as training scenarios do. `excess` is what it loses from the one to the other, twin by twin.
+That a memorised motion fails out of distribution says nothing if it fails within training too. So every kind of memory
+(a replay baseline) is played in two arms: in OOD twins, and in training scenarios that differ from the remembered one
+as much as training scenarios do. `excess` is the loss of success from the second arm to the first, twin by twin.
 
-* `replay`: the actions that solve the training twin; `object_centric`: its path relative to bodies, see `memory`.
-  Control: the same scenario with the axis' own parameters redrawn within training. Where training knows one value
-  only there is no such move. Then both arms play the nearest of `LIBRARY` other memories instead: in the training
-  scenario, and in its OOD twin.
-* `any_replay`, `any_object_centric`: whether any of the `LIBRARY` memories solves it, none of which is the twin's own.
-  Control: the training twin, which none of them remembers either.
+* `replay`: the actions that solve the training twin. `object_centric`: its path relative to bodies, see
+  `solution_memory`. The control is the same scenario with the axis' own parameters redrawn within training. If training
+  has one value only, there is no such move. Then both arms play the nearest of `LIBRARY_SIZE` other memories: in the
+  training scenario, and in its OOD twin.
+* `any_replay`, `any_object_centric`: success if any of the `LIBRARY_SIZE` memories solves the scenario. None of them is
+  the twin's own. The control is the training twin, which none of them remembers either.
 """
 
 import math
@@ -36,54 +36,57 @@ from ..work.parallel import Limits, Workers, each
 from .solution_memory import SolutionMemory, remember
 
 BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")
-"""From the weakest memory to the strongest."""
-LIBRARY = 16
-"""How many training solutions `any_...` may choose from: those of the first indices of another seed."""
-OWN = 0.9
-"""A baseline counts if it solves its own scenario again this often, for example."""
-WORKS = 0.3
-"""A baseline that solves fewer scenarios of its control arm is too weak to tell anything about an axis."""
-HALF = 0.5
+"""Kinds of memory, from the weakest to the strongest."""
+LIBRARY_SIZE = 16
+"""Number of training solutions that `any_...` may choose from: those of the first indices of another seed."""
+MIN_OWN_SUCCESS = 0.9
+"""Minimum share of its own scenarios that a baseline has to solve again. Below it, the baseline is too weak."""
+MIN_CONTROL_SUCCESS = 0.3
+"""Minimum share of its control arm that a baseline has to solve. Below it, the baseline is too weak."""
+SOLVED_SHARE = 0.5
 """An axis counts as solved by memory if the interval for some memory lies above this share."""
-MOVES = 20
-"""Draws of a move within training until one is feasible."""
-LIMITS = Limits(600.0, 4000)
-"""Of one twin: some oracle runs and replays take some seconds."""
-SOLVED_BY_MEMORY, INCONCLUSIVE = "solved by memory", "inconclusive"
+MOVE_TRIES = 20
+"""Maximum number of draws of a move within training until one is feasible."""
+TWIN_LIMITS = Limits(600.0, 4000)
+"""Time and memory limits of one twin: some oracle runs and replays take several seconds."""
+SOLVED_BY_MEMORY = "solved by memory"
+"""Verdict: some memory solves most of the axis, and the axis breaks none."""
+INCONCLUSIVE = "inconclusive"
+"""Verdict: no memory is known to break, and none is known to solve most of the axis."""
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """What one kind of memory does on an axis; twins count that the oracle solves in both arms."""
+    """Success of one kind of memory on an axis. Only twins count that the oracle solves in both arms."""
 
     name: str
     own: float
-    """Share of its own scenarios that it solves again."""
+    """Share of its own scenarios that the memory solves again."""
     control: str
-    """`moved within training` or `held-out training`."""
+    """Kind of the control: `moved within training` or `held-out training`."""
     training: Rate | None
-    """How often it solves its control; None where there was no twin to try."""
+    """Success rate in the control arm; None if there was no twin to try."""
     here: Rate | None
-    """How often it solves the OOD twin."""
+    """Success rate in the OOD twins."""
     excess: Difference | None
-    """`training` minus `here`, by twins."""
+    """Difference `training` minus `here`, paired by twins."""
 
     @property
     def finding(self) -> str:
-        """`breaks`, `holds` (as far as the interval tells), `too weak`, or `not tried`."""
+        """Finding: `breaks`, `holds` (the interval of `excess` includes 0), `too weak`, or `not tried`."""
         if self.training is None or self.excess is None:
             return "not tried"
-        if self.own < OWN or self.training.value < WORKS:
+        if self.own < MIN_OWN_SUCCESS or self.training.value < MIN_CONTROL_SUCCESS:
             return "too weak"
         return "breaks" if self.excess.low > 0 else "holds"
 
 
 def verdict(baselines: Iterable[Baseline]) -> str:
-    """The strongest memory that an axis breaks; else `SOLVED_BY_MEMORY` if some memory solves most of it, or `INCONCLUSIVE`."""
+    """The strongest memory that an axis breaks; if there is none, `SOLVED_BY_MEMORY` or `INCONCLUSIVE`."""
     tried = {baseline.name: baseline for baseline in baselines}
     if broken := [name for name in BASELINES if name in tried and tried[name].finding == "breaks"]:
         return f"breaks {broken[-1]}"
-    solved = any(baseline.here is not None and baseline.here.low > HALF for baseline in tried.values())
+    solved = any(baseline.here is not None and baseline.here.low > SOLVED_SHARE for baseline in tried.values())
     return SOLVED_BY_MEMORY if solved else INCONCLUSIVE
 
 
@@ -98,39 +101,41 @@ def measure(
     workers: Workers = 1,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> tuple[list[Baseline], Rate | None]:
-    """Play all memories on the first twins of a split, continuing what stands in both folders.
+    """Play all memories on the first twins of a split, continuing the runs in both folders.
 
     Args:
-        controls: where the outcomes in held-out training scenarios stand, which all axes of a task share.
-        n: twins; those that their own oracle cannot solve remember nothing and are left out.
-        any_n: how many of them are also tried with any of the library: that costs `2 * LIBRARY` rollouts each.
-        progress: told what is being done, how far it is, and how much there is.
+        folder: folder of the outcomes in OOD twins.
+        controls: folder of the outcomes in training scenarios, which all axes of a task share.
+        n: number of twins. A twin whose training scenario the oracle does not solve has no memory and is left out.
+        any_n: number of twins that are also tried with all memories of the library: `2 * LIBRARY_SIZE` rollouts each.
+        progress: called with the name of the step, the number of twins done, and their total.
 
     Returns:
-        The baselines in the order of `BASELINES`, and how often the oracle solves the split.
+        The baselines in the order of `BASELINES`, and the oracle's success rate on the split.
     """
 
     def play(work: Callable[..., dict], where: Path, which: str, count: int, what: str, library: bool) -> list[dict]:
         shifts = {name: str(dist) for name, dist in task.shifts(which).items()}
-        identity = {"task": task.name, "split": which, "shifts": shifts, "seed": seed, "library": LIBRARY}
+        identity = {"task": task.name, "split": which, "shifts": shifts, "seed": seed, "library": LIBRARY_SIZE}
         identity["source"] = source_sha256(task.family)
         with Log(where, identity) as log:
             todo = sorted(set(range(count)) - {r["index"] for r in log.records})
             if todo and library:
                 _library(task, seed)  # before the workers: they are copies of this process
-            for record in each(partial(work, task, which, seed), todo, workers, LIMITS, _lost):
+            for record in each(partial(work, task, which, seed), todo, workers, TWIN_LIMITS, _lost):
                 log.add(record)
                 progress(what, len(log.records), count)
             return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])
 
-    own = play(_own, controls / "own.jsonl", ID, n, "memories in training", False)
-    any_id = play(_any, controls / "any.jsonl", ID, any_n, "any memory in training", True)
-    twins = play(_twin, folder / "twins.jsonl", split, n, "memories in twins", not _moves(task, split))
-    any_ood = play(_any, folder / "any.jsonl", split, any_n, "any memory in twins", True)
-    return _baselines(own, any_id, twins, any_ood), _oracle(twins)
+    own = play(_play_own, controls / "own.jsonl", ID, n, "memories in training", False)
+    any_id = play(_play_library, controls / "any.jsonl", ID, any_n, "any memory in training", True)
+    twins = play(_play_twin, folder / "twins.jsonl", split, n, "memories in twins", not _varies(task, split))
+    any_ood = play(_play_library, folder / "any.jsonl", split, any_n, "any memory in twins", True)
+    return _baselines(own, any_id, twins, any_ood), _oracle_rate(twins)
 
 
-def _oracle(twins: list[dict[str, Any]]) -> Rate | None:
+def _oracle_rate(twins: list[dict[str, Any]]) -> Rate | None:
+    """Success rate of the oracle in the OOD twins; None if none was tried."""
     tried = [[t["here"]["oracle"]] for t in twins if t.get("here")]
     return rate(tried) if tried else None
 
@@ -141,7 +146,14 @@ def _baselines(
     twins: list[dict[str, Any]],
     any_ood: list[dict[str, Any]],
 ) -> list[Baseline]:
-    """What the records come to."""
+    """The baselines that follow from the records.
+
+    Args:
+        own: records of memories in their own training scenarios.
+        any_id: records of the library in training scenarios.
+        twins: records of the twins in both arms.
+        any_ood: records of the library in OOD twins.
+    """
     again = [r["again"] for r in own if r.get("again") is not None]
     faithful = {name: sum(again) / len(again) if again and "object" in name else 1.0 for name in BASELINES}
     moved = any(t.get("moved") for t in twins)
@@ -166,15 +178,15 @@ def _baselines(
 # --- one index ----------------------------------------------------------------------------------
 
 
-def _own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
+def _play_own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
     scenario, memory = recall(task, seed, index)
     return {"index": index, "again": faithful(task, scenario) if memory else None}
 
 
-def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """A twin's own memory, or the nearest one, in both arms. No `here` where nothing can be said."""
+def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+    """A twin's own memory, or the nearest one, in both arms. `here` is None if there is no memory or no OOD twin."""
     trained, memory = recall(task, seed, index)
-    moved = _moves(task, split)
+    moved = _varies(task, split)
     record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}
     if memory is None:
         return record
@@ -189,12 +201,12 @@ def _twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     return record
 
 
-def _moves(task: Task, split: str) -> bool:
-    """Whether what a split moves varies within training too: then a twin's own memory has a control there."""
+def _varies(task: Task, split: str) -> bool:
+    """Whether a parameter that a split moves varies within training too: then a twin's own memory has a control."""
     return any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
 
 
-def _any(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+def _play_library(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     """Whether any memory of the library solves a scenario, replayed or object-centric."""
     try:
         draw = task.draw(split, seed, index)
@@ -209,7 +221,7 @@ def _any(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
 
 
 def _lost(index: int, reason: str) -> dict[str, Any]:
-    """A twin that has crashed its process, or has reached a limit: nothing is known about it."""
+    """The record of a twin that crashed its process or reached a limit: its outcome is unknown."""
     return {"index": index, "reason": reason}
 
 
@@ -222,9 +234,9 @@ def _outcomes(task: Task, memory: SolutionMemory, scenario: Scenario) -> dict[st
 
 
 def moved_within(task: Task, names: Iterable[str], seed: int, index: int, trained: Scenario) -> Scenario | None:
-    """A training scenario with some parameters drawn anew within training; None if no draw is feasible."""
+    """A training scenario with some parameters redrawn within training; None if no draw is feasible."""
     names = list(names)
-    for attempt in range(MOVES):
+    for attempt in range(MOVE_TRIES):
         fresh = {
             name: task.training[name].quantile(unit(task.name, name, seed, index, attempt, "moved")) for name in names
         }
@@ -235,7 +247,7 @@ def moved_within(task: Task, names: Iterable[str], seed: int, index: int, traine
 
 
 def _nearest(task: Task, seed: int, draw: Draw) -> list[SolutionMemory]:
-    """The library, nearest first: by the quantiles of the parameters that vary in training."""
+    """The library, nearest first. The distance is that of the quantiles of the parameters that vary in training."""
 
     def away(quantiles: Mapping[str, float]) -> float:
         shared = quantiles.keys() & draw.quantiles.keys() - draw.shifted.keys()
@@ -253,26 +265,26 @@ def try_both(task: Task, actions: Actions, scenario: Scenario) -> tuple[bool, bo
 
 
 def twin_actions(task: Task, seed: int, index: int) -> Actions | None:
-    """Actions with which the oracle solves a training scenario, or None."""
+    """Actions with which the oracle solves a training scenario; None if it does not."""
     memory = recall(task, seed, index)[1]
     return memory and memory.actions
 
 
 def recall(task: Task, seed: int, index: int) -> tuple[Scenario, SolutionMemory | None]:
-    """A training scenario, and how the oracle solves it."""
+    """A training scenario, and the memory of the oracle's solution; None if the oracle does not solve it."""
     scenario = task.draw(ID, seed, index).scenario
     return scenario, _remembered(scenario, task.horizon, task.embodiment)
 
 
 def _library(task: Task, seed: int) -> Sequence[tuple[Mapping[str, float], SolutionMemory]]:
     """Memories of training with the quantiles of their scenarios."""
-    draws = [task.draw(ID, seed + 1, index) for index in range(LIBRARY)]
+    draws = [task.draw(ID, seed + 1, index) for index in range(LIBRARY_SIZE)]
     known = [(d.quantiles, _remembered(d.scenario, task.horizon, task.embodiment)) for d in draws]
     return [(quantiles, memory) for quantiles, memory in known if memory is not None]
 
 
 def faithful(task: Task, scenario: Scenario) -> bool:
-    """Whether an object-centric memory solves again the scenario that it remembers."""
+    """Whether an object-centric memory solves the scenario again that it remembers."""
     return _faithful(scenario, task.horizon, task.embodiment)
 
 

@@ -1,4 +1,4 @@
-"""Sampled proofs: what interval arithmetic cannot say, draws say with a bound."""
+"""Sampled proofs that features leave training. Interval arithmetic cannot prove it; draws prove it with a bound."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,30 +11,33 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 
 CONFIDENCE = 0.95
+"""Confidence of the bounds."""
 DRAWS = 300
-"""Draws of a sampled proof: none of 300 inside training is at most 1 % inside, at 95 % confidence (rule of three)."""
+"""Number of draws of a sampled proof. If none of 300 lies inside training, at most 1 % of the split does, at 95 %
+confidence (rule of three)."""
 
 
 @dataclass(frozen=True)
 class Departure:
-    """How far one feature of a split leaves what training shows of it."""
+    """Distance of one feature of a split from its range in training."""
 
     feature: str
     training: tuple[float, float]
-    """Least and largest training draw."""
+    """Smallest and largest value among the training draws."""
     here: tuple[float, float]
-    """Least and largest draw of the split."""
+    """Smallest and largest value among the draws of the split."""
     draws: int
+    """Number of draws of the split."""
     inside: int
-    """Draws of the split that lie between the two training ends."""
+    """Number of draws of the split that lie in the range of training."""
     bound: float
-    """At most this share of the split lies there: one-sided Clopper-Pearson bound at 95 % confidence."""
+    """Upper bound of the share of the split that lies there: one-sided, Clopper-Pearson, 95 % confidence."""
     beyond: float
-    """At most this share of training lies outside its two ends, at the same confidence (Wilks 1941)."""
+    """Upper bound of the share of training that lies outside its sampled range, at the same confidence (Wilks 1941)."""
 
     @property
     def kind(self) -> str:
-        """The kind of proof; an interval proof, as for parameters, needs no draws."""
+        """Kind of the proof, with its number of draws. An interval proof, as for parameters, needs no draws."""
         return f"sampled, {self.draws} draws"
 
     @property
@@ -44,7 +47,7 @@ class Departure:
 
     @property
     def gap(self) -> float | None:
-        """Free space between the two ranges in widths of the training range; None if training is one value."""
+        """Gap between the two ranges [widths of the training range]; None if training is one value."""
         free = max(0.0, self.here[0] - self.training[1], self.training[0] - self.here[1])
         span = self.training[1] - self.training[0]
         return free / span if span > 0 else None
@@ -52,12 +55,12 @@ class Departure:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What draws say about a split."""
+    """Results of the draws of a split."""
 
     departures: tuple[Departure, ...]
-    """One for each feature that the family declares."""
+    """Departures, one for each feature that the family declares."""
     strays: tuple[str, ...]
-    """Parameters that differ between twins although no axis names them. There are none, or the sampler is wrong."""
+    """Parameters that differ between twins although no axis names them. If there are any, the sampler is wrong."""
     stuck: tuple[str, ...]
     """Parameters that an axis names and that equal their twin's in some draw."""
 
@@ -65,13 +68,13 @@ class Evidence:
     def features_stay(self) -> bool:
         """Whether features are declared and not one of them leaves training.
 
-        Then the raw numbers alone are new, and only behaviour can tell whether the problem is.
+        Then only the raw parameters are new, and only behaviour can show whether the problem is new too.
         """
         return bool(self.departures) and not any(d.leaves for d in self.departures)
 
 
 def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Evidence:
-    """Draw a split and its training twins, and compare.
+    """Draw a split and its training twins, and compare them.
 
     Raises:
         BadConfig: no index is feasible.
@@ -92,7 +95,7 @@ def sampled(task: Task, split: str, draws: int = DRAWS, seed: int = 0) -> Eviden
 
 
 def departure(feature: str, training: list[float], here: list[float]) -> Departure:
-    """Compare draws of one feature."""
+    """The departure of one feature, from its values in draws of training and of the split."""
     low, high = min(training), max(training)
     inside = sum(low <= value <= high for value in here)
     return Departure(
@@ -112,7 +115,7 @@ def at_most(hits: int, draws: int) -> float:
 
 
 def unseen(draws: int) -> float:
-    """Largest share of a distribution outside the ends of a sample, at 95 % confidence: Beta(2, n - 1), Wilks 1941."""
+    """Upper bound of the share of a distribution outside the range of a sample: Beta(2, n - 1), Wilks 1941."""
     return float(betaincinv(2, draws - 1, CONFIDENCE)) if draws > 1 else 1.0
 
 

@@ -1,9 +1,9 @@
 """A memory of one solution: its actions, and the path of the hand relative to the bodies that it went to.
 
-Played again as it is, a memory is open-loop replay. Object-centric, it is what MimicGen makes new demonstrations with
-(Mandlekar et al. 2023, arXiv:2310.17596): the path is cut where the hand turns to another body, each part is kept
-relative to that body, and it is followed by feedback wherever the body now is. Nobody annotates anything here: the cuts
-follow from contacts. Of two arms each follows its own path.
+Replayed as it is, a memory is open-loop. Used object-centrically, it works as MimicGen generates demonstrations
+(Mandlekar et al. 2023, arXiv:2310.17596): the path is cut where the hand turns to another body, each part is stored
+relative to that body, and feedback follows it wherever the body now is. The cuts follow from contacts and need no
+annotation. With two arms, each arm follows its own path.
 """
 
 import math
@@ -22,14 +22,14 @@ from ..scenario import Plan, Scenario
 from ..sim.world import Arm, World
 from ..skills.motion import STEP, STIFFNESS, Pace, go_to, together
 
-ARRIVE = Pace(0.30, 0.01, 2.0)
-"""How the hand is brought to where a part begins. If it does not get there in time the path goes on all the same."""
-GRASP = 0.2
-"""How long a body is in the hand before the hand turns to the next one [s]."""
-FALL = 1.0
-"""How long a body that was let go may fall until it touches what it was brought to [s]."""
-GROUND = {"world", "table"}
-"""Bodies that nobody goes to: what touches them is put down or slides, and they never move."""
+ARRIVAL_PACE = Pace(0.30, 0.01, 2.0)
+"""Pace at which the hand moves to the beginning of a part. If it does not arrive in time, the path continues anyway."""
+MIN_HOLD_TIME = 0.2
+"""Time that a body has to be in the hand before the hand turns to the next body [s]."""
+MAX_FALL_TIME = 1.0
+"""Maximum time that a released body may fall until it touches the body that it was brought to [s]."""
+FIXED_BODIES = {"world", "table"}
+"""Bodies that are no targets of the hand: they never move, and bodies that touch them are put down or slide."""
 
 
 @dataclass(frozen=True)
@@ -37,31 +37,32 @@ class PathPart:
     """A stretch of a hand's path that belongs to one body."""
 
     first: int
-    """Row of its first action."""
+    """Row of the first action of the stretch."""
     body: str | None
-    """None where nothing is ever touched: the path then stays where it was."""
+    """Name of the body; None if the path touches nothing. The path is then followed in world coordinates."""
     pos: Vec3
-    """Of the body when the stretch began [m]."""
+    """Position of the body at the beginning of the stretch [m]."""
     rot: Mat3
-    """Its orientation then."""
+    """Orientation of the body at the beginning of the stretch."""
 
 
 @dataclass(frozen=True)
 class HandPath:
-    """What one arm did."""
+    """The path of one arm."""
 
     actions: Actions
-    """Of this arm, shape (n, 7)."""
+    """Actions of this arm, shape (n, 7)."""
     hands: NDArray[np.float64]
-    """Where the hand was before each action [m], shape (n, 3)."""
+    """Positions of the hand before each action [m], shape (n, 3)."""
     rots: NDArray[np.float64]
-    """Its orientation then, shape (n, 3, 3)."""
+    """Orientations of the hand before each action, shape (n, 3, 3)."""
     parts: tuple[PathPart, ...]
+    """Stretches of the path, in order."""
 
     def follow(self, arm: Arm) -> Plan:
-        """The path again, each part relative to its body as it now is; one whose body is not there, where it was."""
+        """The path again, each part relative to its body as it now is, or as it was if the body is missing."""
         world, ends = arm.world, [*(part.first for part in self.parts[1:]), len(self.actions)]
-        here = _bodies(world)
+        here = _target_bodies(world)
         for part, end in zip(self.parts, ends, strict=True):
             turn, origin = np.eye(3), part.pos
             if part.body in here:
@@ -69,9 +70,9 @@ class HandPath:
             aims = origin + (self.hands[part.first : end] - part.pos) @ turn.T
             rots = turn @ self.rots[part.first : end]
             try:
-                yield from go_to(arm, aims[0], rots[0], ARRIVE, self._grip(part.first))
+                yield from go_to(arm, aims[0], rots[0], ARRIVAL_PACE, self._grip(part.first))
             except GaveUp:
-                pass  # out of reach perhaps, where the hand passed by only: what comes next may not be
+                pass  # this pose may be out of reach, though the hand only passes it; the next one may not be
             for asked, aim, rot in zip(self.actions[part.first : end], aims, rots, strict=True):
                 action = np.array(asked, float)
                 action[:3] = turn @ action[:3] + STIFFNESS * (aim - arm.hand) / STEP[:3]
@@ -85,34 +86,34 @@ class HandPath:
 
 @dataclass(frozen=True)
 class SolutionMemory:
-    """What is kept of a rollout that reached its goal."""
+    """The memory of a rollout that reached its goal."""
 
     actions: Actions
-    """As the controller received them."""
+    """Actions as the controller received them."""
     paths: tuple[HandPath, ...]
-    """Of every arm."""
+    """Paths of the arms, in the order of the arms."""
 
     def follow(self, world: World) -> Plan:
-        """The paths of all arms again; actions are meant for the controller as they are."""
+        """The paths of all arms again; the actions go to the controller unfiltered."""
         yield from together(world, *(path.follow(arm) for path, arm in zip(self.paths, world.arms, strict=True)))
 
 
 def remember(scenario: Scenario, world: World, actions: Actions) -> SolutionMemory:
-    """Play a solution again in its own world, events included, and keep what an object-centric memory keeps."""
+    """Replay a solution in its own world, events included, and record the memory of it."""
     world.reset()
     episode = Episode(scenario, world)
-    poses, bodies = list[dict[str, tuple[Vec3, Mat3]]](), _bodies(world)
-    hands, every = list[list[tuple[Vec3, Mat3]]](), [_Aims(arm, bodies) for arm in world.arms]
+    poses, bodies = list[dict[str, tuple[Vec3, Mat3]]](), _target_bodies(world)
+    hands, trackers = list[list[tuple[Vec3, Mat3]]](), [_TargetTracker(arm, bodies) for arm in world.arms]
     for action in actions:
         poses.append({body: (world.pos(body), world.rot(body)) for body in bodies})
         hands.append([(arm.hand, arm.hand_rot) for arm in world.arms])
         episode.step(action)
-        for aims in every:
-            aims.look()
+        for tracker in trackers:
+            tracker.look()
     paths = list[HandPath]()
-    for number, aims in enumerate(every):
+    for number, tracker in enumerate(trackers):
         parts = list[PathPart]()
-        for row, body in enumerate(_next(aims.touched)):
+        for row, body in enumerate(_targets(tracker.touched)):
             if not parts or parts[-1].body != body:
                 pos, rot = poses[row][body] if body else (np.zeros(3), np.eye(3))
                 parts.append(PathPart(row, body, pos, rot))
@@ -122,23 +123,24 @@ def remember(scenario: Scenario, world: World, actions: Actions) -> SolutionMemo
     return SolutionMemory(actions, tuple(paths))
 
 
-class _Aims:
-    """Watches what a hand goes to: what it touches, what touches that which it carries, where that falls to."""
+class _TargetTracker:
+    """Finds the body that a hand goes to: one that it touches, that its load touches, or on which its load falls."""
 
     def __init__(self, arm: Arm, bodies: list[str]):
         self.arm, self.world, self.bodies = arm, arm.world, bodies
         self.touched = list[str | None]()
-        """The body touched in each control period."""
+        """Body that was touched, by control period."""
         self.in_hand: str | None = None
+        """Body in the hand."""
         self.periods = 0
-        """How long that has been so."""
+        """Number of control periods that it has been in the hand."""
         self.leaving: str | None = None
-        """What has been let go of, until the hand has left it."""
+        """Released body, until the hand has left it."""
         self.falling: tuple[str, int] | None = None
-        """What has been let go of, and when, until it is known what it falls to."""
+        """Released body and the row of its release, until it touches another body."""
 
     def look(self) -> None:
-        """Note what the control period that has passed shows."""
+        """Evaluate the past control period."""
         world, row, body = self.world, len(self.touched), held(self.arm)
         if body != self.in_hand:
             if self._carried:
@@ -149,20 +151,20 @@ class _Aims:
         if self.leaving not in robot:
             self.leaving = None
         found = robot | (world.touching_bodies(carried) if carried else set())
-        self.touched.append(self._choose(found - {carried, self.leaving}))
+        self.touched.append(self._nearest(found - {carried, self.leaving}))
         if self.falling:
             fallen, since = self.falling
-            if below := self._choose(world.touching_bodies(fallen) - {fallen}):
+            if below := self._nearest(world.touching_bodies(fallen) - {fallen}):
                 self.touched[since] = below
-            if below or (row - since) * Loop.PERIOD > FALL:
+            if below or (row - since) * Loop.PERIOD > MAX_FALL_TIME:
                 self.falling = None
 
     @property
     def _carried(self) -> str | None:
-        return self.in_hand if self.periods * Loop.PERIOD >= GRASP else None
+        return self.in_hand if self.periods * Loop.PERIOD >= MIN_HOLD_TIME else None
 
-    def _choose(self, found: AbstractSet[str | None]) -> str | None:
-        """Of several bodies the one touched before, or the nearest to the hand."""
+    def _nearest(self, found: AbstractSet[str | None]) -> str | None:
+        """The body that was touched before, if it is among them, else the one nearest to the hand."""
         touched = [body for body in self.bodies if body in found]
         if self.touched and self.touched[-1] in touched:
             return self.touched[-1]
@@ -170,8 +172,8 @@ class _Aims:
         return min(touched, key=lambda body: float(np.linalg.norm(self.world.com(body) - hand)), default=None)
 
 
-def _next(touched: list[str | None]) -> list[str | None]:
-    """For every period the body that is touched then, or next; after the last contact the last one."""
+def _targets(touched: list[str | None]) -> list[str | None]:
+    """The target in every control period: the body that is touched then or next; after the last contact, the last."""
     found, coming = list[str | None](), next((body for body in reversed(touched) if body), None)
     for body in reversed(touched):
         coming = body or coming
@@ -180,11 +182,11 @@ def _next(touched: list[str | None]) -> list[str | None]:
 
 
 def _upright(turn: Mat3) -> Mat3:
-    """The turn about the vertical that is nearest to a rotation: no memory stands on its head."""
+    """The rotation about the vertical that is nearest to a rotation, so that the hand is never turned upside down."""
     return about_z(math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))
 
 
-def _bodies(world: World) -> list[str]:
-    """Names of all bodies of the scene that somebody may go to."""
+def _target_bodies(world: World) -> list[str]:
+    """Names of all bodies of the scene that can be targets of a hand."""
     names = [world.model.body(i).name for i in range(world.model.nbody) if i not in world.own]
-    return [name for name in names if name and name not in GROUND]
+    return [name for name in names if name and name not in FIXED_BODIES]

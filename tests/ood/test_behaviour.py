@@ -6,7 +6,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.ood import behaviour, features
 from scengen.ood.behaviour import INCONCLUSIVE, SOLVED_BY_MEMORY, Baseline, measure, verdict
 from scengen.ood.solution_memory import remember
@@ -15,7 +15,7 @@ from scengen.statistics import paired, rate
 from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import run
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 
 
 def baseline(name, training, here, own=1.0):
@@ -63,7 +63,7 @@ def test_an_object_centric_memory_follows_its_body():
 
 
 def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
-    task = config.task("tool_retrieve")
+    task = load_task("tool_retrieve")
     scenario = task.draw(ID, 0, 0).scenario
     world = world_of(scenario, task.embodiment)
     memory = remember(scenario, world, run(scenario, world, scenario.oracle, task.horizon).actions)
@@ -127,7 +127,7 @@ def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
 
 def test_features_of_numpys_kinds_are_told_as_plain_numbers():
     """A family's features may be numpy's numbers, whose comparisons count as numpy's integers: JSON knows neither."""
-    task = config.task("cracker_box_suction")
+    task = load_task("cracker_box_suction")
     found = features.sampled(task, "slot_across", draws=5)
     assert any(isinstance(value, np.floating) for value in task.family().features().values())
     assert json.dumps([asdict(departure) for departure in found.departures])

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from scengen import config
+from scengen import load_task
 from scengen.errors import BadConfig
 from scengen.ood import boundary
 from scengen.ood.boundary import FAILS, FAILS_AT_ONCE, HOLDS, OPEN, AxisPath, search
 from scengen.samplers.keyed import unit
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 SHORT, LONG = "diagonal", "wide_gaps"
 """Axes whose paths end at 1 and beyond 4."""
 
@@ -150,17 +150,17 @@ def test_the_path_leads_from_the_edge_of_training_through_the_axis_to_the_bounds
     low, high = TASK.training["gap_ratio"].support[0], TASK.axes[LONG].replace["gap_ratio"].support[0]
     assert path.single(0.0)["gap_ratio"] == low.high and path.single(1.0)["gap_ratio"] == high.high
     assert path.single(path.end)["gap_ratio"] <= TASK.known["gap_ratio"].high
-    assert path.single(path.end + boundary.STEP)["gap_ratio"] > TASK.known["gap_ratio"].high
+    assert path.single(path.end + boundary.PATH_STEP)["gap_ratio"] > TASK.known["gap_ratio"].high
 
 
 @pytest.mark.parametrize(("name", "end"), [("domino_single", 45.0), ("domino_select", -90.0)])
 def test_a_path_ends_where_it_would_come_nearer_to_training_again(name, end):
-    task = config.task(name)  # trained along {0, 90} and along {0, 180} deg
+    task = load_task(name)  # trained along {0, 90} and along {0, 180} deg
     path = AxisPath(task, task.axes["diagonal"])
     assert path.values(path.end, 0, 0)["heading"] == pytest.approx(end)
 
 
 def test_an_axis_of_separate_values_has_no_path(tmp_path):
-    task = config.task("tool_retrieve")
-    with pytest.raises(BadConfig, match=r"moves hook\.mirrored, which takes separate values"):
+    task = load_task("tool_retrieve")
+    with pytest.raises(BadConfig, match=r"moves hook\.mirrored, which has separate values"):
         search(task, "mirrored_hook", tmp_path)

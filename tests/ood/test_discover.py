@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scipy import stats
 
-from scengen import cli, config
+from scengen import cli, list_tasks, load_task
 from scengen.errors import BadConfig
 from scengen.ood import behaviour
 from scengen.ood.discovery import candidates, confirmation, proposal
@@ -32,13 +32,13 @@ from scengen.samplers.support import distance
 from scengen.samplers.task import load
 from scengen.validate.settings import QUICK
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 KNOWN = regions(TASK)
 
 
-@pytest.mark.parametrize("name", config.tasks())
+@pytest.mark.parametrize("name", list_tasks())
 def test_every_place_of_every_region_is_within_bounds_and_outside_training(name):
-    task = config.task(name)
+    task = load_task(name)
     for region in regions(task):
         known = region.parameter
         for place in (0.0, 0.01, 0.5, 0.99, 1.0):
@@ -50,7 +50,7 @@ def test_every_place_of_every_region_is_within_bounds_and_outside_training(name)
 
 @pytest.mark.parametrize("name", ["domino_single", "packing"])
 def test_every_range_of_places_of_every_region_can_be_an_axis(name):
-    task = config.task(name)
+    task = load_task(name)
     for region in regions(task):
         for low, high in ((0.0, 0.0), (0.0, 1.0), (0.1, 0.6), (0.4, 0.9)):
             dist = proposal.distribution(region, low, high)
@@ -59,7 +59,7 @@ def test_every_range_of_places_of_every_region_can_be_an_axis(name):
 
 
 def test_a_range_through_the_seam_of_a_circle_has_both_its_sides():
-    turn = next(r for r in regions(config.task("packing")) if r.name == "spot_1_turn_from_minus_50")
+    turn = next(r for r in regions(load_task("packing")) if r.name == "spot_1_turn_from_minus_50")
     there = proposal.distribution(turn, 0.15, 0.9)
     assert there.parts[0].high == 180.0 and there.parts[1].low == -180.0
     middle = turn.value(0.6)

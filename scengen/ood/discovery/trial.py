@@ -12,7 +12,7 @@ from ...validate.certify import certify
 from ...validate.settings import CertifySettings
 from ...work.parallel import Limits
 from .. import behaviour
-from .regions import Region, spelled
+from .regions import Region, values_at
 
 BREAKS = "breaks"
 """Outcome: the memory fails and the oracle succeeds."""
@@ -201,7 +201,7 @@ class TrialRunner:
             return UNSOUND  # its builder, MuJoCo or the physics refuses such values
 
     def _moved(self, trained: Scenario, point: Point) -> Scenario:
-        return with_values(trained, spelled({self.known[place.region]: place.at for place in point}))
+        return with_values(trained, values_at({self.known[place.region]: place.at for place in point}))
 
 
 def play_search_trial(runner: TrialRunner, planned: PlannedTrial) -> SearchTrial:
