@@ -24,13 +24,13 @@ if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
 
 if TYPE_CHECKING:
     from .certificate import Certificate
-    from .config import task as load_task
-    from .config import tasks as list_tasks
+    from .compose import load_task
     from .params import param
     from .pool import Pool
     from .samplers.task import Draw, Task
     from .scenario import Scenario, Shortcut
     from .sim.world import World
+    from .task_files import tasks as list_tasks
     from .validate.certify import certify
     from .validate.rollout import replay, run
 
@@ -59,8 +59,8 @@ _HOME = {
     "Task": ("samplers.task", "Task"),
     "World": ("sim.world", "World"),
     "certify": ("validate.certify", "certify"),
-    "list_tasks": ("config", "tasks"),
-    "load_task": ("config", "task"),
+    "list_tasks": ("task_files", "tasks"),
+    "load_task": ("compose", "load_task"),
     "param": ("params", "param"),
     "replay": ("validate.rollout", "replay"),
     "run": ("validate.rollout", "run"),

@@ -11,7 +11,7 @@ import scengen
 
 LAYERS = (
     ("errors", "statistics", "geometry", "certificate", "versions"),
-    ("orientation", "params", "physics", "symmetry", "task_files"),
+    ("orientation", "params", "physics", "symmetry", "task_files", "typed"),
     ("robots",),
     ("control",),
     ("sim",),
@@ -22,7 +22,7 @@ LAYERS = (
     ("tasks",),
     ("samplers",),
     ("validate",),
-    ("config",),
+    ("compose",),
     ("attack",),
     ("runs",),
     ("pictures",),

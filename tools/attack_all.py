@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from scengen import cli, config
+from scengen import cli, list_tasks
 from scengen.attack.evidence import TierRate
 
 SCENARIOS, SEED = 10, 4242
@@ -48,7 +48,7 @@ def main(budget: str, *tasks: str) -> None:
     """Attack all tasks, or some, and write their lines."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     refuted = []
-    for task in tasks or config.tasks():
+    for task in tasks or list_tasks():
         target = FOLDER / f"{task}.json"
         argv = (f"task={task}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", "workers=2", f"json={target}")
         if cli.run(("attack", *argv)):
@@ -56,7 +56,7 @@ def main(budget: str, *tasks: str) -> None:
         report = json.loads(target.read_text())
         report["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
         target.write_text(json.dumps(report, indent=1, sort_keys=True) + "\n")
-    told = [path for task in config.tasks() if (path := FOLDER / f"{task}.json").is_file()]
+    told = [path for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
     PAGE.write_text(HEAD + "".join(line(json.loads(path.read_text())) for path in told))
     sys.exit(f"refuted, or not attacked: {', '.join(refuted)}" if refuted else 0)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from scengen import cli, config
+from scengen import cli, list_tasks
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.pool.manifest import MANIFEST
@@ -54,8 +54,8 @@ that nothing here uses). A run that is continued with other packages than it was
 def main(n: str, pools: str, *tasks: str) -> None:
     """Compare all tasks, or some, and write their lines."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    missing = [task for task in tasks or config.tasks() if not compared(task, n, Path(pools, task))]
-    told = [json.loads(path.read_text()) for task in config.tasks() if (path := FOLDER / f"{task}.json").is_file()]
+    missing = [task for task in tasks or list_tasks() if not compared(task, n, Path(pools, task))]
+    told = [json.loads(path.read_text()) for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
     PAGE.write_text(page(told))
     sys.exit(f"not compared: {', '.join(missing)}" if missing else 0)
 

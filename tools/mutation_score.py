@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 
-from scengen import config
+from scengen import load_task
 from scengen.attack.adversary import PRIOR, RANDOM, TIERS, Attack
 from scengen.attack.campaign import AttackSettings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import Causal, Hit
@@ -82,7 +82,7 @@ def compare(budget: str = "60", *tasks: str) -> None:
 
 def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> int:
     """Successes that the sound family refuses, in so many rollouts."""
-    priors = fitted(config.task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
+    priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     hits = 0
     for number, subject in enumerate(subjects):
         player = player_of(subject)
@@ -162,7 +162,7 @@ def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
 def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> tuple[int, Hit | None]:
     """Attack until a hit that the sound family refuses: how many rollouts that took, and the hit."""
     used = 0
-    priors = fitted(config.task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
+    priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     for number, subject in enumerate(subjects):
         player = player_of(subject)
         player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
@@ -181,7 +181,7 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
 def flagged(task: str) -> dict[str, Any]:
     """How many varied runs of the oracle lack a contact that is taken for causal, and which."""
     runs, taken, lacking = 0, 0, set()
-    subjects = drawn(config.task(task), "id", 4, 7)
+    subjects = drawn(load_task(task), "id", 4, 7)
     for subject in subjects:
         player = player_of(subject)
         causal = Causal(player)

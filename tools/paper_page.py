@@ -9,7 +9,7 @@ import re
 import sys
 from pathlib import Path
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.samplers.task import Task
 
 PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
@@ -34,7 +34,7 @@ Decisions that hold for all tasks:
 
 def page() -> str:
     """The whole page."""
-    tasks = sorted(map(config.task, config.tasks()), key=lambda task: (task.category == "M", task.category, task.code))
+    tasks = sorted(map(load_task, list_tasks()), key=lambda task: (task.category == "M", task.category, task.code))
     seen: set[str] = set()
     parts = []
     for task in tasks:

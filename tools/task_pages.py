@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.pictures.film import Take, strip
 from scengen.pictures.render import Picture, camera
 from scengen.samplers.axis import spell
@@ -45,8 +45,8 @@ SMALL = (300, 225)
 def main(*names: str) -> None:
     """Write the pages."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in names or config.tasks():
-        task = config.task(name)
+    for name in names or list_tasks():
+        task = load_task(name)
         scenario = task.draw(ID, 0, SCENARIO).scenario
         certified = certify(scenario, task.horizon, embodiment=task.embodiment)
         if certified.certificate.verdict != "certified":
@@ -61,7 +61,7 @@ def main(*names: str) -> None:
 def overview() -> Picture:
     """First states of one training scenario of every task, side by side."""
     scenes = []
-    for task in map(config.task, config.tasks()):
+    for task in map(load_task, list_tasks()):
         scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
         with camera(scene_xml, task.embodiment, *SMALL) as view:
             scenes.append(view.take())

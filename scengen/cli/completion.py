@@ -8,9 +8,9 @@ from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.plugins.completion_plugin import DefaultCompletionPlugin
 
-from .. import config, task_files
+from .. import compose, task_files
 from ..errors import ScengenError
-from ..pool.pool import Pool
+from ..pool import Pool
 
 BASH = r"""
 _scengen() {
@@ -84,9 +84,9 @@ def _settings(verb: str, words: Sequence[str], word: str) -> list[str]:
     groups = task_files.groups(verb)
     if "task" in groups and not _task(words):
         words = [*words, f"task={task_files.tasks()[0]}"]  # its keys are those of all tasks, but for the parameters
-    with initialize_config_dir(str(config.root(verb)), version_base="1.3", job_name="scengen"):
+    with initialize_config_dir(str(compose.root(verb)), version_base="1.3", job_name="scengen"):
         plugin = DefaultCompletionPlugin(GlobalHydra.instance().config_loader())
-        found = plugin._query(config.file(verb), " ".join([*words, word]))
+        found = plugin._query(compose.file(verb), " ".join([*words, word]))
     return [text for text in found if _offered(text, groups)]
 
 

@@ -194,7 +194,7 @@ SHOWING = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--info"}
 
 def _show(verb: str, arguments: Sequence[str]) -> int:
     """Show what a command would work with, or where it comes from: `--cfg job`, `--info defaults`."""
-    from .. import config
+    from .. import compose
     from ..commands import out
 
     words = list(arguments)
@@ -205,9 +205,9 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     if others := [word for word in words if word.startswith("-")]:
         raise BadConfig(f"{cut(repr(others[0]))} cannot be said together with {option}; say one of them")
     if SHOWING[option] == "--info":
-        config.show_origin(verb, words, what)
+        compose.show_origin(verb, words, what)
     elif what == "job":
-        out.print(config.shown(verb, words), end="", soft_wrap=True)
+        out.print(compose.shown(verb, words), end="", soft_wrap=True)
     else:
         raise BadConfig(f"{option} {cut(repr(what))}; the configuration of a command is that of its job, say --cfg job")
     return OK

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from ..assets.kits import kit, kits
-from ..config import read
 from ..errors import BadConfig, cut
 from ..export.mesh import FORMATS, encode
 from ..params import parameters
 from ..pictures import render
 from ..work.targets import try_file, try_folder
 from . import FAILED, OK, Arguments, intake, out, remark, say, write
+from .settings import read
 
 if TYPE_CHECKING:
     from ..intake.asset import MeshAsset

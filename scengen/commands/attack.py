@@ -5,20 +5,20 @@ from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
-from .. import config
+from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
-from ..config import read
 from ..errors import BadConfig
 from ..pictures.report import attack_table
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..task_files import search_path
 from ..work.targets import try_file, try_folder
 from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
+from .settings import read
 
 
 def command(arguments: Arguments) -> int:
@@ -54,11 +54,11 @@ def _chosen(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Seque
     Raises:
         ScengenError: neither a task nor a pool was given, or both, or nothing can be attacked.
     """
-    name, others = config.chosen("attack", arguments), [a for a in arguments if a.startswith("task.")]
+    name, others = compose.chosen_task("attack", arguments), [a for a in arguments if a.startswith("task.")]
     if (name is None) == (settings.pool is None):
         raise BadConfig("attack needs either task=NAME or pool=FOLDER; see scengen attack --help")
     if name is not None:
-        task = config.task(name, [*search_path(arguments), *others])
+        task = compose.load_task(name, [*search_path(arguments), *others])
         return task, drawn(task, settings.split, settings.n, settings.seed)
     pool = Pool.open(str(settings.pool)).check()
     task = task_of(pool, search_path(arguments))

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from ..config import read
 from ..errors import at_least
 from ..evaluate.speed import bench, certificates
 from ..work.targets import try_file
 from . import OK, Arguments, out, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)

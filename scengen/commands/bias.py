@@ -9,12 +9,12 @@ from ..analysis.bias import Bias, acceptance_map, bias
 from ..analysis.redraw import MOST, Redrawn, redrawn, told
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
-from ..config import read
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..work.targets import try_file
 from . import OK, Arguments, err, one, out, say, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def command(arguments: Arguments) -> int:
     settings = read("bias", arguments, Settings)
     try_file(settings.json)
     pool = Pool.open(one(settings.pool)).check()
-    with ProgressBar(err, f"draw {pool.folder} again", min(pool.indices, MOST)) as progress_bar:
+    with ProgressBar(err, f"draw {pool.folder} again", min(pool.manifest.indices, MOST)) as progress_bar:
         drawn = redrawn(pool, lambda done, total: progress_bar.show(done), search_path(arguments))
     if told(pool):
         say(f"a sample: {told(pool)}")

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..attack.check import attacked
-from ..config import read
 from ..errors import BadConfig, PoolError, at_least, cut
 from ..export.hub import DatasetCard, PublishedPool, check_pools, check_target, own_license, publish
 from ..pool import Pool
@@ -15,6 +14,7 @@ from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report
 from ..work.parallel import Workers
 from . import OK, Arguments, err, say, several
+from .settings import read
 from .verify import EXPIRED, verified
 
 LONGEST = 300

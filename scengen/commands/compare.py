@@ -11,13 +11,13 @@ from ..analysis.distance import ENERGY_OF, MOST_PAIRS, NearDuplicate, energy, ne
 from ..analysis.redraw import batch_of, first_scenarios, redrawn, task_of, told
 from ..analysis.space import Batch, of_features
 from ..analysis.tables import SHOWN, pairs_table
-from ..config import read
 from ..errors import BadConfig, at_least
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..samplers.task import Task
 from ..task_files import search_path
 from ..work.targets import try_file
 from . import FAILED, OK, Arguments, names, out, say, several, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def _alone(task: Task, pool: Pool, batch: Batch, settings: Settings, search: Seq
     say(f"{pool.folder}: {len(batch)} scenarios")
     say(f"  outside training by [training widths]: {far or 'nothing'}")
     even = None
-    if len(batch) and not pool.chosen:
+    if len(batch) and not pool.manifest.is_subset:
         certified = [list(p.quantiles.values()) for p in redrawn(pool, search=search) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ..config import read_task
 from ..errors import UnknownName, at_least
 from ..ood.discovery.proposal import Finding
 from ..ood.discovery.search import METHODS, MIN_BUDGET, DiscoverSettings, SearchResult, discover
@@ -12,6 +11,7 @@ from ..runs.progress import ProgressBar
 from ..samplers.axis import spell
 from ..work.targets import try_folder
 from . import OK, Arguments, err, out, say, write
+from .settings import read_task
 
 
 def command(arguments: Arguments) -> int:

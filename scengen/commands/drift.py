@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..config import read
 from ..drift.environment import Environment, environment
 from ..drift.matrix import FLIPPED, UNKNOWN, matrix, remarks, tables, under
 from ..errors import BadConfig, ScengenError, at_least
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..work.targets import try_file
 from . import BAD_INPUT, FAILED, OK, Arguments, err, out, remark, say, several, write_json
+from .settings import read
 
 MODULE = "scengen.drift.judge"
 """What runs in each environment."""

@@ -2,12 +2,12 @@
 
 from rich.table import Table
 
-from ..config import read
 from ..evaluate.rollouts import EvaluateSettings, cells, evaluate, markdown, plain, table
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_json
+from .settings import read
 
 
 def command(arguments: Arguments) -> int:

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from ..config import read
 from ..export.mjcf import export
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
 from ..work.parallel import SHOWN, each
 from ..work.targets import try_folder
 from . import FAILED, OK, Arguments, chosen, err, holder, one, say, warn
+from .settings import read
 
 
 @dataclass(frozen=True)

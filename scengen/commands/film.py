@@ -3,21 +3,21 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import config
+from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
-from ..config import read
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, shortcut, strip
 from ..pictures.render import encode
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
 from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, say, write
+from .settings import read
 
 STRIP = 100_000_000
 """Largest size of a film strip [pixels]: it takes three bytes of memory for each, several times over."""
@@ -88,7 +88,9 @@ def _hit(settings: Settings, arguments: Arguments) -> Take:
     """What the adversary did."""
     hit = Hit.load(Path(str(settings.hit)))
     search = search_path(arguments)
-    task = task_of(Pool.open(str(settings.pool)).check(), search) if settings.pool else config.task(hit.task, search)
+    task = (
+        task_of(Pool.open(str(settings.pool)).check(), search) if settings.pool else compose.load_task(hit.task, search)
+    )
     scenario = task.scenario(hit.params)
     if scenario.id != hit.scenario:
         raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")

@@ -9,17 +9,18 @@ from typing import TypeVar
 
 from rich.table import Table
 
-from ..config import Combination, combinations, read_task
+from ..compose import Combination, combinations
 from ..errors import BadConfig, ScengenError
 from ..pictures.report import attack_table, funnel_table, summary_lines
 from ..pool import collection
-from ..runs.generate import Settings, Summary, generate
+from ..runs.generate import GenerateSettings, Summary, generate
 from ..runs.progress import ProgressBar
 from ..samplers.designs import SOBOL
 from ..samplers.split import Split
 from ..samplers.task import Task
 from ..validate.settings import CertifySettings
 from . import FAILED, OK, Arguments, err, intake, out, say, warn
+from .settings import read_task
 
 T = TypeVar("T")
 
@@ -33,7 +34,7 @@ class Run:
 
     task: Task
     certify_settings: CertifySettings
-    settings: Settings
+    settings: GenerateSettings
 
     def __call__(self) -> Summary:
         """Make the pool, and tell what came of it."""
@@ -72,7 +73,7 @@ def command(arguments: Arguments) -> int:
     summaries = []
     for run in runs:
         summaries.append(run())
-        collection.write(summaries[-1].pool.folder.parent, [summaries[-1].pool])
+        collection.write_index(summaries[-1].pool.folder.parent, [summaries[-1].pool])
     out.print(_table(asked, runs, summaries))
     folder = summaries[-1].pool.folder.parent
     stands = f"pool={folder} stands for all pools that it names"
@@ -82,7 +83,7 @@ def command(arguments: Arguments) -> int:
 
 
 def _run(asked: Combination) -> Run:
-    settings, task, certify_settings = read_task("generate", asked.overrides, Settings)
+    settings, task, certify_settings = read_task("generate", asked.overrides, GenerateSettings)
     if settings.ycb is not None:
         task = intake("ycb").with_scans(task, settings.split, settings.ycb)
     return Run(task, certify_settings, settings)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
-from .. import config
+from .. import task_files
 from ..conformance.rules import SNAKE_CASE
 from ..errors import BadConfig, cut
 from ..task_files import shipped
 from ..work.targets import try_folder, write
 from . import OK, Arguments, say
+from .settings import read
 
 TASK, PACKAGE = "push_off", "my_tasks"
 """Names in the example that is copied."""
@@ -37,14 +38,14 @@ class Settings:
             if not good or name in TAKEN[kind]:
                 what = "in snake_case that neither Python nor the package needs, such as push_off"
                 raise BadConfig(f"{kind} = {cut(name)}; give a word of {LONGEST} letters at most, {what}")
-        if self.task in config.tasks():
+        if self.task in task_files.tasks():
             raise BadConfig(f"task = {self.task}; there is a task of that name already, see scengen tasks")
         if self.package in sys.stdlib_module_names or self.package in packages_distributions():
             raise BadConfig(f"package = {self.package}; a package of that name is installed already, give another name")
 
 
 def command(arguments: Arguments) -> int:
-    settings = config.read("new", arguments, Settings)
+    settings = read("new", arguments, Settings)
     settings.check()
     folder = Path(settings.to or settings.package)
     try_folder(folder)

@@ -3,12 +3,12 @@
 from dataclasses import asdict, dataclass
 
 from ..analysis.tables import power_table
-from ..config import read
 from ..errors import BadConfig
 from ..evaluate.power import PowerAnalysis, seeds_for
 from ..runs.progress import ProgressBar
 from ..work.targets import try_file
 from . import OK, Arguments, err, out, say, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..config import read
 from ..export.recording import ROBOMIMIC, RecordSettings, record
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
+from .settings import read
 
 
 def command(arguments: Arguments) -> int:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.overview import gather, page, plain
-from ..config import read
 from ..errors import BadConfig
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..task_files import search_path
 from ..work.targets import try_file
 from . import OK, Arguments, remark, say, several, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)

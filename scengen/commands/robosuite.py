@@ -5,14 +5,14 @@ from dataclasses import asdict, dataclass
 
 from rich.table import Table
 
-from ..config import read
 from ..errors import BadConfig, at_least
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..work.parallel import Limits, Workers
 from ..work.targets import try_file
 from . import FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
+from .settings import read
 
 
 @dataclass(frozen=True)

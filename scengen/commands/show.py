@@ -4,16 +4,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.redraw import task_of
-from ..config import read
 from ..errors import BadConfig, at_least
 from ..pictures import film, render, report
 from ..pictures.sheet import contact_sheet
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
+from .settings import read
 
 TOLD = 3
 """Of more pools than these a line each is told, not every scenario."""
@@ -46,7 +46,7 @@ def command(arguments: Arguments) -> int:
         else:
             for pool in pools:
                 out.print(report.pool_table(pool))
-                out.print(report.funnel_table(pool.funnel, pool.reasons))
+                out.print(report.funnel_table(pool.manifest.funnel, pool.manifest.reasons))
                 say(f"pool sha256: {pool.sha256}")
         if target:
             with ProgressBar(err, "contact sheet", 1) as bar:

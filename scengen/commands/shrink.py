@@ -8,7 +8,6 @@ from ..analysis.space import scale
 from ..analysis.tables import shrunk_table
 from ..attack.check import attacked
 from ..certificate import Check
-from ..config import read_task
 from ..errors import BadConfig, at_least
 from ..params import Value, values, with_values
 from ..pool.names import Name
@@ -19,6 +18,7 @@ from ..validate.certify import certify
 from ..validate.settings import CertifySettings
 from ..work.targets import try_file
 from . import OK, Arguments, err, out, say, write_json
+from .settings import read_task
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,21 @@
 """choose the scenarios of a pool that cover most of it, as a pool of their own"""
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..analysis.coverage import farthest_points
 from ..analysis.redraw import batch_of, task_of
 from ..analysis.space import of_tables
-from ..config import read
 from ..errors import BadConfig, PoolError
-from ..pool.pool import MANIFEST, Pool, write
+from ..pool import Pool
+from ..pool.manifest import MANIFEST
+from ..pool.writing import write_pool
 from ..task_files import search_path
 from ..validate import lock
 from ..work.targets import try_folder
 from . import OK, Arguments, one, say
+from .settings import read
 
 
 @dataclass(frozen=True)
@@ -35,15 +37,17 @@ def command(arguments: Arguments) -> int:
     if (target / MANIFEST).exists():
         raise PoolError(f"{target} holds a pool already; choose another to=")
     try_folder(target)
-    locked = lock.read(pool.folder)
+    locked = lock.read_lock(pool.folder)
     task = task_of(pool, search_path(arguments))
     batch = batch_of(task, pool)
     points = of_tables(task, batch.values).of(batch.values, len(batch))
     chosen = sorted(farthest_points(points, settings.n).tolist())
-    about = {**pool.about, "n": settings.n, "subset": {"of": pool.sha256, "chosen": "max-min coverage"}}
-    subset = write(target, about, pool.some(chosen))
+    about = replace(
+        pool.manifest.without_files(), n=settings.n, subset={"of": pool.sha256, "chosen": "max-min coverage"}
+    )
+    subset = write_pool(target, about, pool.some(chosen))
     if locked is not None:
-        shutil.copyfile(pool.folder / lock.FILE, target / lock.FILE)
+        shutil.copyfile(pool.folder / lock.LOCK_FILE, target / lock.LOCK_FILE)
     say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")
     say(f"pool sha256: {subset.sha256}")
     return OK

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
-from .. import config
+from .. import compose, task_files
 from ..errors import UnknownName
 from ..pictures.report import axes_table, task_tables, tasks_table
 from ..task_files import about, certified, search_path
 from . import OK, Arguments, out
+from .settings import read
 
 PAPER = "paper"
 
@@ -19,18 +20,18 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings, name = config.read("tasks", arguments, Settings), config.chosen("tasks", arguments)
+    settings, name = read("tasks", arguments, Settings), compose.chosen_task("tasks", arguments)
     if settings.axes not in (None, PAPER):
         raise UnknownName("choice of axes", settings.axes, [PAPER])
     search = search_path(arguments)
-    listed = [about(each, search) for each in ([name] if name else config.tasks(search))]
+    listed = [about(each, search) for each in ([name] if name else task_files.tasks(search))]
     listed.sort(key=lambda task: (task.category == "M", task.category, task.code))  # as in the paper
     if name is None and not settings.axes:
         out.print(tasks_table(listed, certified()))
         return OK
     # Loading a task takes 0.1 s of processor time: here its numbers are told, and checked.
     others = [a for a in arguments if not a.startswith(("task=", "axes="))]
-    tasks = [config.task(each.name, others) for each in listed if name or each.paper_axes]
+    tasks = [compose.load_task(each.name, others) for each in listed if name or each.paper_axes]
     if settings.axes:
         out.print(axes_table([(task, axis) for task in tasks for axis in task.axes.values() if task.of_paper(axis)]))
     else:

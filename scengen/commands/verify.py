@@ -9,14 +9,13 @@ from typing import Any
 
 from rich.table import Table
 
-from .. import config
+from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
-from ..config import read
 from ..errors import BadConfig, at_least, cut
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..task_files import search_path
@@ -28,6 +27,7 @@ from ..validate.verify import LIMITS, Options, Report, verify
 from ..work.parallel import Limits, WorkerDied, Workers, apart
 from ..work.targets import try_file
 from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
+from .settings import read
 
 SHOWN = 20
 """Differences and faults that are told; the files hold all."""
@@ -111,13 +111,15 @@ def verified(pool: Pool, options: Options, search: Sequence[str], progress: Call
         search: overrides that add folders of other packages, see `task_files.search_path`.
         progress: told how many scenarios have been checked.
     """
-    task = config.task(pool.task, search)
-    return _with_hits(verify(pool, task, config.levels(task), options, progress), pool, task, options.limits or LIMITS)
+    task = compose.load_task(pool.task, search)
+    return _with_hits(
+        verify(pool, task, compose.certify_levels(task), options, progress), pool, task, options.limits or LIMITS
+    )
 
 
 def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report:
     """The report on a pool that holds so far, with what is wrong about the attack that its manifest tells of."""
-    if report.verdict != "sound" or "attack" not in pool.manifest:
+    if report.verdict != "sound" or pool.manifest.attack is None:
         return report
     verdict: Verdict = "refuted"
     try:
@@ -134,7 +136,7 @@ def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
     Raises:
         BadConfig: a folder is given, and lacks one of them, or the pool holds none.
     """
-    scans = pool.task_node.get("scans", {})
+    scans = pool.manifest.task_node.get("scans", {})
     if folder is not None and not scans:
         raise BadConfig(f"ycb = {cut(folder)}, but {pool.folder} holds no scans; leave it out")
     if report.verdict != "sound" or not scans:
@@ -163,7 +165,7 @@ def _hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int
     wrong = 0
     for path in paths:
         hit = Hit.load(path)
-        reason = unsound(hit, attacked_task or config.task(hit.task, search))
+        reason = unsound(hit, attacked_task or compose.load_task(hit.task, search))
         wrong += bool(reason)
         say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")
@@ -199,7 +201,7 @@ def _tell(pool: Pool, report: Report) -> None:
         if n
     ]
     say(f"settings: {report.settings or 'unknown'}")
-    if pool.chosen:
+    if pool.manifest.is_subset:
         say("a subset: its scenarios were chosen from another pool, whose funnel it repeats")
     if report.sample:
         share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from ..analysis.redraw import task_of
-from ..config import read
 from ..pictures.view import check_display, view
 from ..task_files import search_path
 from ..validate.playable import check_row
 from . import OK, Arguments, chosen, holder
+from .settings import read
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from .. import config
+from .. import compose, task_files
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import Episode, Outcome
@@ -22,8 +22,8 @@ from ..errors import BadConfig, UnknownName, cut
 from ..orientation import Orientation
 from ..params import Value
 from ..pictures.render import Camera
+from ..pool import PoolRow
 from ..pool.library import Library
-from ..pool.pool import PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size, hands
@@ -153,7 +153,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         _check_action_repeat(action_repeat)
         self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
-        self.task: Task = config.task(task, search)
+        self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._rows = chosen(rows, scenario, split)
         names = proprioception(self.task.embodiment) if observations is None else observations
@@ -353,5 +353,5 @@ def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -
     return reading.clip(-bound, bound).astype(np.float32)
 
 
-for _name in config.tasks():
+for _name in task_files.tasks():
     gymnasium.register(f"scengen/{_name}-v0", "scengen.envs.gym:PoolEnv", kwargs={"task": _name})

@@ -16,14 +16,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import config
+from .. import compose, task_files
 from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
+from ..pool import PoolRow
 from ..pool.library import Library
-from ..pool.pool import PoolRow
 from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
@@ -120,7 +120,7 @@ class RobosuiteEnv(ManipulationEnv):
         if reward_shaping:
             raise BadConfig("reward_shaping = True; the only reward is that of the goal: say reward_shaping=False")
         self.action_filter, self.reward_scale, self.use_object_obs = action_filter, reward_scale, use_object_obs
-        self.task = config.task(self.NAME, self.SEARCH)
+        self.task = compose.load_task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
         grippers = self._certified_grippers(gripper_types)
         self._object_state: NDArray[np.float64] | None = None
@@ -390,5 +390,5 @@ def _scenes(rows: Sequence[PoolRow]) -> Iterator[str]:
     )
 
 
-for _name in config.tasks():
+for _name in task_files.tasks():
     env_class(_name)

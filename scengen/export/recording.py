@@ -18,7 +18,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from .. import config
+from .. import compose
 from ..control.loop import Loop
 from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
@@ -27,8 +27,7 @@ from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
-from ..pool import collection
-from ..pool import Pool, PoolRow
+from ..pool import Pool, PoolRow, collection
 from ..sim.world import World, hands
 from ..validate.identity import check_versions
 from ..validate.playable import unplayable
@@ -149,7 +148,8 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
-    tasks = {name: config.task(name, search) for name in sorted({n for pool in pools for n in pool.kinds("task")[0]})}
+    names = sorted({name for pool in pools for name in pool.kinds("task")[0]})
+    tasks = {name: compose.load_task(name, search) for name in names}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
         raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
     streams = streams_of(robot)

@@ -9,15 +9,15 @@ import pytest
 from pools import make, rewritten
 from scipy import stats
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.analysis.bias import acceptance_map, bias
 from scengen.analysis.redraw import redrawn
 from scengen.errors import BadConfig, PoolError
 from scengen.params import values
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.samplers.split import ID
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 DRAWS = [TASK.draw(ID, 0, i) for i in range(300)]
 TABLE = {
     name: np.array([float(values(draw.scenario)[name]) for draw in DRAWS])

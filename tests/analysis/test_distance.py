@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from scengen import config
+from scengen import load_task
 from scengen.analysis.coverage import evenness, farthest_points
 from scengen.analysis.distance import energy, near_duplicates, offsets, per_parameter
 from scengen.analysis.space import Batch, of_features, of_parameters
@@ -14,7 +14,7 @@ from scengen.params import with_values
 from scengen.samplers.split import ID
 from scengen.symmetry import Symmetry
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 TRAINED = {f"id {i}": TASK.draw(ID, 0, i).scenario for i in range(40)}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scengen import config
+from scengen import load_task
 from scengen.analysis.histogram import figure, histogram, label
 
 DRAWS = np.random.default_rng(0).uniform(0.0, 1.0, 400)
@@ -33,4 +33,4 @@ def test_one_value_is_one_bar():
 
 @pytest.mark.parametrize(("name", "told"), [("tile.mass", "tile.mass [kg]"), ("tile.friction", "tile.friction")])
 def test_a_label_has_the_unit(name, told):
-    assert label(config.task("domino_single"), name) == told
+    assert label(load_task("domino_single"), name) == told

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.analysis.shrink import centre, shrink
 from scengen.errors import BadConfig
 
@@ -65,7 +65,7 @@ def test_what_does_not_fail_and_what_fails_everywhere_is_refused():
 
 
 def test_the_centre_is_the_median():
-    middle = centre(config.task("domino_single").training)
+    middle = centre(load_task("domino_single").training)
     assert (
         middle["gap_ratio"] == pytest.approx(0.9) and middle["x"] == pytest.approx(0.0) and middle["slab.mass"] == 0.06
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from unittest import mock
 
-from scengen import config
+from scengen import load_task
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
 from scengen.pool.names import Name
@@ -58,7 +58,7 @@ class Mutant:
     @property
     def asked(self) -> Task:
         """The task."""
-        return config.task(self.task, self.narrow)
+        return load_task(self.task, self.narrow)
 
     @contextmanager
     def weakened(self) -> Iterator[None]:
@@ -70,7 +70,7 @@ class Mutant:
         """Whether a hit is one because of the weakness: the family as it should be refuses the same actions."""
         if self.change is not None:
             return hit.refutes or hit.tier in BLIND
-        task = config.task(self.task)
+        task = load_task(self.task)
         with strict(self):
             world = World.load(scene_xml, task.embodiment)
             return not replay(scenario, world, hit.actions, task.horizon, until_settled=True).solved
@@ -95,7 +95,7 @@ class Mutant:
 @contextmanager
 def patched(task: str, patch: Mapping[str, Any], limits: Mapping[str, float]) -> Iterator[None]:
     """A family with attributes and constants replaced."""
-    family = config.task(task).family
+    family = load_task(task).family
     with ExitStack() as stack:
         for name, value in patch.items():
             stack.enter_context(mock.patch.object(family, name, value))
@@ -107,7 +107,7 @@ def patched(task: str, patch: Mapping[str, Any], limits: Mapping[str, float]) ->
 @contextmanager
 def strict(mutant: Mutant) -> Iterator[None]:
     """The family as it should be, also where a mutant is in force."""
-    family = config.task(mutant.task).family
+    family = load_task(mutant.task).family
     with patched(
         mutant.task, {n: SOUND[family, n] for n in mutant.patch}, {n: SOUND[family, n] for n in mutant.limits}
     ):
@@ -123,7 +123,7 @@ def mutants() -> list[Mutant]:
     kinds = (clauses, limits, values, narrow)
     found = [mutant for task in TASKS for kind in kinds for mutant in kind(task)]
     for mutant in found:
-        family = config.task(mutant.task).family
+        family = load_task(mutant.task).family
         module = sys.modules[family.__module__]
         SOUND.update({(family, name): getattr(family, name) for name in mutant.patch})
         SOUND.update({(family, name): getattr(module, name) for name in mutant.limits})
@@ -135,7 +135,7 @@ def mutants() -> list[Mutant]:
 
 def clauses(task: str) -> Iterator[Mutant]:
     """The family without one clause of its failure or of its goal."""
-    family = config.task(task).family
+    family = load_task(task).family
     if family.failure is not Scenario.failure:
         tree = _parsed(family.failure)
         for statement in list(tree.body):

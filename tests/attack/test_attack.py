@@ -7,7 +7,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from scengen import config
+from scengen import load_task
 from scengen.attack import draws
 from scengen.attack.adversary import RANDOM, RETRY, Attack
 from scengen.attack.campaign import AttackSettings, attack, drawn, player_of
@@ -24,7 +24,7 @@ from scengen.scenario import Answer
 from scengen.sim.world import ROBOT
 from scengen.validate.rollout import replay
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 
 
 def with_hole(self, world):

@@ -9,17 +9,18 @@ from unittest import mock
 
 import pytest
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.attack.campaign import drawn
 from scengen.attack.check import attacked
 from scengen.attack.evidence import Hit
 from scengen.errors import BadConfig
-from scengen.pool.pool import Pool, sha256
+from scengen.pool import Pool
+from scengen.pool.files import sha256
 from scengen.predicates import touched_only
 from scengen.validate.certify import certify
 from scengen.validate.settings import QUICK, Robust
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 
 
 @pytest.fixture(scope="module")

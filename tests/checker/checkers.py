@@ -66,7 +66,7 @@ def replay(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
     """
     import numpy as np
 
-    from scengen import config
+    from scengen import load_task
     from scengen.sim.world import World
     from scengen.validate.rollout import replay as play
 
@@ -74,7 +74,7 @@ def replay(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
         return REFUTED
     try:
         for row in _rows(folder, json.loads((folder / "manifest.json").read_text())):
-            scenario = config.task(row["task"]).scenario(json.loads(row["params"]))
+            scenario = load_task(row["task"]).scenario(json.loads(row["params"]))
             certificate = row["certificate"]
             witness = next(check for check in certificate["checks"] if check["name"] == "witness")
             settle = json.loads(witness["settings"])["settle"]

@@ -108,12 +108,12 @@ class Draft:
         Raises:
             AssertionError: they do not reach the goal: this would be no forgery, but a damage.
         """
-        from scengen import config
+        from scengen import load_task
         from scengen.sim.world import World
         from scengen.validate.rollout import replay
 
         row = self.row
-        scenario = config.task(row["task"]).scenario(row["params"])
+        scenario = load_task(row["task"]).scenario(row["params"])
         world = World.load(row["scene_xml"], row["embodiment"])
         actions = row["witness"] if actions is None else np.asarray(actions, np.float32)
         rollout = replay(scenario, world, actions, row["horizon"], self.check("witness")["settings"]["settle"])

@@ -65,12 +65,12 @@ def _param(name: str, by: float) -> Change:
     """A parameter that was not drawn: the scene is rebuilt, id and hashes are right."""
 
     def change(draft: Draft) -> None:
-        from scengen import config
+        from scengen import load_task
         from scengen.validate.rebuilt import rebuild
 
         row = draft.row
         row["params"][name] *= by
-        scenario = config.task(row["task"]).scenario(row["params"])
+        scenario = load_task(row["task"]).scenario(row["params"])
         row["scene_xml"] = rebuild(scenario)
         draft.check("feasible")["numbers"] = dict(scenario.features())
         draft.played()

@@ -125,14 +125,14 @@ def make(name: str, folder: Path) -> None:
 
 def expired(folder: Path) -> bool:
     """Whether a pool is not there, or its certificates rest on other code than there is now."""
-    from scengen import config
+    from scengen import load_task
     from scengen.validate.identity import source_sha256
 
     path = folder / "manifest.json"
     if not path.is_file():
         return True
     manifest = json.loads(path.read_text())
-    return manifest["source_sha256"] != source_sha256(config.task(manifest["config"]["task"]["name"]).family)
+    return manifest["source_sha256"] != source_sha256(load_task(manifest["config"]["task"]["name"]).family)
 
 
 if __name__ == "__main__":

@@ -68,11 +68,11 @@ def _base(name: str, others: Path, target: Path) -> None:
 def sealed(source: Path, target: Path) -> None:
     """Copy a pool; if its certificates rest on other code than there is now, it says that they do not."""
     if make_base.expired(source):
-        from scengen import config
+        from scengen import load_task
         from scengen.validate.identity import source_sha256
 
         draft = Draft.of(source)
-        draft.everywhere(source_sha256=source_sha256(config.task(draft.task["name"]).family))
+        draft.everywhere(source_sha256=source_sha256(load_task(draft.task["name"]).family))
         draft.write(target)
     else:
         shutil.copytree(source, target)

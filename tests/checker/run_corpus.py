@@ -106,14 +106,14 @@ def _apart(work: Callable[[], None]) -> None:
 
 def warm() -> None:
     """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
-    from scengen import cli, config  # noqa: F401
+    from scengen import cli, compose, list_tasks, load_task  # noqa: F401
     from scengen.commands import verify  # noqa: F401
     from scengen.fingerprint import fingerprint
     from scengen.validate.identity import source_sha256
 
     fingerprint()
-    for name in config.tasks():
-        source_sha256(config.task(name).family)
+    for name in list_tasks():
+        source_sha256(load_task(name).family)
 
 
 def _tables(scores: Sequence[Score], outcomes: Sequence[Outcome]) -> Iterable[str]:

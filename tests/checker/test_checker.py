@@ -12,8 +12,8 @@ from checkers import CONTROLS, EASY
 from make_base import BASE, KEPT, POOLS, expired
 from make_corpus import cases, write
 
-from scengen import config
-from scengen.pool.pool import Pool
+from scengen import list_tasks, load_task
+from scengen.pool import Pool
 from scengen.validate.claims import alike
 from scengen.validate.spot import excluded_share
 
@@ -34,7 +34,7 @@ def test_the_corpus_is_large_and_covers_every_task():
     expected = [case.expect for case in corpus]
     assert expected.count("accept") >= 20 and expected.count("reject") + expected.count("refuse") >= 120
     tasks = {arguments[0].removeprefix("task=") for arguments in POOLS.values()}
-    assert tasks == set(config.tasks())
+    assert tasks == set(list_tasks())
     for expect in ("accept", "reject"):
         assert {POOLS[case.base][0] for case in corpus if case.expect == expect} == {f"task={task}" for task in tasks}
 
@@ -42,7 +42,7 @@ def test_the_corpus_is_large_and_covers_every_task():
 @pytest.mark.parametrize("name", KEPT)
 def test_the_pools_in_the_repository_are_those_of_the_families_as_they_are(name):
     pool = Pool.open(BASE / name)
-    task = config.task(pool.manifest["config"]["task"]["name"])
+    task = load_task(pool.manifest["config"]["task"]["name"])
     remedy = "make checker-base"
     assert not expired(BASE / name), remedy
     for row in pool.rows():

@@ -55,11 +55,11 @@ def _spoiled(value: float) -> Callable[[np.ndarray], np.ndarray]:
 
 def _unfiltered(draft: Draft) -> None:
     """The oracle without the filter of the interface: another, quicker robot."""
-    from scengen import config
+    from scengen import load_task
     from scengen.sim.world import World
 
     row = draft.row
-    scenario = config.task(row["task"]).scenario(row["params"])
+    scenario = load_task(row["task"]).scenario(row["params"])
     world = World.load(row["scene_xml"], row["embodiment"])
     world.reset()
     actions = []

@@ -15,7 +15,8 @@ import pytest
 from helpers import REFERENCE
 from pools import QUICKLY, make
 
-from scengen import cli, config, task_files
+from scengen import cli, list_tasks, load_task, task_files
+from scengen.commands.settings import read
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
@@ -133,7 +134,7 @@ def test_fewer_than_asked_for_is_status_1_and_keeps_what_there_is(capsys, tmp_pa
     status, err = said(capsys, *GENERATE, *QUICKLY, *hopeless, f"pool={folder}")
     assert status == 1 and "only 0 of 2 could be certified among 2 indices" in err
     opened = Pool.open(folder)
-    assert len(opened) == 0 and opened.funnel["not trivial"] == 2
+    assert len(opened) == 0 and opened.manifest.funnel["not trivial"] == 2
     rejects = list(opened.rejects())
     assert [r.certificate.verdict for r in rejects] == ["unknown", "unknown"]
     assert all("the oracle failed" in r.certificate.reason and len(r.witness) == 0 for r in rejects)
@@ -156,8 +157,8 @@ def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
     far = ("task.id.x=[uniform,0.1,0.4]", "+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=3", "n=1")
     assert said(capsys, *GENERATE, *QUICKLY, *far, f"pool={tmp_path / 'far'}")[0] == 1
     opened = Pool.open(tmp_path / "far")
-    infeasible = {why: n for why, n in opened.reasons.items() if why.startswith("feasible: ")}
-    lost = opened.funnel["proposed"] - opened.funnel["feasible"]
+    infeasible = {why: n for why, n in opened.manifest.reasons.items() if why.startswith("feasible: ")}
+    lost = opened.manifest.funnel["proposed"] - opened.manifest.funnel["feasible"]
     assert infeasible.keys() == {"feasible: the chain leaves the table"} and sum(infeasible.values()) == lost > 0
 
 
@@ -246,7 +247,7 @@ def test_a_contact_sheet_shows_the_training_twin_and_what_has_moved(tmp_path):
 def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys, tmp_path):
     row = next(Pool.open(made).rows())
     try:
-        scenario = config.task(row.task).scenario(row.params)
+        scenario = load_task(row.task).scenario(row.params)
         picture = film.strip(film.Take.witness(row, scenario), frames=4)
     except render.NoPictures as error:
         assert "libegl1" in str(error)
@@ -268,7 +269,7 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
     task = ["task=domino_single"] if verb in ("generate", "axis", "discover") else []
-    assert config.read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
+    assert read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 
 def test_it_runs_from_any_folder_as_a_module(tmp_path):
@@ -299,4 +300,4 @@ def test_a_scene_that_reaches_outside_itself_is_refused(text, says):
 
 def test_every_task_file_is_found_without_registration():
     files = {path.stem for path in (task_files.conf_dir() / "task").glob("*.yaml")}
-    assert set(config.tasks()) == files and "domino_single" in files
+    assert set(list_tasks()) == files and "domino_single" in files

@@ -7,11 +7,10 @@ import pytest
 from helpers import REFERENCE
 from pools import make
 
-from scengen import cli, config, task_files
+from scengen import cli, compose, list_tasks, load_task, task_files
 from scengen.envs.pools import rows_of
 from scengen.errors import PoolError
-from scengen.pool import collection
-from scengen.pool.pool import Pool
+from scengen.pool import Pool, collection
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +19,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("collection")
     pools = [make(folder / split, split=split, n=1).pool for split in ("id", "diagonal")]
     for pool in pools:
-        collection.write(folder, [pool])  # as a run over several does it
+        collection.write_index(folder, [pool])  # as a run over several does it
     return folder
 
 
@@ -83,16 +82,16 @@ def test_a_strange_index_is_one_clear_line(text, tmp_path):
 
 
 def test_all_tasks_or_a_category_are_a_sweep():
-    every = [one.swept["task"] for one in config.combinations("generate", ["task=all", "n=1"])]
-    assert every == config.tasks()
-    named = [one.swept["task"] for one in config.combinations("generate", ["task=P4,packing,tool_retrieve"])]
-    assert named == [*sorted(t for t in config.tasks() if task_files.category(t) == "P4"), "packing"]
+    every = [one.swept["task"] for one in compose.combinations("generate", ["task=all", "n=1"])]
+    assert every == list_tasks()
+    named = [one.swept["task"] for one in compose.combinations("generate", ["task=P4,packing,tool_retrieve"])]
+    assert named == [*sorted(t for t in list_tasks() if task_files.category(t) == "P4"), "packing"]
 
 
 def test_the_tasks_stand_by_category(capsys):
     _, out, _ = told(capsys, "tasks")
     codes = [word for line in out.splitlines() for word in line.split() if word[:1] in "TM" and word[1:].isdigit()]
-    categories = {config.task(name).code: task_files.category(name) for name in config.tasks()}
+    categories = {load_task(name).code: task_files.category(name) for name in list_tasks()}
     order = [categories[code] for code in codes]
     assert order == sorted(order, key=lambda c: (c == "M", c))
     assert len(codes) == len(categories)

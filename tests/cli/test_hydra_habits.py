@@ -10,12 +10,13 @@ import yaml
 from helpers import REFERENCE
 from pools import QUICKLY
 
-from scengen import cli, config, task_files
+from scengen import cli, compose, task_files
 from scengen.cli.completion import BASH, completions
 from scengen.cli.usage import usage
 from scengen.commands import generate
+from scengen.commands.settings import read_task
 from scengen.errors import BadConfig
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 
 DOMINO = "task=domino_single"
 
@@ -29,12 +30,12 @@ def said(capsys, *argv):
 
 
 def test_lists_and_hydras_own_words_are_combined():
-    found = config.combinations("generate", ["task=glob(balance_*)", "split=id,turned", "n=3", "seed=range(0,2)"])
+    found = compose.combinations("generate", ["task=glob(balance_*)", "split=id,turned", "n=3", "seed=range(0,2)"])
     assert len(found) == 8 and len({one.overrides for one in found}) == 8
     assert found[0].swept == {"task": "balance_hard", "split": "id", "seed": "0"} and "n=3" in found[0].overrides
-    mass = config.combinations("generate", [DOMINO, "task.id.tile.mass=[uniform,0.03,0.04],0.05"])
+    mass = compose.combinations("generate", [DOMINO, "task.id.tile.mass=[uniform,0.03,0.04],0.05"])
     assert [one.swept["task.id.tile.mass"] for one in mass] == ["[uniform,0.03,0.04]", "0.05"]
-    (alone,) = config.combinations("generate", [DOMINO, "keep=refuted,unknown", "task.id.tile.mass=[uniform,1,2]"])
+    (alone,) = compose.combinations("generate", [DOMINO, "keep=refuted,unknown", "task.id.tile.mass=[uniform,1,2]"])
     assert not alone.swept, "these are lists, and no sweeps"
 
 
@@ -58,7 +59,7 @@ def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(c
 
 
 def test_an_axis_of_another_task_of_a_sweep_is_left_out_and_told(capsys):
-    asked = config.combinations("generate", ["task=domino_single,packing", "split=id,tight"])
+    asked = compose.combinations("generate", ["task=domino_single,packing", "split=id,tight"])
     kept, runs = generate._sensible(asked)
     assert [(run.task.name, run.settings.split) for run in runs] == [
         ("domino_single", "id"),
@@ -97,7 +98,7 @@ def test_cfg_job_is_what_the_command_works_with(capsys):
     asked = ("task=seesaw_balance", "n=3", "certify.robust.runs=5", "task.id.x=0.01")
     status, shown = said(capsys, "generate", *asked, "--cfg", "job")
     plain = yaml.safe_load(shown.out)
-    settings, task, certify_settings = config.read_task("generate", asked, generate.Settings)
+    settings, task, certify_settings = read_task("generate", asked, generate.Settings)
     assert status == 0 and plain["n"] == settings.n == 3 and plain["task"]["id"]["x"] == 0.01
     assert plain["certify"]["robust"]["runs"] == certify_settings.robust.runs == 5
     assert plain["certify"]["rest"] == vars(certify_settings.rest), "with what the task's file changes"
@@ -138,8 +139,8 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
     (example,) = re.findall(r"^# Example: (scengen .*)$", text, re.M)
     program, given, *overrides = shlex.split(example)
     assert (program, given) == ("scengen", verb)
-    for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
-        config.shown(verb, getattr(one, "overrides", one))
+    for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
+        compose.shown(verb, getattr(one, "overrides", one))
     takes_task = "task" in task_files.groups(verb)
     assert takes_task == ("stout_starter turned_slab" in text) == ("+task.axes.NAME" in text)
     assert ("certify.robust.runs=4" in text) == ("certify" in task_files.groups(verb))

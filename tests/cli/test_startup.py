@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from scengen import config, task_files
+from scengen import list_tasks, load_task, task_files
 from scengen.control.compilation import NOTICE
 
 HEAVY = {"mujoco", "numba", "scipy", "numpy", "hydra", "pyarrow", "matplotlib", "robosuite", "gymnasium"}
@@ -27,10 +27,10 @@ def test_what_asks_for_little_loads_little(given, status):
     assert told == status and not HEAVY & set(modules) and len(modules) < MOST
 
 
-@pytest.mark.parametrize("name", config.tasks())
+@pytest.mark.parametrize("name", list_tasks())
 def test_a_task_is_told_of_as_it_is_loaded(name):
     """The list of tasks is made from their files alone: what it says is what the loaded family and axes say."""
-    about, task = task_files.about(name), config.task(name)
+    about, task = task_files.about(name), load_task(name)
     for key in ("name", "code", "category", "instruction", "embodiment"):
         assert getattr(about, key) == getattr(task, key)
     assert about.axes == tuple(task.axes)

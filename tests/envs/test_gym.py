@@ -11,12 +11,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.sim.world import IDLE
 
 EVERYTHING = (*observations.streams_of("panda_jaw"),)
@@ -35,7 +35,7 @@ def test_gymnasiums_own_checker_has_nothing_to_say():
 
 
 def test_every_task_is_registered():
-    assert {f"scengen/{name}-v0" for name in config.tasks()} <= set(gymnasium.registry)
+    assert {f"scengen/{name}-v0" for name in list_tasks()} <= set(gymnasium.registry)
 
 
 def test_witnesses_reach_the_goal_and_end_in_the_certified_seconds(env):
@@ -57,7 +57,7 @@ def test_doing_nothing_is_cut_off_at_the_time_limit(env):
         _, reward, terminated, truncated, info = env.step(IDLE)
         over, steps = terminated or truncated, steps + 1
     assert truncated and not terminated and reward == 0.0 and not info["success"]
-    assert steps == round(config.task("domino_single").horizon * 100) and "was not reached" in info["reason"]
+    assert steps == round(load_task("domino_single").horizon * 100) and "was not reached" in info["reason"]
 
 
 def test_the_filter_of_people_and_oracles_is_there_on_request():

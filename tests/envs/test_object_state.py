@@ -9,15 +9,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.envs.object_state import ObjectState, bodies_of
 from scengen.params import values, with_values
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.samplers.split import ID
 from scengen.sim.world import World, hands
 from scengen.validate.rebuilt import rebuild, world_of
 
-HIDING = [name for name in config.tasks() if any(p.hidden for p in config.task(name).known.values())]
+HIDING = [name for name in list_tasks() if any(p.hidden for p in load_task(name).known.values())]
 
 
 def state_of(task):
@@ -32,7 +32,7 @@ def entries(state, read, name):
 def flight():
     """A slab thrown up while the hand moves: the state, the world, the vector, and the same 10 ms before."""
     row = next(Pool.open(REFERENCE).rows())
-    state, world = state_of(config.task(row.task)), World.load(row.scene_xml)
+    state, world = state_of(load_task(row.task)), World.load(row.scene_xml)
     reach = np.array([1, -1, 1, 1, 1, 1, -1], np.float32)
     for _ in range(20):
         world.apply(reach)
@@ -46,7 +46,7 @@ def flight():
 
 @pytest.mark.parametrize("name", HIDING)
 def test_scenarios_that_differ_in_what_is_hidden_look_alike(name):
-    task = config.task(name)
+    task = load_task(name)
     hidden = {p.name: (p.low + p.high) / 2 for p in task.known.values() if p.hidden}
     one, state = task.draw(ID, 0, 0).scenario, state_of(task)
     told = (values(task.draw(ID, 0, index).scenario) for index in range(1, 20))  # all alike: the middle of the bounds
@@ -57,7 +57,7 @@ def test_scenarios_that_differ_in_what_is_hidden_look_alike(name):
 
 def test_what_is_not_hidden_shows():
     """The negative control of the test above: a yaw is seen."""
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     one, state = task.draw(ID, 0, 0).scenario, state_of(task)
     other = with_values(one, {"slab_yaw": one.slab_yaw + 3.0})
     differ = np.flatnonzero(state.read(world_of(one)) != state.read(world_of(other)))
@@ -66,7 +66,7 @@ def test_what_is_not_hidden_shows():
 
 def test_a_centre_of_mass_that_is_hidden_is_in_no_velocity():
     """The velocity of a body's origin, and not that of its centre of mass."""
-    task = config.task("balance_hard")
+    task = load_task("balance_hard")
     state, world = state_of(task), world_of(task.draw(ID, 0, 0).scenario)
     with world.events():
         world.launch("rod", [0.1, 0.2, 0.3], [4.0, 5.0, 6.0])
@@ -97,7 +97,7 @@ def test_the_hand_sees_what_stands_where_it_is_seen(flight):
 
 
 def test_a_body_that_a_scenario_lacks_reads_zero_and_the_others_keep_their_places():
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     state, few = state_of(task), with_values(task.draw(ID, 0, 0).scenario, {"count": 3})
     read = state.read(world_of(few))
     assert state.ordered[:4] == ("slab", "tile_0", "tile_1", "tile_2")
@@ -107,7 +107,7 @@ def test_a_body_that_a_scenario_lacks_reads_zero_and_the_others_keep_their_place
 
 @pytest.mark.parametrize("name", ["ramp_sort", "packing", "domino_select", "mass_sort", "plate_shelf_hetbi"])
 def test_every_split_of_a_task_has_its_bodies_among_the_entries(name):
-    task = config.task(name)
+    task = load_task(name)
     state = state_of(task)
     for split in (ID, *list(task.axes)[:3]):
         scene = task.draw(split, 0, 1).scenario.build()
@@ -115,14 +115,14 @@ def test_every_split_of_a_task_has_its_bodies_among_the_entries(name):
 
 
 def test_bodies_of_a_pool_with_other_distributions_are_there_too():
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     many = with_values(task.draw(ID, 0, 0).scenario, {"count": 8})
     assert "tile_7" not in bodies_of(task)
     assert bodies_of(task, [rebuild(many)])["tile_7"]
 
 
 def test_what_cannot_move_has_a_pose_and_no_velocity():
-    state = state_of(config.task("sheltered_grasp"))
+    state = state_of(load_task("sheltered_grasp"))
     assert state.bodies["rack"] is False and "rack_quat" in state.segments and "rack_vel_lin" not in state.segments
 
 

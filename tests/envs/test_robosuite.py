@@ -11,7 +11,7 @@ import pytest
 from helpers import REFERENCE, pictures_are_possible
 from pools import certificate_of
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.assets.prop import servo
 from scengen.certificate import Certificate
 from scengen.cli.program import run as scengen
@@ -23,7 +23,8 @@ from scengen.envs.robosuite import RobosuiteEnv, env_class
 from scengen.envs.robosuite_models import SceneModel
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.pool.pool import NO_WITNESS, Pool
+from scengen.pool import Pool
+from scengen.pool.row import NO_WITNESS
 from scengen.robots import panda
 from scengen.runs.generate import row_of
 from scengen.sim import scene_text
@@ -50,7 +51,7 @@ def row():
 @cache
 def drawn(task):
     """A row as in a pool, of a scenario that nobody has certified."""
-    found = config.task(task)
+    found = load_task(task)
     draw = found.draw("id", 0, 0)
     text = rebuild(draw.scenario)
     return row_of(found, draw, Certified(Certificate("quick", ()), text, NO_WITNESS, ""))
@@ -93,7 +94,7 @@ def names(model, kind, count):
 
 
 def test_robosuite_knows_every_task():
-    for task in config.tasks():
+    for task in list_tasks():
         name = "".join(part.capitalize() for part in task.split("_"))
         assert robosuite.environments.base.REGISTERED_ENVS[name].NAME == task
 
@@ -106,7 +107,7 @@ def test_robosuite_does_not_tell_where_files_lie_on_this_machine(row, caplog):
     assert any(".json" in record.message for record in caplog.records), "the control: it would have told"
 
 
-@pytest.mark.parametrize("task", config.tasks())
+@pytest.mark.parametrize("task", list_tasks())
 def test_the_text_of_a_scene_means_the_same_to_robosuite(task):
     text = drawn(task).scene_xml
     assert different(SceneModel(text).get_model(), mujoco.MjModel.from_xml_string(text), 0.0) == []

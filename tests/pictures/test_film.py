@@ -8,13 +8,13 @@ import pytest
 from helpers import REFERENCE, pictures_are_possible
 from PIL import Image
 
-from scengen import cli, config
+from scengen import cli, list_tasks, load_task
 from scengen.assets.box import Cube, Domino
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
 from scengen.pictures import film, render
 from scengen.pictures.view import view
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.scenario import Shortcut
 from scengen.sim import scene_text
 from scengen.sim.world import World
@@ -32,7 +32,7 @@ def row():
 
 @pytest.fixture(scope="module")
 def scenario(row):
-    return config.task(row.task).scenario(row.params)
+    return load_task(row.task).scenario(row.params)
 
 
 def on_screen(world, camera, points, aspect):
@@ -47,10 +47,10 @@ def on_screen(world, camera, points, aspect):
     return across / (away @ ahead * half)[:, None]
 
 
-@pytest.mark.parametrize("task", config.tasks())
+@pytest.mark.parametrize("task", list_tasks())
 def test_the_default_view_holds_everything_that_stands_on_the_table(task):
     """All corners in the scene of nominal values, and the hands; it is as near as that and `CLOSEST` allow."""
-    loaded = config.task(task)
+    loaded = load_task(task)
     world = world_of(loaded.family(), loaded.embodiment)
     model, data = world.model, world.data
     others = {world.body("world"), world.body("table"), *world.own}
@@ -110,7 +110,7 @@ def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
 
 
 def test_no_collision_hull_of_any_arm_is_in_the_picture():
-    task = config.task("plate_shelf_hobi")
+    task = load_task("plate_shelf_hobi")
     model = World.load(rebuild(task.family()), task.embodiment, visual=True).model
     render.hide_hulls(model)
     names = [model.body(body).name for body in model.geom_bodyid]

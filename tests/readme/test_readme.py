@@ -7,7 +7,7 @@ from helpers import REFERENCE
 from readme.commands import APART, PAGES, ROOT, commands, why_apart
 from readme.run import run
 
-from scengen import cli, config
+from scengen import cli, compose
 
 LINES = [
     line
@@ -32,8 +32,8 @@ def test_every_setting_of_a_command_exists(line, monkeypatch):
         if "task=push_off" in overrides and verb != "new":  # the task of the example, which is not installed
             monkeypatch.syspath_prepend(ROOT / "example")
             overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
-        for one in config.combinations(verb, overrides) if verb == "generate" else [overrides]:
-            config.shown(verb, getattr(one, "overrides", one))
+        for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
+            compose.shown(verb, getattr(one, "overrides", one))
 
 
 def test_a_command_that_fails_is_seen(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.geometry import UP, about_y, about_z, between
 from scengen.robots import ik, panda
 from scengen.skills.motion import facing_down
@@ -149,7 +149,7 @@ def test_a_box_in_front_of_the_shoulder_is_missed_by_its_near_face(half):
 def test_no_cube_that_is_drawn_can_be_touched_without_the_hook(split):
     """Two proofs that share nothing but the robot: the bound, and a search from eight postures."""
     for index in range(2):
-        scenario = config.task("tool_retrieve").draw(split, 0, index).scenario
+        scenario = load_task("tool_retrieve").draw(split, 0, index).scenario
         middle = scenario.spot + scenario.half * UP
         assert scenario.out_of_touch > 0
         assert ik.reach(middle).residual > max(0.07, ik.shortfall(middle))

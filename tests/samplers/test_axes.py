@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.errors import BadConfig, ScengenError, UnknownName
 from scengen.params import param
 from scengen.samplers import keyed
@@ -13,8 +13,8 @@ from scengen.samplers.task import load
 from scengen.symmetry import Symmetry
 from scengen.tasks.domino_single import DominoSingle
 
-TASKS = config.tasks()
-NODE = config.task("domino_single").node
+TASKS = list_tasks()
+NODE = load_task("domino_single").node
 
 
 def with_axis(**replace):
@@ -23,7 +23,7 @@ def with_axis(**replace):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_every_task_has_axes_that_are_outside_and_say_why(name):
-    task = config.task(name)
+    task = load_task(name)
     assert len(task.axes) >= 3
     for axis in task.axes.values():
         assert axis.why and axis.source

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.errors import BadConfig, Infeasible
 from scengen.params import values
 from scengen.samplers.dists import Choice, Fixed, Integer, LogUniform, Uniform, parse
@@ -19,8 +19,8 @@ from scengen.samplers.task import load
 GOLDEN = Path(__file__).parents[1] / "golden" / "draws.json"
 FIRST = 12
 """Draws of a split that its checksum covers: a changed range or formula moves nearly all of them."""
-TASKS = config.tasks()
-NODE = config.task("domino_single").node
+TASKS = list_tasks()
+NODE = load_task("domino_single").node
 
 
 def test_a_number_depends_on_its_key_alone():
@@ -85,7 +85,7 @@ def test_a_bare_number_is_a_constant():
 
 def test_an_axis_changes_only_what_it_names():
     """Here for one task; tests/tasks/test_conformance.py asks it of every axis of all."""
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     for axis, moved in task.axes.items():
         for index in range(12):
             trained, shifted = task.draw(ID, 0, index), task.draw(axis, 0, index)
@@ -95,7 +95,7 @@ def test_an_axis_changes_only_what_it_names():
 
 
 def test_composed_axes_move_what_each_moves_alone():
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     for index in range(20):
         both = values(task.draw("diagonal+wide_gaps", 0, index).scenario)
         assert both["heading"] == values(task.draw("diagonal", 0, index).scenario)["heading"]
@@ -105,7 +105,7 @@ def test_composed_axes_move_what_each_moves_alone():
 def test_a_new_parameter_or_axis_moves_no_other_value():
     richer = load("domino_single", {**NODE, "id": {**NODE["id"], "slab": {"mass": ["uniform", 0.05, 0.07]}}})
     for index in range(20):
-        before = values(config.task("domino_single").draw(ID, 0, index).scenario)
+        before = values(load_task("domino_single").draw(ID, 0, index).scenario)
         after = values(richer.draw(ID, 0, index).scenario)
         assert {n for n in before if before[n] != after[n]} == {"slab.mass"}
 
@@ -127,7 +127,7 @@ def golden_draws() -> dict[str, str]:
     """A checksum of the first draws of every split."""
     sums = {}
     for name in TASKS:
-        task = config.task(name)
+        task = load_task(name)
         for split in (ID, *task.axes):
             text = json.dumps([_drawn(task, split, i) for i in range(FIRST)], sort_keys=True)
             sums[f"{name}/{split}"] = hashlib.sha256(text.encode()).hexdigest()[:16]

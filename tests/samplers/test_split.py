@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.errors import BadConfig, UnknownName
 from scengen.samplers.split import ID, Part, Split
 
@@ -45,11 +45,11 @@ def test_what_is_no_split_is_refused(text, says):
 @pytest.mark.parametrize("text", ["", "diagonal+", "+", "diagnal", "id@2"])
 def test_a_split_of_no_axis_of_the_task_is_refused(text):
     with pytest.raises(UnknownName, match="no split of domino_single named"):
-        config.task("domino_single").draw(text, 0, 0)
+        load_task("domino_single").draw(text, 0, 0)
 
 
 def test_a_task_travels_to_workers_as_it_is():
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     again = pickle.loads(pickle.dumps(task))
     assert again == task and again.node == task.node
     assert again.draw("wide_gaps@2", 0, 3) == task.draw(Split.parse("wide_gaps@2"), 0, 3)

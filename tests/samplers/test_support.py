@@ -4,11 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import config, task_files
+from scengen import list_tasks, load_task, task_files
+from scengen.commands.settings import read_task
 from scengen.errors import BadConfig, OutOfBounds
 from scengen.ood.features import at_most, departure, sampled, unseen
 from scengen.params import Parameter, parameters, values
-from scengen.runs.generate import Settings
+from scengen.runs.generate import GenerateSettings
 from scengen.samplers.axis import Axis, spell
 from scengen.samplers.dists import Choice, Fixed, Mixture, Uniform, parse
 from scengen.samplers.split import ID
@@ -17,7 +18,7 @@ from scengen.samplers.task import leaves, load
 from scengen.symmetry import Symmetry, images
 from scengen.tasks.domino_single import DominoSingle
 
-NODE = {k: v for k, v in config.task("domino_single").node.items() if k != "limits"}
+NODE = {k: v for k, v in load_task("domino_single").node.items() if k != "limits"}
 KNOWN = {p.name: p for p in parameters(DominoSingle())}
 
 
@@ -144,7 +145,7 @@ def test_bounds_of_sampled_proofs_are_those_of_the_textbook():
 
 
 def test_an_axis_moves_the_features_that_follow_from_what_it_moves():
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     by_name = {d.feature: d for d in sampled(task, "wide_gaps", draws=60).departures}
     gap = by_name["gap_over_height"]
     assert gap.leaves and gap.inside == 0 and gap.bound == pytest.approx(at_most(0, 60)) and "60 draws" in gap.kind
@@ -154,8 +155,8 @@ def test_an_axis_moves_the_features_that_follow_from_what_it_moves():
 
 
 def test_other_numbers_with_the_same_features_are_told_apart_from_new_physics():
-    assert sampled(config.task("domino_single"), "diagonal", draws=20).features_stay
-    assert not sampled(config.task("domino_single"), "light_tiles", draws=20).features_stay
+    assert sampled(load_task("domino_single"), "diagonal", draws=20).features_stay
+    assert not sampled(load_task("domino_single"), "light_tiles", draws=20).features_stay
 
 
 def test_overlap_of_a_feature_is_counted():
@@ -245,9 +246,9 @@ def test_limits_of_an_axis_that_was_dropped_or_changed_do_not_stand_in_the_way()
     assert load("domino_single", {**NODE, "axes": axes, "limits": limits}).axes["mine"].limits == {}
 
 
-@pytest.mark.parametrize("name", config.tasks())
+@pytest.mark.parametrize("name", list_tasks())
 def test_every_recorded_limit_belongs_to_a_parameter_of_an_axis_with_one_path_to_go(name):
-    task, recorded = config.task(name), config.task(name).node.get("limits", {})
+    task, recorded = load_task(name), load_task(name).node.get("limits", {})
     for axis, measured in recorded.items():
         assert {n for n, _ in leaves(measured)} == set(task.axes[axis].limits), "a name in conf/limits is wrong"
         assert not any(isinstance(task.axes[axis].replace[n], Choice) for n in task.axes[axis].limits)
@@ -261,6 +262,6 @@ def test_recorded_limits_are_found_beside_the_task_files_of_any_package(tmp_path
         (tmp_path / group).mkdir()
         (tmp_path / group / "theirs.yaml").write_text(text)
     asked = ["task=theirs", "++task.axes.wide_gaps.severities=5", f"hydra.searchpath=[file://{tmp_path}]"]
-    _, task, _ = config.read_task("generate", asked, Settings)
+    _, task, _ = read_task("generate", asked, GenerateSettings)
     assert task.shifts("wide_gaps@5") == {"gap_ratio": Fixed(1.55)}
     assert task.node["limits"] == {"wide_gaps": {"gap_ratio": 1.55}}, "and so the manifest records it"

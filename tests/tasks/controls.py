@@ -2,7 +2,7 @@
 
 In a test of a task:
 
-    TASK = config.task("domino_single")
+    TASK = load_task("domino_single")
     play(TASK, scenario, scenario.oracle)            # until the plan has ended and everything is at rest
     not_certified(TASK, scenario, "feasible", "cannot reach its neighbour")
 """

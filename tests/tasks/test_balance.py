@@ -17,7 +17,7 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.ridge import Ridge
 from scengen.assets.rod import Rod
@@ -27,7 +27,7 @@ from scengen.sim import scene_text
 from scengen.sim.world import IDLE, World
 from scengen.tasks.balance import LEVEL, Balance
 
-MEDIUM, HARD = config.task("balance_medium"), config.task("balance_hard")
+MEDIUM, HARD = load_task("balance_medium"), load_task("balance_hard")
 BOTH = pytest.mark.parametrize("task", [MEDIUM, HARD], ids=lambda task: task.name)
 ROD = Balance()
 

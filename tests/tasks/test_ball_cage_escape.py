@@ -19,7 +19,7 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.cage import SIDE, TOP, HoledCage
 from scengen.assets.prop import TABLE_TOP
@@ -27,7 +27,7 @@ from scengen.assets.stool import Stool
 from scengen.episode import Episode
 from scengen.tasks.ball_cage_escape import SPARE, STEEPEST, STILL, BallCageEscape
 
-TASK = config.task("ball_cage_escape")
+TASK = load_task("ball_cage_escape")
 NOMINAL = BallCageEscape()
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from controls import ablated, each_refuted_for_its_own_reason, load, play_shortcut, replayed
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.enclosure import Enclosure
 from scengen.sim.world import IDLE
 from scengen.tasks.bounce_intercept import BounceIntercept, place_on
 
-TASK = config.task("bounce_intercept")
+TASK = load_task("bounce_intercept")
 CATCH = TASK.draw("id", 0, 0).scenario
 BACK = BounceIntercept(x=-0.2, y=-0.05, aim=12.0)
 """To the back wall and out again."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from controls import builds_or_is_refuted
 
-from scengen import config
+from scengen import list_tasks, load_task
 from scengen.params import parameters, with_values
 
 DRAWS = 100
@@ -18,9 +18,9 @@ def end_or_between(parameter, random):
     return float(random.choice([low, high, random.uniform(low, high)]))
 
 
-@pytest.mark.parametrize("name", config.tasks())
+@pytest.mark.parametrize("name", list_tasks())
 def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(name):
-    nominal, random = config.task(name).family(), np.random.default_rng(0)
+    nominal, random = load_task(name).family(), np.random.default_rng(0)
     for k in range(DRAWS):
         share = (k + 1) / DRAWS  # few parameters moved: most of these scenes can be built; all of them: hardly any
         moved = [known for known in parameters(nominal) if random.random() < share]

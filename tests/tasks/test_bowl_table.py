@@ -17,7 +17,7 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.bowl import Bowl
 from scengen.geometry import UP, about_y
 from scengen.params import values, with_values
@@ -25,7 +25,7 @@ from scengen.robots.jaw import OPENING
 from scengen.tasks.bowl_table import FALL_ANGLE, MAX_FALL_SPEED, RIM_CLEARANCE, UPRIGHT_TOLERANCE, BowlTable
 from scengen.validate.rollout import replay
 
-TASK = config.task("bowl_table")
+TASK = load_task("bowl_table")
 NOMINAL = BowlTable()
 ACCIDENT = "the bowl lay on its side or upside down"
 

@@ -5,11 +5,11 @@
 
 import pytest
 
-from scengen import config, conformance
+from scengen import conformance, list_tasks
 
 CHECKS = [
     pytest.param(check, id=f"{task}-{check}", marks=[pytest.mark.slow] if "certified" in str(check) else [])
-    for task in config.tasks()
+    for task in list_tasks()
     for check in conformance.checks(task, scenarios=1, certified=("id",))
 ]
 

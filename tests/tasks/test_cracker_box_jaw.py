@@ -16,12 +16,12 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
 from scengen.tasks.cracker_box_jaw import BELOW, PASSES, CrackerBoxJaw
 
-TASK = config.task("cracker_box_jaw")
+TASK = load_task("cracker_box_jaw")
 NOMINAL = CrackerBoxJaw()
 BOX = NOMINAL.box
 

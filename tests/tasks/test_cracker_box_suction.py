@@ -17,14 +17,14 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.geometry import UP, about_z, axes
 from scengen.params import values, with_values
 from scengen.robots import suction
 from scengen.robots.suction import CUP_HALF_WIDTH, TORQUE
 from scengen.tasks.cracker_box_suction import BREAKS, FLAT, HIGH, OFF, CrackerBoxSuction
 
-TASK = config.task("cracker_box_suction")
+TASK = load_task("cracker_box_suction")
 NOMINAL = CrackerBoxSuction()
 BOX = NOMINAL.box
 

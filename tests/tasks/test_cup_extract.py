@@ -15,7 +15,7 @@ from controls import (
     play_shortcut,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, heading, quat
 from scengen.params import with_values
@@ -24,7 +24,7 @@ from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW, pinch
 from scengen.sim.world import ROBOT
 from scengen.tasks.cup_extract import AIR, TAPER, CupExtract
 
-TASK = config.task("cup_extract")
+TASK = load_task("cup_extract")
 NOMINAL = CupExtract()
 
 

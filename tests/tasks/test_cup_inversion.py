@@ -15,12 +15,12 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.physics import GRAVITY
 from scengen.tasks.cup_inversion import FALL_ANGLE, INVERTED_ANGLE, MAX_FALL_SPEED, UPRIGHT_TOLERANCE, CupInversion
 from scengen.validate.rollout import replay
 
-TASK = config.task("cup_inversion")
+TASK = load_task("cup_inversion")
 NOMINAL = CupInversion()
 CUP = NOMINAL.cup
 

@@ -19,7 +19,7 @@ from controls import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Domino
 from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Defect
 from scengen.attack.priors import fit
@@ -28,7 +28,7 @@ from scengen.tasks.domino_select import LANES, SLAB_DISPLACEMENT, DominoSelect
 from scengen.validate.rebuilt import rebuild
 from scengen.validate.rollout import AT_REST, STILL
 
-TASK = config.task("domino_select")
+TASK = load_task("domino_select")
 SPLITS = ["id", *TASK.axes]
 EVERY_KIND = DominoSelect(fourth=Defect(kind=MISSING, place=0.6), count=3)
 """One chain with each kind of defect."""

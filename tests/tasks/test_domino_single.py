@@ -14,12 +14,12 @@ from controls import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Domino
 from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.validate.rollout import AT_REST
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 ELLIPTIC, PYRAMID = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtCone.mjCONE_PYRAMIDAL
 
 

@@ -19,14 +19,14 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.board import Board
 from scengen.assets.prop import TABLE_TOP
 from scengen.sim.world import ROBOT
 from scengen.tasks.edge_slide import LIFTED, LIP, SPARE, EdgeSlide
 from scengen.validate.rollout import AT_REST
 
-TASK = config.task("edge_slide")
+TASK = load_task("edge_slide")
 NOMINAL = EdgeSlide()
 
 

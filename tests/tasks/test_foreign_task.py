@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from foreign.push_block import PushBlock
 
-from scengen import cli, config, conformance, task_files
+from scengen import cli, conformance, list_tasks, load_task, task_files
 from scengen.conformance import rules
 from scengen.conformance.rules import Nonconformity
 from scengen.envs.gym import PoolEnv
@@ -31,7 +31,7 @@ def test_a_foreign_task_and_its_severities_go_through_the_command_line(tmp_path)
 
 def test_a_foreign_axis_that_touches_training_is_refused_with_the_remedy():
     with pytest.raises(BadConfig, match="touches or overlaps its training range"):
-        config.task("push_block", (*SEARCH, "task.axes.far.replace.distance=[uniform,0.13,0.2]"))
+        load_task("push_block", (*SEARCH, "task.axes.far.replace.distance=[uniform,0.13,0.2]"))
 
 
 def broken(rule, task, split="id"):
@@ -41,7 +41,7 @@ def broken(rule, task, split="id"):
 
 
 def test_what_does_not_vary_is_caught():
-    task = config.task("push_block", SEARCH)
+    task = load_task("push_block", SEARCH)
     still = replace(
         task, training={name: Fixed(0.12 if name == "distance" else p.nominal) for name, p in task.known.items()}
     )
@@ -49,7 +49,7 @@ def test_what_does_not_vary_is_caught():
 
 
 def test_an_axis_whose_value_twins_share_is_caught():
-    task = config.task("push_block", SEARCH)
+    task = load_task("push_block", SEARCH)
     same = replace(task.axes["far"], replace={"distance": Fixed(0.12)})
     here = replace(task, training={**task.training, "distance": Fixed(0.12)}, axes={"far": same})
     told = broken(rules._twins_differ_in_the_axis_alone, here, "far")
@@ -58,18 +58,18 @@ def test_an_axis_whose_value_twins_share_is_caught():
 
 def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {"the_oracle_itself": Shortcut(self.oracle)})
-    told = broken(rules._scenarios_are_certified, config.task("push_block", SEARCH))
+    told = broken(rules._scenarios_are_certified, load_task("push_block", SEARCH))
     assert "is refuted" in told and "the_oracle_itself" in told
 
 
 def test_a_feature_with_the_name_of_a_parameter_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "features", lambda self: {"distance": self.distance})
-    told = broken(rules._scenes_have_controls, config.task("push_block", SEARCH))
+    told = broken(rules._scenes_have_controls, load_task("push_block", SEARCH))
     assert "distance name both parameters and features" in told
 
 
 def test_an_instruction_that_names_its_axis_is_caught():
-    task = replace(config.task("push_block", SEARCH), instruction="Push the block far.")
+    task = replace(load_task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
         rules._told_well(task)
 
@@ -89,14 +89,14 @@ def installed(tmp_path, monkeypatch):
 
 
 def test_an_installed_package_offers_its_tasks_to_every_command(installed, tmp_path, capsys):
-    assert {"push_block", "domino_single"} < set(config.tasks()) == set(config.tasks(SEARCH))
-    assert config.task("push_block").family is PushBlock
+    assert {"push_block", "domino_single"} < set(list_tasks()) == set(list_tasks(SEARCH))
+    assert load_task("push_block").family is PushBlock
     assert cli.run(("tasks",)) == 0 and "push_block" in capsys.readouterr().out
     assert cli.run(("tasks", "task=push_bloc")) == 2 and "did you mean 'push_block'" in capsys.readouterr().err
     (installed / "entry_points.txt").write_text("[scengen.tasks]\nours = foreign.config\n")
     task_files.packages.cache_clear()
     assert cli.run(("tasks",)) == 2
-    assert "package foreign offers tasks in foreign.config/task, which is not there" in capsys.readouterr().err
+    assert "package foreign offers tasks in foreign.config/task, which does not exist" in capsys.readouterr().err
 
 
 def test_policies_play_foreign_tasks(tmp_path):

@@ -6,12 +6,12 @@ from controls import load
 from foreign.push_block import PushBlock
 from foreign.push_pair import PushPair
 
-from scengen import config
+from scengen import load_task
 from scengen.conformance import frames
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.rollout import run
 
-DOMINO = config.task("domino_single")
+DOMINO = load_task("domino_single")
 
 
 class OnTheTable(PushBlock):

@@ -20,13 +20,13 @@ from helpers import anywhere
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.ramp import Ramp
 from scengen.params import parameters, with_values
 from scengen.tasks.galileo_ramp_drop import GalileoRampDrop
 
-TASK = config.task("galileo_ramp_drop")
+TASK = load_task("galileo_ramp_drop")
 NOMINAL = GalileoRampDrop()
 
 

@@ -16,14 +16,14 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.gap_wall import GapWall, Kerb
 from scengen.attack.priors import fit
 from scengen.sim.world import IDLE
 from scengen.tasks.gap_funnel import GapFunnel
 
-TASK = config.task("gap_funnel")
+TASK = load_task("gap_funnel")
 PLAIN = GapFunnel()
 
 

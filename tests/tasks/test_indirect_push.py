@@ -17,7 +17,7 @@ from controls import (
     spared,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.robots import ik
@@ -26,7 +26,7 @@ from scengen.robots.panda import BASE
 from scengen.sim.world import ROBOT
 from scengen.tasks.indirect_push import COASTING, FRONT, INSIDE, ZONE, IndirectPush, Spot
 
-TASK = config.task("indirect_push")
+TASK = load_task("indirect_push")
 NOMINAL = IndirectPush()
 
 

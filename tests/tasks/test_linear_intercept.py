@@ -13,12 +13,12 @@ from controls import (
     replayed,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.sim.world import IDLE
 from scengen.tasks.linear_intercept import LinearIntercept
 
-TASK = config.task("linear_intercept")
+TASK = load_task("linear_intercept")
 CATCH = TASK.draw("id", 0, 0).scenario
 
 

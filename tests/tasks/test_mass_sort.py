@@ -17,7 +17,7 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.attack.priors import fit
 from scengen.params import parameters
 from scengen.sim.world import IDLE
@@ -25,7 +25,7 @@ from scengen.skills import jaw
 from scengen.tasks.mass_sort import APART, ORDERS, MassSort, Spot
 from scengen.validate.rebuilt import world_of
 
-TASK = config.task("mass_sort")
+TASK = load_task("mass_sort")
 SCENE = MassSort()
 
 

@@ -16,7 +16,7 @@ from controls import (
     replayed,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Cube, Lid
 from scengen.assets.prop import CAMERAS, TABLE_TOP
 from scengen.attack.priors import fit
@@ -25,7 +25,7 @@ from scengen.params import parameters
 from scengen.sim.world import IDLE, ROBOT
 from scengen.tasks.occluder_push import COUNT, OTHERS, RED, OccluderPush, Spot
 
-TASK = config.task("occluder_push")
+TASK = load_task("occluder_push")
 SCENE = OccluderPush(red=0)
 WRONG = "another cube was put on the patch"
 

@@ -11,12 +11,12 @@ from controls import ablated, each_refuted_for_its_own_reason, load, mistaken, n
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.assets import guillotine
 from scengen.params import values, with_values
 from scengen.tasks.packing import Packing, Spot
 
-TASK = config.task("packing")
+TASK = load_task("packing")
 NOMINAL = Packing()
 cuts = st.fixed_dictionaries(
     {

@@ -17,12 +17,12 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.pendulum import Pendulum
 from scengen.sim.world import IDLE
 from scengen.tasks.pendulum_grasp import APEX, BOB, HINGE, PendulumGrasp
 
-TASK = config.task("pendulum_grasp")
+TASK = load_task("pendulum_grasp")
 GRASP = TASK.draw("id", 0, 0).scenario
 
 

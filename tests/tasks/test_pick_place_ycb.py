@@ -17,12 +17,12 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.ycb import Ycb
 from scengen.episode import Episode
 from scengen.tasks.pick_place_ycb import APART, FIELD, LIFTED, Jump, PickPlaceYcb
 
-TASK = config.task("pick_place_ycb")
+TASK = load_task("pick_place_ycb")
 NOMINAL = PickPlaceYcb()
 
 

@@ -16,14 +16,14 @@ from controls import (
     solution,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.crowned_ramp import CrownedRamp
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.sim.world import ROBOT
 from scengen.tasks.ramp_sort import BIN_FLOOR, RampSort
 
-TASK = config.task("ramp_sort")
+TASK = load_task("ramp_sort")
 NOMINAL = RampSort(reds=1, blues=1)
 """The smallest sorting there is, which takes half as long."""
 

@@ -18,7 +18,7 @@ from controls import (
     solution,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.peg import Peg
 from scengen.assets.slot_board import PLATE_THICKNESS, SlotBoard
 from scengen.episode import Episode
@@ -27,7 +27,7 @@ from scengen.sim.world import World
 from scengen.tasks.recover_peg_insert import ALIGNED, BESIDE, DEEP, FLUSH, HINGE, HOME, RecoverPegInsert
 from scengen.validate.rollout import Jitter, run
 
-TASK = config.task("recover_peg_insert")
+TASK = load_task("recover_peg_insert")
 NOMINAL = RecoverPegInsert()
 NO_TURN = math.radians(0.05)
 

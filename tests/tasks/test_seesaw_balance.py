@@ -9,7 +9,7 @@ from controls import ablated, load, not_certified, play, play_shortcut, refuted,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Block
 from scengen.assets.prop import place, table
 from scengen.assets.seesaw import Seesaw
@@ -19,7 +19,7 @@ from scengen.sim.world import IDLE, World
 from scengen.tasks.seesaw_balance import BEAM, LEVEL, STAYS, SeesawBalance
 from scengen.validate.rebuilt import rebuild
 
-TASK = config.task("seesaw_balance")
+TASK = load_task("seesaw_balance")
 SPLITS = ["id", *TASK.axes]
 LIGHT, HEAVY = SeesawBalance(weight=Block(mass=0.14)), SeesawBalance(weight=Block(mass=0.35))
 

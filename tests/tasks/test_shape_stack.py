@@ -13,14 +13,14 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.shape import FRUSTUM, Shape
 from scengen.attack.priors import fit
 from scengen.geometry import UP, heading
 from scengen.sim.world import IDLE
 from scengen.tasks.shape_stack import Piece, ShapeStack
 
-TASK = config.task("shape_stack")
+TASK = load_task("shape_stack")
 THREE = ShapeStack(count=3)
 NAMES = tuple(THREE.pieces)
 Y = heading(90.0)

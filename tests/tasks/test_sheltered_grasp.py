@@ -18,7 +18,7 @@ from controls import (
     spared,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Cube
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.rack import TierRack
@@ -26,7 +26,7 @@ from scengen.robots.jaw import PALM_ACROSS, PALM_ALONG
 from scengen.sim.world import ROBOT, World
 from scengen.tasks.sheltered_grasp import AIR, AT, RAISED, TRAY, ShelteredGrasp
 
-TASK = config.task("sheltered_grasp")
+TASK = load_task("sheltered_grasp")
 NOMINAL = ShelteredGrasp()
 
 

@@ -16,7 +16,7 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.ycb import Ycb
 from scengen.control.loop import Loop
@@ -28,7 +28,7 @@ from scengen.skills.grip import extent
 from scengen.skills.motion import go_to
 from scengen.tasks.slip_recovery import FLOWN, LIFTED, LOST, LOWERED, SLID, Slip, SlipRecovery
 
-TASK = config.task("slip_recovery")
+TASK = load_task("slip_recovery")
 NOMINAL = SlipRecovery()
 
 

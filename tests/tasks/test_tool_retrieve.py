@@ -20,7 +20,7 @@ from controls import (
     unchecked,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.hook import LHook
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
@@ -30,7 +30,7 @@ from scengen.sim.world import ROBOT
 from scengen.skills.hook import nearest_pull, put_down, slide
 from scengen.tasks.tool_retrieve import ARM, DRAWN_TO, LIFTED, ToolRetrieve
 
-TASK = config.task("tool_retrieve")
+TASK = load_task("tool_retrieve")
 NOMINAL = ToolRetrieve()
 
 

@@ -11,9 +11,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import pictures_are_possible
 from pools import QUICKLY, rewritten
-from scengen.pool.schema import Malformed
 
-from scengen import cli, config, conformance
+from scengen import cli, compose, conformance, load_task
 from scengen.attack.evidence import Causal
 from scengen.attack.macros import Macro
 from scengen.attack.player import Attempt, Player
@@ -28,7 +27,8 @@ from scengen.errors import BadConfig, PoolError
 from scengen.evaluate import policies
 from scengen.evaluate.rollouts import BadPolicy, PolicyPlayer, RolloutId
 from scengen.evaluate.rollouts import EvaluateSettings as Evaluation
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
+from scengen.pool.untrusted import Malformed
 from scengen.sim.world import World
 from scengen.validate.rollout import Jitter, replay
 
@@ -52,8 +52,8 @@ def rows(folder):
 @pytest.fixture
 def known(monkeypatch):
     """Let environments find the task: they know no search path."""
-    find = config.task
-    monkeypatch.setattr(config, "task", lambda name, overrides=(): find(name, (*SEARCH, *overrides)))
+    find = load_task
+    monkeypatch.setattr(compose, "load_task", lambda name, overrides=(): find(name, (*SEARCH, *overrides)))
 
 
 @pytest.mark.parametrize("check", conformance.checks("push_pair", conf=CONF, scenarios=1), ids=str)
@@ -185,7 +185,7 @@ def test_recordings_hold_the_actions_of_both_arms(folder, rows, tmp_path):
 
 @pytest.fixture(scope="module")
 def player(rows):
-    row, task = rows[0], config.task("push_pair", SEARCH)
+    row, task = rows[0], load_task("push_pair", SEARCH)
     return Player(task.scenario(row.params), row.scene_xml, PAIR, row.horizon, row.witness)
 
 
@@ -220,7 +220,7 @@ def test_retries_are_made_by_both_arms(player):
 def test_witnesses_replay_bit_for_bit(rows):
     for row in rows:
         again = replay(
-            config.task("push_pair", SEARCH).scenario(row.params),
+            load_task("push_pair", SEARCH).scenario(row.params),
             World.load(row.scene_xml, row.embodiment),
             row.witness,
             row.horizon,

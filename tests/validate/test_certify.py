@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from scengen import config
+from scengen import load_task
 from scengen.certificate import CHECKS
 from scengen.geometry import UP
 from scengen.sim.world import ROBOT, World
@@ -22,7 +22,7 @@ HORIZON = 12.0
 
 @pytest.fixture(scope="module")
 def good():
-    return certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
+    return certify(load_task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
 
 
 def test_a_good_scene_passes_every_check(good):
@@ -40,12 +40,12 @@ def test_the_certificate_keeps_how_every_shortcut_ended(good):
 
 
 def test_the_certificate_keeps_what_the_physics_depends_on(good):
-    features = config.task("domino_single").draw("id", 0, 1).scenario.features()
+    features = load_task("domino_single").draw("id", 0, 1).scenario.features()
     assert good.certificate.checks[0].name == "feasible" and good.certificate.checks[0].numbers == features
 
 
 def test_certifying_twice_gives_the_same_bits(good):
-    again = certify(config.task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
+    again = certify(load_task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings())
     assert again.digest == good.digest and np.array_equal(again.witness, good.witness)
     assert again.certificate == good.certificate
 
@@ -219,7 +219,7 @@ def test_jitter_moves_what_it_should_by_what_its_key_says():
 
 def test_jitter_turns_a_hinge_that_is_named_about_its_axle():
     """The bob of a pendulum stays at its distance from the axle, and the joint reads where it hangs."""
-    scenario = config.task("pendulum_grasp").draw("id", 0, 0).scenario
+    scenario = load_task("pendulum_grasp").draw("id", 0, 0).scenario
     world = world_of(scenario)
     turned = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world, scenario.DISTURBED)
     (before, _), (angle, rate) = world.hinge(HINGE), turned.hinge(HINGE)
@@ -235,7 +235,7 @@ def test_jitter_turns_a_hinge_that_is_named_about_its_axle():
 
 
 def test_a_replay_after_a_used_world_ends_in_the_same_bits(good):
-    scenario = config.task("domino_single").draw("id", 0, 1).scenario
+    scenario = load_task("domino_single").draw("id", 0, 1).scenario
     world = World.load(good.scene_xml)
     run(scenario, world, scenario.shortcuts()["push_the_slab"].plan, 3.0)
     assert replay(scenario, world, good.witness, HORIZON).digest == good.digest

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from scengen import config, conformance
+from scengen import conformance, load_task
 from scengen.conformance import rules
 from scengen.conformance.rules import Nonconformity
 from scengen.scenario import Shortcut
 from scengen.tasks.domino_single import DominoSingle
 
-TASK = config.task("domino_single")
+TASK = load_task("domino_single")
 
 
 @dataclass(frozen=True, kw_only=True)

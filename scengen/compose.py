@@ -1,15 +1,19 @@
-"""From the command line to checked settings: Hydra composes, this module types and explains."""
+"""Composition of settings by Hydra: the files in conf/ with the overrides of a command line, as plain data.
+
+Hydra's errors become one line each, with the nearest name or a remedy. Tasks are composed and loaded here too; settings
+of commands are checked in `scengen.commands.settings`.
+"""
 
 import itertools
 import logging
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
 from hydra import compose, initialize_config_dir
@@ -22,48 +26,54 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .samplers.task import Task, load
-from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path
-from .task_files import tasks as tasks  # for those who load them all
+from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path, tasks
+from .typed import typed
 from .validate.settings import CertifySettings
-from .work.cluster import AUTO, Cluster
-from .work.parallel import Workers, cores
-
-T = TypeVar("T")
 
 
-def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
-    """The settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
+def load_task(name: str, search: Sequence[str] = ()) -> Task:
+    """The task of that name.
 
     Args:
-        kind: dataclass that says which settings there are, and their types.
+        name: of its file, a plain word: it never leads out of the folders of tasks.
+        search: further overrides, such as folders of other packages (`search_path`) or `task.horizon=20`.
 
     Raises:
-        ScengenError: one line that says what is wrong.
+        UnknownName: there is no such file.
     """
-    return typed("", kind, _settings(verb, _composed(verb, overrides)[0]))
+    if name not in (known := tasks(search_path(search))):  # a name from a pool must not leave the folders of task files
+        raise UnknownName("task", name, known)
+    return _loaded(name, search) if search else _installed(name, packages())
 
 
-def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task, CertifySettings]:
-    """The settings of a command that takes a task, the task, and the settings of its certificates.
+@cache
+def _installed(name: str, others: tuple[str, ...]) -> Task:
+    """A task as its file stands; read once, as the code of its family is.
 
-    Raises:
-        ScengenError: one line that says what is wrong.
+    Args:
+        others: folders of other packages that offer tasks.
     """
-    plain, choices = _composed(verb, overrides)
-    settings = typed("", kind, _settings(verb, plain))
-    found = load(choices["task"], plain["task"])
-    certify_settings = typed("certify", CertifySettings, _settled(plain["certify"], found, choices["certify"]))
-    certify_settings.check()
-    return settings, found, certify_settings
+    return _loaded(name, ())
 
 
-def chosen(verb: str, overrides: Sequence[str]) -> str | None:
+def _loaded(name: str, search: Sequence[str]) -> Task:
+    plain, choices = composed("one_task", [f"task={name}", *search])
+    return load(choices["task"], plain["task"])
+
+
+def certify_levels(found: Task) -> dict[str, CertifySettings]:
+    """The settings that stand behind each name of a level, such as `quick`, for a task: without a command line."""
+    names = sorted(path.stem for path in (conf_dir() / "certify").glob("*.yaml"))
+    return {name: typed("certify", CertifySettings, settled({}, found, name)) for name in names}
+
+
+def chosen_task(verb: str, overrides: Sequence[str]) -> str | None:
     """Name of the task that a command line chooses, for a command that may go without; None if it does not.
 
     Raises:
         ScengenError: one line that says what is wrong.
     """
-    return _composed(verb, overrides)[1].get("task")
+    return composed(verb, overrides)[1].get("task")
 
 
 @dataclass(frozen=True)
@@ -137,9 +147,9 @@ def shown(verb: str, overrides: Sequence[str]) -> str:
     Raises:
         ScengenError: one line that says what is wrong.
     """
-    plain, choices = _composed(verb, overrides)
+    plain, choices = composed(verb, overrides)
     if {"certify", "task"} <= choices.keys():
-        plain["certify"] = _settled(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
+        plain["certify"] = settled(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
     lines = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
     told = {"sort_keys": False, "allow_unicode": True, "width": 120}
     return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **told) for key, flow in lines.items())
@@ -153,7 +163,7 @@ def show_origin(verb: str, overrides: Sequence[str], what: str) -> None:
     """
     if what not in ORIGINS:
         raise UnknownName("information of --info", what, ORIGINS)
-    _composed(verb, overrides)
+    composed(verb, overrides)
     with _logging_kept(), initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
         asked = [_listed(o) for o in overrides]
         asked = _with_packages(asked) if groups(verb) else asked
@@ -182,87 +192,7 @@ def _with_packages(overrides: Sequence[str]) -> list[str]:
     return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
 
 
-def task(name: str, search: Sequence[str] = ()) -> Task:
-    """The task of that name.
-
-    Args:
-        name: of its file, a plain word: it never leads out of the folders of tasks.
-        search: further overrides, such as folders of other packages (`search_path`) or `task.horizon=20`.
-
-    Raises:
-        UnknownName: there is no such file.
-    """
-    if name not in (known := tasks(search_path(search))):  # a name from a pool must not leave the folders of task files
-        raise UnknownName("task", name, known)
-    return _loaded(name, search) if search else _installed(name, packages())
-
-
-@cache
-def _installed(name: str, others: tuple[str, ...]) -> Task:
-    """A task as its file stands; read once, as the code of its family is.
-
-    Args:
-        others: folders of other packages that offer tasks.
-    """
-    return _loaded(name, ())
-
-
-def _loaded(name: str, search: Sequence[str]) -> Task:
-    plain, choices = _composed("one_task", [f"task={name}", *search])
-    return load(choices["task"], plain["task"])
-
-
-def levels(found: Task) -> dict[str, CertifySettings]:
-    """The settings that stand behind each name of a level, such as `quick`, for a task: without a command line."""
-    names = sorted(path.stem for path in (conf_dir() / "certify").glob("*.yaml"))
-    return {name: typed("certify", CertifySettings, _settled({}, found, name)) for name in names}
-
-
-def typed(where: str, cls: type[T], node: Mapping[str, Any]) -> T:
-    """Fill a dataclass from plain data, checking names and types.
-
-    Raises:
-        UnknownName, BadConfig: a key or the type of a value is wrong.
-    """
-    known = {f.name: f for f in fields(cls)}  # type: ignore[arg-type]
-    for key in node:
-        if key not in known:
-            raise UnknownName(f"key of {where}" if where else "key", key, known)
-    filled = {}
-    for name, field in known.items():
-        default = field.default if field.default is not MISSING else None
-        if field.default_factory is not MISSING:
-            default = field.default_factory()
-        filled[name] = _value(f"{where}.{name}".strip("."), field.type, node.get(name, default))
-    return cls(**filled)
-
-
-def _value(where: str, kind: Any, value: Any) -> Any:
-    if is_dataclass(kind):
-        if not isinstance(value, (Mapping, kind)):  # type: ignore[arg-type]
-            raise BadConfig(f"{where} = {cut(repr(value))}; it must be a group of settings")
-        return value if isinstance(value, kind) else typed(where, kind, value)  # type: ignore[arg-type]
-    spelled = {int: "a whole number", float: "a number", str: "a word", bool: "true or false"}
-    options = kind.__args__ if hasattr(kind, "__args__") and not hasattr(kind, "__origin__") else (kind,)
-    if float in options and isinstance(value, int) and not isinstance(value, bool):
-        with suppress(OverflowError):  # a number of hundreds of digits, which is refused below
-            return float(value)
-    if value is None and type(None) in options:
-        return None
-    if str in options and isinstance(value, (int, float)) and not isinstance(value, bool):
-        return str(value)
-    for option in options:
-        plain = getattr(option, "__origin__", option)
-        if isinstance(value, plain) and not (isinstance(value, bool) and plain is not bool):
-            if plain is list:
-                return [_value(f"{where}[{i}]", option.__args__[0], each) for i, each in enumerate(value)]
-            if plain is not str or "\0" not in value:
-                return value
-    wanted = " or ".join(spelled.get(o, "a list of words") for o in options if o is not type(None))
-    raise BadConfig(f"{where} = {cut(repr(value))}; it must be {wanted}")
-
-
-def _composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
+def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
     """The whole configuration as plain data, and which file was chosen in each group."""
     with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
         try:
@@ -351,32 +281,6 @@ def _depth(text: str) -> int:
     return deepest
 
 
-def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything but what is chosen from files, such as task and certify."""
-    settings = {key: value for key, value in plain.items() if key not in groups(verb)}
-    for key, value in settings.items():
-        if value == "???":
-            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
-    if "workers" in settings:
-        settings["workers"] = _workers(settings["workers"], plain.get("executor"))
-    return settings
-
-
-def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
-    """Who works: `workers=auto` stands for all cores, of this machine or of the cluster that executor=ray names.
-
-    Raises:
-        ScengenError: it is no number, or there is no such cluster.
-    """
-    if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
-        raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")
-    if not executor:
-        return cores() if count == AUTO else count
-    cluster = typed("executor", Cluster, {**executor, "count": None if count == AUTO else count})
-    cluster.connect()
-    return cluster
-
-
 def _listed(override: str) -> str:
     """`keep=refuted,unknown`, `pool=a,b` and the like mean lists here, not sweeps; `keep` always is one.
 
@@ -389,7 +293,7 @@ def _listed(override: str) -> str:
     return f"{key}=[{value}]" if many and not value.startswith("[") else override
 
 
-def _settled(node: Mapping[str, Any], task: Task, choice: str) -> dict[str, Any]:
+def settled(node: Mapping[str, Any], task: Task, choice: str) -> dict[str, Any]:
     """The chosen file of conf/certify, then the task's own settings, then the command line: the later one wins."""
     base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{choice}.yaml"))  # type: ignore[assignment]
     asked = OmegaConf.create(_difference(node, base))

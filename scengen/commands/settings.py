@@ -1,0 +1,67 @@
+"""Settings of commands: composed by Hydra, checked, and filled into dataclasses."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from ..compose import composed, settled
+from ..errors import BadConfig, cut
+from ..samplers.task import Task, load
+from ..task_files import groups
+from ..typed import typed
+from ..validate.settings import CertifySettings
+from ..work.cluster import AUTO, Cluster
+from ..work.parallel import Workers, cores
+
+T = TypeVar("T")
+
+
+def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
+    """The settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
+
+    Args:
+        kind: dataclass that says which settings there are, and their types.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    return typed("", kind, _settings(verb, composed(verb, overrides)[0]))
+
+
+def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task, CertifySettings]:
+    """The settings of a command that takes a task, the task, and the settings of its certificates.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    plain, choices = composed(verb, overrides)
+    settings = typed("", kind, _settings(verb, plain))
+    found = load(choices["task"], plain["task"])
+    certify_settings = typed("certify", CertifySettings, settled(plain["certify"], found, choices["certify"]))
+    certify_settings.check()
+    return settings, found, certify_settings
+
+
+def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything but what is chosen from files, such as task and certify."""
+    settings = {key: value for key, value in plain.items() if key not in groups(verb)}
+    for key, value in settings.items():
+        if value == "???":
+            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
+    if "workers" in settings:
+        settings["workers"] = _workers(settings["workers"], plain.get("executor"))
+    return settings
+
+
+def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
+    """Who works: `workers=auto` stands for all cores, of this machine or of the cluster that executor=ray names.
+
+    Raises:
+        ScengenError: it is no number, or there is no such cluster.
+    """
+    if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
+        raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")
+    if not executor:
+        return cores() if count == AUTO else count
+    cluster = typed("executor", Cluster, {**executor, "count": None if count == AUTO else count})
+    cluster.connect()
+    return cluster
