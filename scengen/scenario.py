@@ -151,7 +151,7 @@ class Scenario(abc.ABC):
         """Whether the goal holds now."""
 
     def failure(self, world: World) -> str | None:
-        """Reason why the episode is lost for good, or None. A failure ends the episode."""
+        """Reason why the episode is lost, or None. A failure ends the episode."""
         return None
 
     def events(self, world: World) -> None:  # noqa: B027

@@ -118,7 +118,7 @@ def paired(a: Sequence[Sequence[bool]], b: Sequence[Sequence[bool]], confidence:
     """
     one, other = (np.array([np.mean(s) for s in side]) for side in (a, b))
     if len(one) != len(other):
-        raise ValueError("twins come in pairs")
+        raise ValueError(f"{len(one)} and {len(other)} scenarios; twins need the same number on both sides")
     spread = one.std() * other.std()
     correlation = float(((one - one.mean()) * (other - other.mean())).mean() / spread) if spread > 0 else 0.0
     return Difference(*_difference_interval(rate(a, confidence), rate(b, confidence), correlation), len(one))

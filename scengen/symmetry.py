@@ -41,7 +41,7 @@ class Symmetry:
         missing = [n for n in self.reflect if n not in names]
         missing += [n for n in names if self.source(n) not in names]
         if missing or (self.swap and all(self.source(n) == n for n in names)):
-            raise BadConfig(f"symmetry {self.name!r} speaks of parameters that do not exist: {missing or self.swap}")
+            raise BadConfig(f"symmetry {self.name!r} names parameters that do not exist: {missing or self.swap}")
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,9 @@ def _offered(point: EntryPoint) -> str:
         if Path(folder, "task").is_dir():
             return folder
     whose = point.dist.name if point.dist else point.name
-    raise BadConfig(f"the package {whose} offers tasks in {point.value}/task, which is not there; mend or remove it")
+    raise BadConfig(
+        f"the package {whose} offers tasks in {point.value}/task, which does not exist; reinstall or remove the package"
+    )
 
 
 def groups(verb: str) -> list[str]:

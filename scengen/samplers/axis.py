@@ -1,4 +1,4 @@
-"""An OOD axis: which parameters leave their training support, where they go, and why."""
+"""An OOD axis: the parameters that leave their training support, their new distributions, and the reason."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -16,12 +16,14 @@ class Proof:
     """Evidence that one parameter of an axis takes no training value."""
 
     parameter: str
+    """Name of the parameter."""
     kind: str
-    """`interval`, or `categorical` when one of the two supports is a finite set; `, modulo P` if periodic."""
+    """`interval`, or `categorical` if one of the two supports is a finite set; followed by `, modulo P` if it is
+    periodic."""
     gap: float
     """Smallest distance between a training value and a value of the axis, in the parameter's unit."""
     relative: float | None
-    """The gap in widths of the training range; None when training knows one value only."""
+    """Gap in widths of the training range; None if training has only one value."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +31,17 @@ class Axis:
     """A named departure from the training distribution."""
 
     name: str
+    """Name of the axis."""
     why: str
-    """What it probes, and why a habit from training fails there."""
+    """Ability that the axis probes, and the reason why a habit from training fails there."""
     source: str
+    """Source of the axis, such as a section of the paper."""
     replace: Mapping[str, Dist]
-    """New distribution of every parameter that moves; all others keep theirs."""
+    """New distribution of every parameter that moves. All others keep theirs."""
     severities: int = 0
-    """How many severities there are, `name@1` to `name@severities`; 0 for none."""
+    """Number of severities, `name@1` to `name@severities`; 0 if there are none."""
     limits: Mapping[str, float] = field(default_factory=dict)
-    """Measured ends of the path by parameter, from conf/limits: where the oracle fails."""
+    """Measured ends of the path by parameter, from conf/limits: the values at which the oracle fails."""
 
     def prove(
         self,
@@ -58,14 +62,14 @@ class Axis:
         if not self.replace:
             raise BadConfig(f"axis {self.name} replaces no parameter; name at least one under `replace`")
         proofs = [self._prove(known[name], dist, training[name]) for name, dist in self.replace.items()]
-        self._not_training_again(training, known, symmetries)
+        self._check_symmetries(training, known, symmetries)
         return proofs
 
     def at(self, severity: int, training: Mapping[str, Dist], known: Mapping[str, Parameter]) -> "Axis":
-        """The axis at one severity: every value is `severity / severities` of the path from training to the far end.
+        """The axis at one severity: every value is at `severity / severities` of the path from training to the far end.
 
         The path of a value begins at the nearest training value. It ends at the far end of its range, or at the
-        measured limit if there is one. A range thus becomes one value, several separate values remain several.
+        measured limit if there is one. A range thus becomes one value; several separate values remain several.
 
         Raises:
             BadConfig: there is no such severity, or a whole number would have to be a fraction.
@@ -80,7 +84,7 @@ class Axis:
     def along(
         self, fraction: float, training: Mapping[str, Dist], known: Mapping[str, Parameter]
     ) -> dict[str, Fixed | Choice]:
-        """Where the axis' parameters are at a fraction of the path: 0 the edge of training, 1 the far end.
+        """Distributions of the axis' parameters at a fraction of the path: 0 is the edge of training, 1 the far end.
 
         Raises:
             BadConfig: a whole number would have to be a fraction.
@@ -88,6 +92,11 @@ class Axis:
         return {n: self._on_path(fraction, known[n], d, training[n].support) for n, d in self.replace.items()}
 
     def _prove(self, parameter: Parameter, there: Dist, here: Dist) -> Proof:
+        """Prove that one parameter leaves its training support.
+
+        Raises:
+            BadConfig: it does not.
+        """
         gap = distance(here.support, there.support, parameter.period)
         if gap <= 0:
             modulo = f" modulo {parameter.period:g}" if parameter.period else ""
@@ -104,12 +113,12 @@ class Axis:
         span = width(here.support)
         return Proof(parameter.name, kind, gap, gap / span if span > 0 else None)
 
-    def _not_training_again(
+    def _check_symmetries(
         self, training: Mapping[str, Dist], known: Mapping[str, Parameter], symmetries: Sequence[Symmetry]
     ) -> None:
-        """Raise if a symmetric image of the training scenes takes in scenes of the axis.
+        """Raise if a symmetric image of the training scenes contains scenes of the axis.
 
-        Scenes are apart where any one parameter is, named by the axis or not.
+        Two scenes differ if any one parameter differs, whether the axis names it or not.
         """
         here = {name: dist.support for name, dist in training.items()}
         there = {**here, **{name: dist.support for name, dist in self.replace.items()}}
@@ -122,6 +131,7 @@ class Axis:
                 )
 
     def _on_path(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:
+        """Distribution of one parameter at a fraction of its path."""
         whole = isinstance(dist, Integer)  # its values are separate, but lie on one path
         ranges = (Interval(dist.low, dist.high),) if whole else dist.support
         listed = [Interval(v, v) for v in dist.options] if isinstance(dist, Choice) else ranges
@@ -129,6 +139,7 @@ class Axis:
         return Fixed(values[0]) if len(set(values)) == 1 else Choice(tuple(values))
 
     def _value(self, fraction: float, parameter: Parameter, target: Interval, training: Support) -> Value:
+        """Value at a fraction of the path to one target range."""
         period = parameter.period
         ends = [target.low, target.high, *_opposite(training, target, period)]
         far = max(ends, key=lambda v: abs(nearest(training, v, period) - v))
@@ -151,7 +162,7 @@ class Axis:
 
 
 def _opposite(training: Support, target: Interval, period: float | None) -> list[float]:
-    """On a circle, the values of a range that lie in the middle between two neighbouring parts of training."""
+    """On a circle, the values of a range that lie midway between two neighbouring parts of training."""
     if period is None:
         return []
     parts = sorted((z for part in training for z in turned(part, target, period)), key=lambda i: i.low)
@@ -160,7 +171,7 @@ def _opposite(training: Support, target: Interval, period: float | None) -> list
 
 
 def reflected(support: Support, about: float) -> Support:
-    """The mirror image of a support about a value."""
+    """Mirror image of a support about a value."""
     return tuple(sorted((i.reflected(about) for i in support), key=lambda i: i.low))
 
 
@@ -172,6 +183,7 @@ def spell(dist: Dist) -> str:
 
 
 def _spell(span: Interval) -> str:
+    """An interval in a few words."""
     open_ends = [e for e, is_open in ((span.low, span.open_low), (span.high, span.open_high)) if is_open]
     without = f" without {' and '.join(f'{e:g}' for e in open_ends)}" if open_ends else ""
     return f"{span.low:g} to {span.high:g}{without}"

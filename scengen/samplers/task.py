@@ -1,4 +1,4 @@
-"""Task: a scenario family plus the distributions that we test it on. One file each in conf/task/."""
+"""A task: a scenario family and the distributions that it is tested on. One file each in conf/task/."""
 
 import hashlib
 import importlib
@@ -23,10 +23,12 @@ from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
 from .split import ID, Part, Split
 
-REQUIRED = ("family", "code", "category", "instruction", "horizon", "id")
-LONGEST = 3600.0
-"""Largest horizon of a task [s]: what a certificate may take, and far beyond any task."""
-OPTIONAL = ("axes", "certify", "embodiment", "limits", "scans")
+REQUIRED_KEYS = ("family", "code", "category", "instruction", "horizon", "id")
+"""Keys that every task file has."""
+MAX_HORIZON = 3600.0
+"""Largest time limit of a task [s]: within the runtime of a certificate, and far beyond any task."""
+OPTIONAL_KEYS = ("axes", "certify", "embodiment", "limits", "scans")
+"""Keys that a task file may have."""
 
 
 @dataclass(frozen=True)
@@ -34,33 +36,41 @@ class Proposal:
     """One try at an index, feasible or not."""
 
     attempt: int
+    """Number of the try, from 0."""
     scenario: Scenario
+    """Proposed scenario."""
     quantiles: Mapping[str, float]
-    """What the design gave for each parameter that varies, in (0, 1)."""
+    """Number in (0, 1) from the design for each parameter that varies."""
     refutation: Refutation | None
+    """Reason why the scenario is infeasible, or None."""
     trained: Scenario | None
-    """The training scenario of the same index; None in the training split."""
+    """Training scenario of the same index; None in the training split."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """A scenario and where it came from."""
+    """A scenario and its origin."""
 
     task: str
+    """Name of the task."""
     split: Split
+    """Split that it was drawn from."""
     seed: int
+    """Seed of the run."""
     index: int
+    """Index of the scenario in the split."""
     attempt: int
-    """Which try was the first feasible one."""
+    """Number of the first feasible try."""
     scenario: Scenario
+    """The scenario."""
     quantiles: Mapping[str, float]
-    """See `Proposal`."""
+    """Numbers from the design, see `Proposal`."""
     id_twin: str
-    """Id of the training scenario with the same index: it differs in the parameters of the split's axes only."""
+    """Id of the training scenario with the same index. It differs only in the parameters of the split's axes."""
     shifted: Mapping[str, Value]
     """Values of the parameters that the split's axes name."""
     rejected: Mapping[str, int]
-    """How many earlier tries were infeasible, by reason."""
+    """Number of earlier infeasible tries, by reason."""
 
 
 @dataclass(frozen=True)
@@ -68,28 +78,33 @@ class Task:
     """One benchmark task."""
 
     name: str
+    """Name of the task, that of its file."""
     family: type[Scenario]
+    """Scenario family."""
     code: str
-    """Number in the paper, e.g. T17."""
+    """Number in the paper, such as T17."""
     category: str
-    """P1 to P7 or M: the kind of intuition that the paper says it probes."""
+    """Kind of intuition that the task probes according to the paper: P1 to P7 or M."""
     instruction: str
+    """Instruction for a policy."""
     horizon: float
     """Time limit [s]."""
     embodiment: str
+    """Robot of the task, one of `EMBODIMENTS`."""
     training: Mapping[str, Dist]
-    """ID distribution of every parameter; what the file does not list is constant at its nominal value."""
+    """ID distribution of every parameter. A parameter that the file does not list is constant at its nominal value."""
     axes: Mapping[str, Axis]
+    """OOD axes by name."""
     certify: Mapping[str, Any]
     """Settings of the certificate that differ from conf/certify for this task."""
     node: Mapping[str, Any] = field(repr=False)
-    """The file that all this was read from, with measured limits and what a command line changed."""
+    """Contents of the task file, with measured limits and the changes of the command line."""
     scans: Mapping[str, Scan] = field(default_factory=dict, repr=False)
-    """Solids in the place of the proxies of YCB objects, by `Ycb.called`."""
+    """Solids that replace the proxies of YCB objects, by `Ycb.called`."""
 
     @cached_property
     def nominal(self) -> Scenario:
-        """The family with its nominal parameters, and with the scans in the place of proxies."""
+        """The family with its nominal parameters, and with scans instead of proxies."""
         found: Any = self.family()
         if not self.scans:
             return found
@@ -110,15 +125,15 @@ class Task:
 
     @cached_property
     def proofs(self) -> dict[str, list[Proof]]:
-        """Why each axis lies outside the training support.
+        """Proofs that each axis lies outside the training support.
 
         Raises:
-            BadConfig: one does not.
+            BadConfig: an axis does not.
         """
         return {name: self.prove(axis) for name, axis in self.axes.items()}
 
     def prove(self, axis: Axis) -> list[Proof]:
-        """Why an axis lies outside the training support.
+        """Proofs that an axis lies outside the training support.
 
         Raises:
             BadConfig: it does not.
@@ -130,7 +145,7 @@ class Task:
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such severity, or that one does not leave training.
+            BadConfig: it has no such severity, or that severity does not leave training.
         """
         part = Part.parse(part) if isinstance(part, str) else part
         if part.axis not in self.axes:
@@ -143,11 +158,11 @@ class Task:
         return severe
 
     def shifts(self, split: Split | str) -> dict[str, Dist]:
-        """The distributions that a split replaces: none for `id`, those of all its axes else.
+        """The distributions that a split replaces: none for `id`, else those of all its axes.
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: it has no such severity, two axes move the same parameter, or together they lead back into
+            BadConfig: an axis has no such severity, two axes move the same parameter, or together they lead back into
                 training.
         """
         split = Split.parse(split)
@@ -166,25 +181,28 @@ class Task:
 
     @cached_property
     def _composed(self) -> dict[Split, dict[str, Dist]]:
-        """What splits replace, proved once."""
+        """Replaced distributions of splits that are already proved."""
         return {}
 
     def design(self, spelled: str) -> Design:
-        """Where the numbers come from: `iid`, `sobol`, `lhs:50` or `grid:3`.
+        """The design of that spelling: `iid`, `sobol`, `lhs:50` or `grid:3`.
 
         Raises:
-            BadConfig: it is none of these.
+            BadConfig: there is no such design.
         """
         return designs.parse(spelled, self.name, self.training)
 
     def draw(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Draw:
-        """Scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
+        """Draw scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
 
-        Every parameter has its own random stream. A split starts from the training scenario of the same index and
-        draws only what its axes name, so that scenario 7 of `diagonal` is scenario 7 of `id`, turned.
+        Every parameter has its own random stream. A split starts from the training scenario of the same index and draws
+        only the parameters that its axes name. Scenario 7 of `diagonal` is therefore scenario 7 of `id`, turned.
 
         Args:
-            design: where the numbers come from; independent draws without it.
+            split: the split or its spelling.
+            seed: seed of the run.
+            index: index of the scenario, from 0.
+            design: source of the numbers; by default independent draws.
 
         Raises:
             Infeasible: no try gave a feasible scenario.
@@ -201,10 +219,10 @@ class Task:
         return Draw(self.name, split, seed, index, last.attempt, scenario, last.quantiles, twin, shifted, rejected)
 
     def proposals(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Iterator[Proposal]:
-        """Every try at an index; the last one is feasible, if any is.
+        """Yield every try at an index. The last one is feasible, if any is.
 
         Raises:
-            Infeasible: there is no training scenario of this index that an axis could start from.
+            Infeasible: the index has no training scenario for an axis to start from.
         """
         split, design = Split.parse(split), design or Independent(self.name)
         if split.is_training:
@@ -223,8 +241,9 @@ class Task:
         index: int,
         design: Design,
     ) -> Iterator[Proposal]:
+        """Yield tries at an index until one is feasible."""
         start, varied = trained or self.nominal, [n for n, d in space.items() if not isinstance(d, Fixed)]
-        for attempt in range(design.tries if varied else 1):  # without anything varied all tries are the same
+        for attempt in range(design.tries if varied else 1):  # if nothing varies, all tries are the same
             quantiles = {name: design.number(name, seed, index, attempt) for name in varied}
             scenario = with_values(start, {n: d.quantile(quantiles.get(n, 0.5)) for n, d in space.items()})
             refutation = scenario.infeasible()
@@ -239,7 +258,7 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     Raises:
         ScengenError: something in the file is unknown, mistyped, out of bounds, or not outside training.
     """
-    _check_keys(f"task {name}", node, REQUIRED, OPTIONAL)
+    _check_keys(f"task {name}", node, REQUIRED_KEYS, OPTIONAL_KEYS)
     family = _family(name, node["family"])
     known = {p.name: p for p in parameters(family())}
     training: dict[str, Dist] = {n: Fixed(p.nominal) for n, p in known.items()}
@@ -280,24 +299,24 @@ def load(name: str, node: Mapping[str, Any]) -> Task:
     )
     _ = task.proofs
     for axis in task.axes.values():
-        if not axis.limits:  # those were measured with other distributions perhaps, and are looked at when asked for
+        if not axis.limits:  # limits may have been measured with other distributions; those axes are checked on use
             for severity in range(1, axis.severities + 1):
                 task.axis(Part(axis.name, severity))
     return task
 
 
 def things(family: type[Scenario]) -> dict[str, Ycb]:
-    """The YCB objects of a family, by field."""
+    """YCB objects of a family, by field."""
     found: Any = family()
     every = {field.name: getattr(found, field.name) for field in fields(found)}
     return {name: value for name, value in every.items() if isinstance(value, Ycb)}
 
 
 def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[str, Scan]:
-    """The scans that a task holds: each with the file that it was made of, and the solid itself.
+    """Scans of a task: each with the file that it was made of, and the solid itself.
 
     Raises:
-        BadConfig: the family has no place for them, or one is no solid.
+        BadConfig: the family has no YCB object, or a scan is not a solid.
     """
     if node and not things(family):
         raise BadConfig(f"{name}.scans: {family.__name__} has no YCB object; leave them out")
@@ -310,7 +329,7 @@ def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[s
         try:
             prop = MeshProp.read(told["solid"])
         except (ValueError, TypeError) as error:
-            raise BadConfig(f"{where}.solid is no solid: {cut(str(error))}") from None
+            raise BadConfig(f"{where}.solid is not a solid: {cut(str(error))}") from None
         text = json.dumps(told["solid"], sort_keys=True)
         sha256 = hashlib.sha256(text.encode()).hexdigest()
         found[called] = Scan(sha256, replace(prop, rgba=getattr(every[called].prop, "rgba", prop.rgba)))
@@ -318,6 +337,7 @@ def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[s
 
 
 def _family(name: str, path: Any) -> type[Scenario]:
+    """Scenario class of a dotted path."""
     if not isinstance(path, str) or not re.fullmatch(r"\w+(\.\w+)+", path):
         raise BadConfig(f"{name}.family = {cut(repr(path))}; expected package.module.Class")
     module, _, inner = path.rpartition(".")
@@ -327,18 +347,19 @@ def _family(name: str, path: Any) -> type[Scenario]:
         why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
     if not (isinstance(family, type) and issubclass(family, Scenario)):
-        raise BadConfig(f"{name}.family = {cut(repr(path))} is no Scenario")
+        raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")
     return family
 
 
 def _group(where: str, node: Any) -> Mapping[str, Any]:
-    """A group of settings; an empty one where nothing is given."""
+    """A group of settings; an empty one if nothing is given."""
     if node is not None and not isinstance(node, Mapping):
         raise BadConfig(f"{where} = {cut(repr(node))}; expected a group of settings, {{name: value}}")
     return node or {}
 
 
 def _check_keys(where: str, node: Mapping[str, Any], required: tuple[str, ...], optional: tuple[str, ...]) -> None:
+    """Raise for an unknown or missing key."""
     for key in node:
         if key not in required + optional:
             raise UnknownName(f"key of {where}", str(key), required + optional)
@@ -356,6 +377,7 @@ def leaves(nodes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def _space(where: str, nodes: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Dist]:
+    """Distributions of a group of parameters."""
     space: dict[str, Dist] = {}
     for name, node in leaves(nodes):
         if name not in known:
@@ -368,6 +390,7 @@ def _space(where: str, nodes: Mapping[str, Any], known: Mapping[str, Parameter])
 
 
 def _severities(where: str, count: Any) -> int:
+    """Number of severities of an axis."""
     if isinstance(count, bool) or not isinstance(count, int) or count < 0:
         raise BadConfig(f"{where}.severities = {count!r}; it must be a whole number, 0 for none")
     return count
@@ -378,7 +401,7 @@ def _limits(
 ) -> dict[str, float]:
     """Measured limits of the parameters of one axis, from conf/limits/<task>.yaml.
 
-    Limits of what is no part of the axis are left alone: a command line may change or drop axes that were measured.
+    Limits of other parameters are ignored: a command line may change or drop axes that were measured.
     """
     where, names = f"{task}.limits.{axis}", dict(leaves(replaced))
     if not isinstance(nodes, Mapping):
@@ -390,13 +413,15 @@ def _limits(
 
 
 def _positive(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= LONGEST:
+    """A positive number of seconds."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= MAX_HORIZON:
         told = cut(repr(value))
-        raise BadConfig(f"{where} = {told}; it must be a positive number of seconds, at most {LONGEST:g}")
+        raise BadConfig(f"{where} = {told}; it must be a positive number of seconds, at most {MAX_HORIZON:g}")
     return float(value)
 
 
 def _embodiment(name: str, value: Any) -> str:
+    """Name of a robot."""
     if not isinstance(value, str) or value not in EMBODIMENTS:
         close, known = nearest(str(value), EMBODIMENTS), ", ".join(EMBODIMENTS)
         raise BadConfig(f"{name}.embodiment = {cut(repr(value))}{close}; known: {known}")

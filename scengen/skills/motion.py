@@ -271,7 +271,7 @@ def together(world: World, *plans: Plan | None) -> Plan:
     An arm without a plan, or whose plan has ended, is held still with its last gripper command.
     """
     if len(plans) != len(world.arms):
-        raise ValueError(f"{len(plans)} plans for {len(world.arms)} arms; say None for an arm that is to be held still")
+        raise ValueError(f"{len(plans)} plans for {len(world.arms)} arms; pass None for an arm that is held still")
     running = list(plans)
     still = [hold(arm, math.inf) for arm in world.arms]
     while True:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.assets.mesh_prop import MeshProp
 from scengen.assets.ycb import ITEMS, Ycb
 from scengen.errors import BadConfig
@@ -46,7 +46,7 @@ def folder(tmp_path):
 
 
 def task(name="pick_place_ycb"):
-    return config.task(name, [ONE])
+    return load_task(name, [ONE])
 
 
 @pytest.mark.parametrize("askew", [ASKEW, math.pi / 2 - ASKEW, 3.0])
@@ -145,7 +145,7 @@ def test_a_forged_solid_is_refused(folder):
         ("more", 1),
     ):
         scan = {**node["scans"]["004_sugar_box/low"], "solid": {**solid, name: value}}
-        with pytest.raises(BadConfig, match="is no solid"):
+        with pytest.raises(BadConfig, match="is not a solid"):
             load("pick_place_ycb", {**node, "scans": {"004_sugar_box/low": scan}})
     with pytest.raises(BadConfig, match="has no YCB object"):
-        load("domino_single", {**config.task("domino_single").node, "scans": node["scans"]})
+        load("domino_single", {**load_task("domino_single").node, "scans": node["scans"]})

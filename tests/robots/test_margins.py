@@ -36,8 +36,8 @@ TAKEN_AT = TABLE_TOP + 0.03
 
 RINGS = {
     "take a block": indirect_push.HAND,
-    "take what has fallen": (stack_collapse_recovery.NEAREST, stack_collapse_recovery.FARTHEST),
-    "meet a ball": (launched_ball.NEAREST, launched_ball.FARTHEST),
+    "take what has fallen": (stack_collapse_recovery.MIN_DISTANCE, stack_collapse_recovery.MAX_DISTANCE),
+    "meet a ball": (launched_ball.MIN_DISTANCE, launched_ball.MAX_DISTANCE),
     "grasp a hook": (hook.MIN_HAND_DISTANCE, tool_retrieve.ARM),
 }
 """Nearest and farthest distance from the first axis at which a hand points down [m]."""
@@ -56,9 +56,9 @@ def spared(spare):
 
 
 def miss(place, rot, spare=SPARE, base=panda.BASE):
-    """How far the hand stays from a pose, as `ik.Nearest.left` [m], for an arm that stands at `base`."""
+    """How far the hand stays from a pose, as `ik.Nearest.error` [m], for an arm that stands at `base`."""
     with spared(spare):
-        return ik.reach(np.asarray(place) - base + panda.BASE, rot).left
+        return ik.reach(np.asarray(place) - base + panda.BASE, rot).error
 
 
 def down(away, bearing, spare=SPARE):

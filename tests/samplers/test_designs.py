@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from scengen import cli, config
+from scengen import cli, load_task
 from scengen.analysis.coverage import evenness
 from scengen.errors import BadConfig, Infeasible
 from scengen.params import values
-from scengen.runs.generate import Settings
+from scengen.runs.generate import GenerateSettings
 from scengen.samplers.designs import Grid, Latin, Sobol
 from scengen.samplers.keyed import unit
 from scengen.samplers.split import ID
 from scengen.samplers.task import load
 
-NODE = config.task("domino_single").node
-TASK = config.task("domino_single")
+NODE = load_task("domino_single").node
+TASK = load_task("domino_single")
 SPELLED = ["iid", "sobol", "lhs:16", "grid:3"]
 VARIED = [name for name, dist in TASK.training.items() if dist.support[0].low != dist.support[-1].high]
 
@@ -123,7 +123,7 @@ def test_an_infeasible_grid_point_is_infeasible_and_not_replaced():
 @pytest.mark.parametrize("spelled", ["sobl", "lhs", "lhs:0", "lhs:x", "grid:-1", "iid:3", "sobol:5", ""])
 def test_a_sampler_that_does_not_exist_is_refused(spelled):
     with pytest.raises(BadConfig, match="known: iid, sobol, lhs:STRATA"):
-        Settings(sampler=spelled).check(TASK)
+        GenerateSettings(sampler=spelled).check(TASK)
 
 
 def test_the_command_line_refuses_it_in_one_line(capsys):
