@@ -6,24 +6,23 @@ r"""T05 plate-shelf-hobi: stand a plate on edge in the slot of a shelf, with two
                      \___           v      up, and makes room for the palm of the left hand. The shelf stands behind.
     ----------------------\________/----
 
-Bottleneck: no jaw takes the plate from the table, as the palm of a hand level with the rim would be under it. A second
-arm has to press it, has to go on until the first one holds the raised rim, and has to be gone before the plate is
-turned on edge. What is done wrong costs the episode: a plate that falls breaks.
+Bottleneck: no jaw takes the plate from the table, because the palm of a hand level with the rim would be under it. A
+second arm has to press the plate until the first one holds the raised rim, and has to leave before the plate is turned
+on edge. A failed attempt ends the episode: a plate that falls breaks.
 
 Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slot" and "slight incline":
 
 * The plate has a wide foot and a rim that rises by 12 mm: pressed down there it leans by the incline, 20 deg, and the
-  other side is 76 mm high. The rim that comes up has the incline twice, and so has the hand that takes it.
-* The plate is glazed. A hand over the table that grips the rim of a plate that lies flat is steeper than 60 deg. Two
-  pads hold a rim that slopes by s and is askew to them as long as the difference is less than twice the angle of
-  friction: they do at a friction of 0.6, and at 0.3 they slip off. A single finger under the rim does not lift it
-  either; it pushes the plate away.
-* Where something stops the plate, or a palm finds room beside the table, one arm could lift the rim all the same. So a
-  plate that comes within 6 cm of the table's edge is lost, and so is one that knocks against the shelf: only a plate on
-  edge, over the slot, may touch it. Nor can it be laid down on the shelf, to be taken there by its rim.
-* The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get in
+  other side is 76 mm high. The raised rim has twice the incline, and so has the hand that takes it.
+* The plate is glazed. A hand over the table that grips the rim of a flat plate is steeper than 60 deg. Two pads hold a
+  rim that slopes by s and is askew to them if the difference is less than twice the angle of friction: at a friction of
+  0.6 they do, at 0.3 they slip off. A single finger under the rim does not lift it either; it pushes the plate away.
+* If something stops the plate, or a palm has space beside the table, one arm could lift the rim. So a plate that comes
+  within 6 cm of the table's edge is lost, and so is one that knocks against the shelf: only a plate on edge, over the
+  slot, may touch it. Nor can the plate be laid down on the shelf, to be taken there by its rim.
+* The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get
   between the dividers with it. The dividers are lower than the plate, so that the fingers on its upper rim are free.
-* Which arm presses: the one that is farther from the shelf. In training that is the right one.
+* The arm that is farther from the shelf presses. In training that is the right one.
 """
 
 import math
@@ -46,40 +45,27 @@ from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_rea
 from ..sim.world import Arm, World
 from ..skills import jaw
 from ..skills.handover import OVERLAP, STAND_OFF, steepness, take_rim
-from ..skills.motion import (
-    CLOSED,
-    OPEN,
-    STEADY,
-    Pace,
-    alone,
-    facing_down,
-    go_to,
-    steer,
-    together,
-    until,
+from ..skills.motion import CLOSED, OPEN, STEADY, Pace, alone, facing_down, go_to, steer, together, until
+from .plate_and_slot import (
+    ANGLE_TOLERANCE,
+    EDGE_MARGIN,
+    FOOT_CLEARANCE,
+    LIFT_HEIGHT,
+    LIFT_PACE,
+    PROBE_PACE,
+    PlateAndSlot,
 )
-from .plate_and_slot import AIR, EDGE, LEAN, LIFT, PROBING, SLOWLY, PlateAndSlot
 
-ASTRAY = math.radians(30.0)
-"""By how much a plate that touches the shelf may be off the slot [rad]."""
-PRESS_AT, PRESSED = 0.008, 0.96
-"""Where the rim is pressed, from its edge [m], and down to which share of its incline."""
-PRESSING, DEEPER = Pace(0.04, 0.0), 0.008
-"""How the rim is pressed, towards a place that is deeper than the fingers get [m]."""
-SPARE = 0.015
-"""How far a plate that is pressed may move to either side [m]: by 4 mm, as it turns about its foot."""
-HARDEST = 10.0
-"""Force that a hand which holds its place gives without being pushed away [N]: by 10 mm (`control.osc.KP`)."""
-UNDER_THE_PALM, ASKEW = 0.005, math.radians(12.0)
-"""Air between palm and table [m], and how much steeper than the rim a hand may be for it [rad]: less than friction."""
-HOLDS = 1.5
-"""How many times the plate's weight the friction of the pads must hold."""
-SQUEEZED = 0.02
-"""How much nearer to each other than the plate allows two hands are sent that squeeze it [m]."""
+PRESS_OFFSET = 0.008
+"""Distance from the rim's edge at which the rim is pressed [m]."""
+SHIFT_MARGIN = 0.015
+"""Distance that a pressed plate may move to either side [m]: it moves by 4 mm, as it turns about its foot."""
+PALM_CLEARANCE = 0.005
+"""Gap between palm and table [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlateShelfHobi(PlateAndSlot):
+class PlateShelfHobi(PlateAndSlot[Dish]):
     """A plate on the table and a shelf with a slot."""
 
     plate_x: float = param(-0.15, "m", -0.3, 0.2)
@@ -91,7 +77,7 @@ class PlateShelfHobi(PlateAndSlot):
     gap: float = param(0.036, "m", 0.02, 0.09)
     """Width of the slot."""
     proud: float = param(0.04, "m", 0.0, 0.1)
-    """How far the plate stands out of the slot."""
+    """Height by which the plate stands out of the slot."""
 
     def failure(self, world: World) -> str | None:
         if world.touching("plate", "shelf") and not self.over_slot(world):
@@ -99,25 +85,25 @@ class PlateShelfHobi(PlateAndSlot):
         return super().failure(world)
 
     def over_slot(self, world: World) -> bool:
-        """Whether the plate is about on edge, its middle over the slot or in it."""
+        """Whether the plate is on edge within 30 deg, its middle over the slot or in it."""
         across = world.rot("shelf")[:, 0]
         beside = abs(float((self.middle(world) - self.foot) @ across))
-        upright = abs(float(world.rot("plate")[:, 2] @ across)) > math.cos(ASTRAY)
-        return upright and beside < self.gap / 2 + self.shelf.chamfer
+        on_edge = abs(float(world.rot("plate")[:, 2] @ across)) > math.cos(math.radians(30.0))
+        return on_edge and beside < self.gap / 2 + self.shelf.chamfer
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Press the rim with one arm, take the other side of it with the other one, put the plate in."""
+        """Press the rim with one arm, take its other side with the other arm, put the plate in."""
         presser, taker = self.roles(world)
         yield from self.take(world)
-        yield from alone(presser, self.leave(presser))
+        yield from alone(presser, self.park(presser))
         yield from self.deliver(taker)
 
     def take(self, world: World) -> Plan:
-        """Press the rim and take the side that comes up."""
+        """Press the rim, and take the side that rises."""
         presser, taker = self.roles(world)
-        yield from self.both(world, self.press(presser), self.wait_beside(taker))
+        yield from self.in_roles(world, self.press(presser), self.wait_beside(taker))
         yield from take_rim(taker, lambda: self.rim(world), self.gripping(world))
 
     def roles(self, world: World) -> tuple[Arm, Arm]:
@@ -125,17 +111,18 @@ class PlateShelfHobi(PlateAndSlot):
         right, left = world.arms
         return (right, left) if self.side > 0 else (left, right)
 
-    def both(self, world: World, pressing: Plan, taking: Plan) -> Plan:
-        """Plans of the two roles at once."""
+    def in_roles(self, world: World, pressing: Plan, taking: Plan) -> Plan:
+        """Run the plans of the two roles at once."""
         plans = (pressing, taking)
         yield from together(world, *(plans if self.side > 0 else plans[::-1]))
 
     def press(self, arm: Arm) -> Plan:
-        """Press the rim to the table with closed fingers."""
-        world, at = arm.world, self.start - (self.plate.radius - PRESS_AT) * self.outside
-        yield from go_to(arm, at + (self.plate.height + TIP_BELOW + 0.03) * UP, facing_down(), STEADY, CLOSED)
-        below = go_to(arm, at + (self.plate.thickness + TIP_BELOW - DEEPER) * UP, facing_down(), PRESSING, CLOSED)
-        yield from until(below, lambda: self.tilt(world) > PRESSED * self.plate.slope)
+        """Press the rim to the table with closed fingers, until the plate has turned by 96 % of its incline."""
+        world, spot = arm.world, self.start - (self.plate.radius - PRESS_OFFSET) * self.outside
+        yield from go_to(arm, spot + (self.plate.height + TIP_BELOW + 0.03) * UP, facing_down(), STEADY, CLOSED)
+        below = spot + (self.plate.thickness + TIP_BELOW - 0.008) * UP  # 8 mm deeper than the fingers get
+        press = go_to(arm, below, facing_down(), Pace(0.04, 0.0), CLOSED)
+        yield from until(press, lambda: self.tilt(world) > 0.96 * self.plate.slope)
 
     def wait_beside(self, arm: Arm) -> Plan:
         """Bring the open jaw beside the place where the rim is going to be."""
@@ -145,21 +132,22 @@ class PlateShelfHobi(PlateAndSlot):
         yield from go_to(arm, rim - STAND_OFF * hand[:, 2], hand, STEADY, OPEN)
 
     def edgewise(self, arm: Arm) -> Mat3:
-        """The hand with the plate upright, its upper face towards the robot: as the rim slopes, the hand looks away.
+        """Orientation of the hand with the plate upright and its upper face towards the robot.
 
-        The other way round the arm would have to reach over the plate, as far as it goes. Turned upright only on the
-        way to the slot, which is quicker, a thin plate slips out of the pinch.
+        As the rim slopes, the hand then looks away from the robot. The other way round the arm would have to reach over
+        the plate, as far as it goes. If the plate is turned upright only on the way to the slot, which is quicker, a
+        thin plate slips out of the pinch.
         """
         across, normal = -arm.world.rot("shelf")[:, 0], arm.world.rot("plate")[:, 2]
         turn = about_z(math.remainder(polar(across)[0] - polar(normal)[0], 2 * math.pi))
         return shortest(turn @ normal, across) @ turn @ arm.hand_rot
 
     def gripping(self, world: World) -> Mat3:
-        """The hand along the rim as it lies now, or steeper where the table asks for it."""
+        """Orientation of the hand along the rim as it is now, or steeper if the palm would meet the table."""
         return self.hand(max(self.plate.slope + self.tilt(world), self.raised_tilt))
 
     def tilt(self, world: World) -> float:
-        """By how much the side of the plate that is taken comes up [rad]."""
+        """Angle by which the side of the plate that is taken has risen [rad]."""
         return math.asin(float(self.outwards(world) @ UP))
 
     # --- what must not work ---------------------------------------------------------------
@@ -168,65 +156,65 @@ class PlateShelfHobi(PlateAndSlot):
         return {
             "grip_it_flat": Shortcut(lambda world: self.grip_flat(self.roles(world)[1], self.flat_tilt)),
             "grip_it_from_above": Shortcut(lambda world: self.grip_flat(self.roles(world)[1], math.pi / 2)),
-            "pry_it_up": Shortcut(self._pry),
+            "pry_it_up": Shortcut(self._pry_up),
             "slide_it_to_the_edge": Shortcut(self._slide),
-            "let_it_fall_back": Shortcut(self._too_early),
+            "let_it_fall_back": Shortcut(self._let_fall_back),
             "squeeze_it_between_the_hands": Shortcut(self._squeeze),
             "insert_it_flat": Shortcut(self._insert_flat),
         }
 
-    def _pry(self, world: World) -> Plan:
+    def _pry_up(self, world: World) -> Plan:
         """Put a finger under the rim, lift and level the hand, close."""
         _, taker = self.roles(world)
         hand = self.hand(self.flat_tilt)
         yield from alone(taker, go_to(taker, self.rim(world) - STAND_OFF * hand[:, 2], hand, STEADY, OPEN))
         for share in np.linspace(0.0, 1.0, 6):
             tilt = (1.0 - share) * self.flat_tilt + share * self.raised_tilt
-            high = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
+            target = self.rim(world) + share * (self.plate.raised - self.plate.rise) * UP
             with suppress(GaveUp):
-                yield from alone(taker, go_to(taker, high, self.hand(tilt), PROBING, OPEN))
-        yield from self.go_on_with(taker)
+                yield from alone(taker, go_to(taker, target, self.hand(tilt), PROBE_PACE, OPEN))
+        yield from self.lift_and_deliver(taker)
 
     def _slide(self, world: World) -> Plan:
-        """Push it to the table's edge with one arm, and take it there with the other."""
+        """Push the plate to the table's edge with one arm, and take it there with the other."""
         yield from self.slide_to_the_edge(*self.roles(world), self.plate.slope)
 
-    def _too_early(self, world: World) -> Plan:
-        """Press the rim, let go, and take the plate then."""
+    def _let_fall_back(self, world: World) -> Plan:
+        """Press the rim, let go, and only then take the plate."""
         presser, taker = self.roles(world)
-        yield from self.both(world, self.press(presser), self.wait_beside(taker))
-        yield from alone(presser, self.leave(presser))
+        yield from self.in_roles(world, self.press(presser), self.wait_beside(taker))
+        yield from alone(presser, self.park(presser))
         yield from self.grip_flat(taker, self.flat_tilt)
 
     def _squeeze(self, world: World) -> Plan:
         """Lift the plate between the fingers of both hands, lower it on the slot, let go."""
-        pressing, taking = self.roles(world)
+        presser, taker = self.roles(world)
         out, across = self.outside, facing_down(math.pi / 2)
         low, high = self.start + (self.plate.rise / 2 + TIP_BELOW) * UP, self.foot[2] + self.shelf.top + TIP_BELOW
         beside = (self.plate.radius + FINGER_ACROSS) * out
-        away = self.foot - self.start - self.foot[2] * UP + self.start[2] * UP
+        way_to_slot = self.foot - self.start - self.foot[2] * UP + self.start[2] * UP
 
-        def go(arm: Arm, at: Vec3) -> Plan:
-            yield from go_to(arm, at, across, Pace(0.1, 0.005), CLOSED)
+        def go(arm: Arm, spot: Vec3) -> Plan:
+            yield from go_to(arm, spot, across, Pace(0.1, 0.005), CLOSED)
 
         for above, apart in ((0.1, 0.04), (0.0, 0.04), (0.0, 0.005)):
             middle = low + above * UP
             places = middle - beside - apart * out, middle + beside + apart * out
-            yield from self.both(world, go(pressing, places[0]), go(taking, places[1]))
-        for way in (0.0 * UP, (high - low[2] + 0.05) * UP, away, -0.045 * UP):
-            moves = _carry_between(pressing, out, way), _carry_between(taking, -out, way)
-            yield from self.both(world, *moves)
-        yield from self.both(world, go(pressing, pressing.hand - 0.04 * out), go(taking, taking.hand + 0.04 * out))
+            yield from self.in_roles(world, go(presser, places[0]), go(taker, places[1]))
+        for way in (0.0 * UP, (high - low[2] + 0.05) * UP, way_to_slot, -0.045 * UP):
+            moves = _move_squeezing(presser, out, way), _move_squeezing(taker, -out, way)
+            yield from self.in_roles(world, *moves)
+        yield from self.in_roles(world, go(presser, presser.hand - 0.04 * out), go(taker, taker.hand + 0.04 * out))
 
     def _insert_flat(self, world: World) -> Plan:
-        """Take the plate as one should, and lower it on the slot without turning it on edge."""
+        """Take the plate as the oracle does, and lower it on the slot without turning it on edge."""
         presser, taker = self.roles(world)
         yield from self.take(world)
-        yield from alone(presser, self.leave(presser))
-        yield from alone(taker, go_to(taker, taker.hand + LIFT * UP, self.hand(self.plate.slope), SLOWLY))
+        yield from alone(presser, self.park(presser))
+        yield from alone(taker, go_to(taker, taker.hand + LIFT_HEIGHT * UP, self.hand(self.plate.slope), LIFT_PACE))
         for above in (0.05, 0.01):
-            here = self.foot + (self.shelf.top + above) * UP - self.middle(world)
-            yield from alone(taker, go_to(taker, taker.hand + here, pace=SLOWLY))
+            way = self.foot + (self.shelf.top + above) * UP - self.middle(world)
+            yield from alone(taker, go_to(taker, taker.hand + way, pace=LIFT_PACE))
         yield from alone(taker, jaw.release(taker))
         yield from alone(taker, go_to(taker, taker.hand + STAND_OFF * self.outside))
 
@@ -240,23 +228,27 @@ class PlateShelfHobi(PlateAndSlot):
 
     def constraints(self) -> Iterator[Refutation | None]:
         plate, shelf, around = self.plate, self.shelf, corners(self.start, 0.0, 2 * [2 * self.plate.radius])
-        yield on_table("the plate", around, EDGE + SPARE)
-        yield on_table("the shelf", self._outline)
-        apart = gap(self._outline, around)
-        yield require(apart > SPARE, "plate and shelf stand in each other's place", apart=apart)
-        yield require(self.slack > 2 * AIR, "the plate is higher than the slot is wide", slack=self.slack)
+        yield on_table("the plate", around, EDGE_MARGIN + SHIFT_MARGIN)
+        yield on_table("the shelf", self._shelf_outline)
+        apart = gap(self._shelf_outline, around)
+        yield require(apart > SHIFT_MARGIN, "plate and shelf stand in each other's place", apart=apart)
+        yield require(self.slack > 2 * FOOT_CLEARANCE, "the plate is higher than the slot is wide", slack=self.slack)
         lean = math.atan2(self.slack, shelf.height)
-        yield require(lean < 0.8 * LEAN, "the plate leans in the slot", lean=lean)
+        yield require(lean < 0.8 * ANGLE_TOLERANCE, "the plate leans in the slot", lean=lean)
         room = self.proud - OVERLAP - TIP_BELOW
         yield require(room > 0.0, "the fingers that hold the rim meet the dividers", room=room)
         askew, slips = self.flat_tilt - plate.slope, 2 * math.atan(plate.friction)
         yield require(askew > slips, "one jaw takes the plate from the table", askew=askew, slips=slips)
         askew = self.raised_tilt - 2 * plate.slope
-        yield require(askew < ASKEW, "the palm of the hand that takes the raised rim meets the table", askew=askew)
-        force = GRAVITY * plate.mass * plate.foot / (plate.rim - PRESS_AT)
-        yield require(force < HARDEST, "no hand presses so hard", force=force)
+        # For its clearance from the table the hand may be steeper than the rim, by less than friction allows.
+        yield require(
+            askew < math.radians(12.0), "the palm of the hand that takes the raised rim meets the table", askew=askew
+        )
+        force = GRAVITY * plate.mass * plate.foot / (plate.rim - PRESS_OFFSET)
+        # A hand that holds its place is pushed away by 10 mm at 10 N (`control.osc.KP`).
+        yield require(force < 10.0, "no hand presses so hard", force=force)
         grip, weight = plate.friction * pinch(plate.thickness), GRAVITY * plate.mass
-        yield require(grip > HOLDS * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
+        yield require(grip > 1.5 * weight, "the jaw does not hold the plate", grip=grip, weight=weight)
         presser = panda.bases(2)[0 if self.side > 0 else 1]
         yield within_reach("the rim", self.start - plate.radius * self.outside, base=presser)
 
@@ -278,21 +270,22 @@ class PlateShelfHobi(PlateAndSlot):
 
     @property
     def side(self) -> float:
-        """On which side the plate is taken: 1 by the left arm, -1 by the right one. The shelf stands nearer to it."""
+        """Side on which the plate is taken, the shelf's: 1 by the left arm, -1 by the right one."""
         return math.copysign(1.0, self.shelf_y)
 
     @property
     def raised_tilt(self) -> float:
-        """Tilt of the hand that takes the raised rim [rad]: along it, or as steep as the table asks of the palm."""
-        height = self.plate.raised + self.plate.thickness / 2 - UNDER_THE_PALM
+        """Tilt of the hand that takes the raised rim [rad]: along the rim, or steeper if the palm needs it."""
+        height = self.plate.raised + self.plate.thickness / 2 - PALM_CLEARANCE
         return max(2 * self.plate.slope, steepness(height, PALM_ABOVE - OVERLAP))
 
 
-def _carry_between(arm: Arm, inwards: Vec3, way: Vec3) -> Plan:
-    """Move a hand along a way [m] while it presses against what another hand holds from the other side."""
+def _move_squeezing(arm: Arm, inwards: Vec3, way: Vec3) -> Plan:
+    """Move a hand along `way` [m] while it presses inwards against a plate that another hand presses from outside."""
     world, setpoint, rot = arm.world, arm.hand, arm.hand_rot
     seconds = max(1.0, float(np.linalg.norm(way)) / 0.08)
     end = world.time + seconds
     while world.time < end:
         setpoint = setpoint + Loop.PERIOD / seconds * way
-        yield steer(arm, setpoint + SQUEEZED * inwards, way / seconds, between(arm.hand_rot, rot), CLOSED)
+        target = setpoint + 0.02 * inwards  # 20 mm nearer to the other hand than the plate allows
+        yield steer(arm, target, way / seconds, between(arm.hand_rot, rot), CLOSED)

@@ -17,15 +17,21 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, rotation
 from scengen.params import values, with_values
-from scengen.tasks.plate_and_slot import ALONG, BREAKS, DEEP, LEAN, PlateAndSlot
+from scengen.tasks.plate_and_slot import (
+    ALONG_TOLERANCE,
+    ANGLE_TOLERANCE,
+    FLOOR_TOLERANCE,
+    MAX_FALL_SPEED,
+    PlateAndSlot,
+)
 from scengen.tasks.plate_shelf import PlateShelf
 from scengen.validate.rollout import replay
 
-TASK = config.task("plate_shelf_hetbi")
+TASK = load_task("plate_shelf_hetbi")
 NOMINAL = PlateShelf()
 
 
@@ -57,8 +63,8 @@ def world():
     ("change", "counts"),
     [
         ({}, True),
-        ({"up": DEEP - 0.002}, True),
-        ({"up": DEEP + 0.002}, False),
+        ({"up": FLOOR_TOLERANCE - 0.002}, True),
+        ({"up": FLOOR_TOLERANCE + 0.002}, False),
         ({"lean": 0.07}, True),
         ({"up": 0.1, "lean": math.pi / 2}, False),
     ],
@@ -68,14 +74,14 @@ def test_what_counts_as_in_the_slot(world, change, counts):
     assert NOMINAL.success(standing(world, NOMINAL, **change)) == counts
 
 
-@pytest.mark.parametrize(("along", "counts"), [(ALONG - 0.003, True), (ALONG + 0.003, False)])
+@pytest.mark.parametrize(("along", "counts"), [(ALONG_TOLERANCE - 0.003, True), (ALONG_TOLERANCE + 0.003, False)])
 def test_how_far_along_an_open_slot_it_counts(along, counts):
     open_slot = open_ended(NOMINAL)
     assert open_slot.success(standing(load(TASK, open_slot), open_slot, along=along)) == counts
 
 
 def test_a_plate_that_leans_or_is_askew_by_more_than_ten_degrees_does_not_count(world):
-    for angle, counts in ((LEAN - 0.02, True), (LEAN + 0.02, False)):
+    for angle, counts in ((ANGLE_TOLERANCE - 0.02, True), (ANGLE_TOLERANCE + 0.02, False)):
         for which in ("lean", "yaw"):
             world.reset()
             assert NOMINAL.on_edge(standing(world, NOMINAL, up=0.3, **{which: angle})) == counts
@@ -85,7 +91,7 @@ def test_a_plate_that_leans_or_is_askew_by_more_than_ten_degrees_does_not_count(
 def test_a_fall_breaks_the_plate_from_the_height_of_a_textbook(world, share, breaks):
     """v^2 = 2 g h. A fall is looked at every 10 ms, in which it gains 0.1 m/s: at 1.7 h it is seen for certain."""
     world.reset()
-    height, broken = BREAKS**2 / (2 * 9.81), False
+    height, broken = MAX_FALL_SPEED**2 / (2 * 9.81), False
     standing(world, NOMINAL, up=share * height)
     for _ in range(30):
         world.step(world.idle)

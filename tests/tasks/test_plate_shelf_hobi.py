@@ -16,14 +16,14 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.errors import GaveUp
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
-from scengen.tasks.plate_shelf_hobi import OVERLAP, UNDER_THE_PALM, PlateShelfHobi
+from scengen.tasks.plate_shelf_hobi import OVERLAP, PALM_CLEARANCE, PlateShelfHobi
 
-TASK = config.task("plate_shelf_hobi")
+TASK = load_task("plate_shelf_hobi")
 NOMINAL = PlateShelfHobi()
 PLATE = NOMINAL.plate
 
@@ -47,7 +47,7 @@ def test_the_raised_rim_is_where_geometry_says_and_the_palm_passes_over_the_tabl
     assert not world.touched(taker.label, "table") and not world.touched("robot0", "robot1")
     palm = taker.hand - PALM_ABOVE * taker.hand_rot[:, 2]
     lowest = min((palm + side * PALM_ALONG * taker.hand_rot[:, 0])[2] for side in (-1, 1))
-    assert lowest - TABLE_TOP > UNDER_THE_PALM / 2
+    assert lowest - TABLE_TOP > PALM_CLEARANCE / 2
 
 
 def test_the_palm_just_passes_at_the_tilt_that_the_law_gives():
@@ -55,7 +55,7 @@ def test_the_palm_just_passes_at_the_tilt_that_the_law_gives():
     tilt, height = low.raised_tilt, low.plate.raised + low.plate.thickness / 2
     assert tilt > 2 * low.plate.slope  # the palm decides, not the rim
     lowest = height + (PALM_ABOVE - OVERLAP) * math.sin(tilt) - PALM_ALONG * math.cos(tilt)
-    assert lowest == pytest.approx(UNDER_THE_PALM, abs=1e-9)
+    assert lowest == pytest.approx(PALM_CLEARANCE, abs=1e-9)
 
 
 # --- two arms -------------------------------------------------------------------------------
