@@ -1,1 +1,1 @@
-"""Statistics of pools and distributions: distances, coverage, selection bias, smallest causes of a failure."""
+"""Statistics of pools and distributions: distances, coverage, selection bias, causes of a failure."""

@@ -1,4 +1,4 @@
-"""What selection does to a distribution: a certifier that lets only easy scenarios through must be seen."""
+"""Selection bias: the change of a distribution by certification. If only easy scenarios are certified, it shows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,12 +11,13 @@ from ..errors import BadConfig
 from .distance import Energy, energy
 
 SIGNIFICANCE = 0.05
+"""P value below which a marginal is flagged."""
 BINS = 4
-"""Cells per parameter: quarters of the proposals."""
-FEW = 6
-"""Parameters with at most so many different values have one cell for each."""
-MOST = 1000
-"""Proposals in the joint test at most; it needs a matrix of their distances. The first ones are taken."""
+"""Number of bins per parameter: quarters of the proposals."""
+MAX_SINGLE_VALUES = 6
+"""Maximum number of different values of a parameter for which each value has a bin of its own."""
+MAX_JOINT = 1000
+"""Maximum number of proposals in the joint test, which needs a matrix of their distances. The first ones are taken."""
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -29,55 +30,60 @@ class Bin:
     low: float
     high: float
     proposed: int
+    """Number of proposals in the bin."""
     accepted: int
+    """Number of accepted draws in the bin."""
 
     @property
     def rate(self) -> float:
-        """Share that was accepted."""
+        """Acceptance rate in the bin."""
         return self.accepted / self.proposed
 
 
 @dataclass(frozen=True)
 class Marginal:
-    """What selection did to one parameter or feature."""
+    """Change of the distribution of one parameter or feature by selection."""
 
     name: str
     ks: float
     """Largest difference between the distribution functions of accepted and proposed values (Kolmogorov-Smirnov)."""
     energy: float
-    """Energy distance between them, in ranges of the proposed values."""
+    """Energy distance between accepted and proposed values [ranges of the proposed values]."""
     pvalue: float
-    """Of accepted against rejected values, which share no draw; corrected for the number of marginals (Benjamini and
-    Hochberg), and too large rather than too small for parameters with few values."""
+    """P value of accepted against rejected values, which share no draw. It is corrected for the number of marginals
+    (Benjamini and Hochberg), and conservative for parameters with few values."""
     cells: tuple[Bin, ...]
+    """Bins of the range, in order."""
 
     @property
     def effective(self) -> float:
-        """Effective sample size (Kish): so many unbiased draws tell as much about this marginal as the accepted ones,
-        reweighted to the proposed distribution. Cells without any accepted draw cannot be reweighted."""
+        """Effective sample size (Kish): the number of unbiased draws that carry as much information on this marginal as
+        the accepted ones, reweighted to the proposed distribution. Bins without an accepted draw are left out."""
         used = [c for c in self.cells if c.accepted]
         return sum(c.proposed for c in used) ** 2 / sum(c.proposed**2 / c.accepted for c in used)
 
     @property
     def lost(self) -> float:
-        """Share of the proposals that lie in cells where nothing was accepted."""
+        """Share of the proposals that lie in bins without an accepted draw."""
         return sum(c.proposed for c in self.cells if not c.accepted) / sum(c.proposed for c in self.cells)
 
 
 @dataclass(frozen=True)
 class Bias:
-    """What selection did to a distribution."""
+    """Change of a distribution by selection."""
 
     proposed: int
+    """Number of proposals."""
     accepted: int
+    """Number of accepted draws."""
     marginals: tuple[Marginal, ...]
-    """Most telling first."""
+    """Marginals, the most significant change first."""
     joint: Energy
-    """All marginals at once, accepted against rejected."""
+    """Energy distance of accepted and rejected draws in all marginals at once."""
 
     @property
     def flagged(self) -> tuple[str, ...]:
-        """Marginals that were changed, `(joint)` for all together; empty if chance explains everything."""
+        """Marginals with a significant change, `(joint)` for all together; empty if chance explains everything."""
         names = [m.name for m in self.marginals if m.pvalue < SIGNIFICANCE]
         return (*names, *(["(joint)"] if self.joint.pvalue < SIGNIFICANCE else []))
 
@@ -88,12 +94,12 @@ class Bias:
 
 
 def bias(table: Mapping[str, Numbers], accepted: Flags, permutations: int = 999) -> Bias:
-    """Compare what was accepted with what was proposed.
+    """Compare the accepted draws with all proposals.
 
     Args:
-        table: value of every proposal, by parameter or feature; constant ones are left out of the result.
-        accepted: which proposals were.
-        permutations: size of the joint test.
+        table: values of the proposals, by parameter or feature. Constant ones are left out of the result.
+        accepted: whether each proposal was accepted.
+        permutations: number of permutations in the joint test.
 
     Raises:
         BadConfig: nothing was accepted.
@@ -105,10 +111,10 @@ def bias(table: Mapping[str, Numbers], accepted: Flags, permutations: int = 999)
     pvalues = false_discovery_control(raw) if raw else []
     marginals = [_marginal(n, c, accepted, float(p)) for (n, c), p in zip(varied.items(), pvalues, strict=True)]
     joint = Energy(0.0, 1.0)
-    if varied and _can_tell(accepted):
-        points = np.column_stack([column / np.ptp(column) for column in varied.values()])[:MOST]
-        taken = accepted[:MOST]
-        if _can_tell(taken):
+    if varied and _comparable(accepted):
+        points = np.column_stack([column / np.ptp(column) for column in varied.values()])[:MAX_JOINT]
+        taken = accepted[:MAX_JOINT]
+        if _comparable(taken):
             joint = energy(points[taken], points[~taken], permutations)
     order = sorted(marginals, key=lambda m: (m.pvalue, -m.ks))
     return Bias(len(accepted), int(accepted.sum()), tuple(order), joint)
@@ -116,17 +122,20 @@ def bias(table: Mapping[str, Numbers], accepted: Flags, permutations: int = 999)
 
 @dataclass(frozen=True)
 class AcceptanceMap:
-    """Where in the plane of two parameters selection takes what. Empty cells have 0 proposals."""
+    """Numbers of proposed and accepted draws in the plane of two parameters. Empty bins have 0 proposals."""
 
     names: tuple[str, str]
+    """Names of the two parameters."""
     edges: tuple[Numbers, Numbers]
+    """Edges of the bins of each parameter."""
     proposed: NDArray[np.int64]
-    """Shape (cells of the first, cells of the second)."""
+    """Numbers of proposals, shape (bins of the first parameter, bins of the second)."""
     accepted: NDArray[np.int64]
+    """Numbers of accepted draws, of the same shape."""
 
 
 def acceptance_map(names: tuple[str, str], table: Mapping[str, Numbers], accepted: Flags) -> AcceptanceMap:
-    """Count proposed and accepted draws over two parameters."""
+    """Count proposed and accepted draws in bins of two parameters."""
     columns = np.column_stack([table[name] for name in names])
     first, second = (_edges(column) for column in columns.T)
     proposed, _ = np.histogramdd(columns, (first, second))
@@ -135,11 +144,11 @@ def acceptance_map(names: tuple[str, str], table: Mapping[str, Numbers], accepte
 
 
 def _pvalue(column: Numbers, accepted: Flags) -> float:
-    return 1.0 if not _can_tell(accepted) else float(ks_2samp(column[accepted], column[~accepted]).pvalue)  # type: ignore[attr-defined]
+    return 1.0 if not _comparable(accepted) else float(ks_2samp(column[accepted], column[~accepted]).pvalue)  # type: ignore[attr-defined]
 
 
-def _can_tell(accepted: Flags) -> bool:
-    """Whether there are two on either side at least: one draw has no distribution."""
+def _comparable(accepted: Flags) -> bool:
+    """Whether at least two draws were accepted and two rejected: one draw has no distribution."""
     return bool(2 <= accepted.sum() <= len(accepted) - 2)
 
 
@@ -157,9 +166,9 @@ def _marginal(name: str, column: Numbers, accepted: Flags, pvalue: float) -> Mar
 
 
 def _edges(column: Numbers) -> Numbers:
-    """Between different values if there are few, else between quarters of the draws."""
+    """Edges of the bins: between the different values if there are few, else between quarters of the draws."""
     different = np.unique(column)
-    if len(different) <= FEW:
+    if len(different) <= MAX_SINGLE_VALUES:
         between = (different[:-1] + different[1:]) / 2
         return np.array([different[0], *between, different[-1]])
     return np.unique(np.quantile(column, np.linspace(0, 1, BINS + 1)))

@@ -1,4 +1,4 @@
-"""How evenly a pool covers what it was drawn from, and how to choose the few that cover most."""
+"""Coverage of a distribution by a pool, and the choice of a subset with the best coverage."""
 
 from dataclasses import dataclass
 
@@ -17,36 +17,39 @@ class Evenness:
     discrepancy: float
     """Squared centred L2 discrepancy (Hickernell 1998), as `scipy.stats.qmc.discrepancy` gives it."""
     independent: float
-    """What as many independent draws have on average."""
+    """Mean squared discrepancy of the same number of independent draws."""
 
     @property
     def relative(self) -> float:
-        """Below 1: more even than independent draws. Far above: parts of the distribution are missing."""
+        """Ratio to independent draws. Below 1: more even. Far above 1: parts of the distribution are missing."""
         return self.discrepancy / self.independent
 
 
 def evenness(numbers: Points) -> Evenness:
-    """How evenly numbers fill the unit cube.
+    """Evenness of numbers in the unit cube.
 
     For independent draws the expected value is ((5/4)^d - (13/12)^d) / n: all mixed terms of the discrepancy average to
     (13/12)^d, the n^-2 diagonal ones to (5/4)^d.
 
     Args:
-        numbers: shape (n, d), what the design gave for each parameter that varies.
+        numbers: shape (n, d), the design's number for each parameter that varies.
     """
     n, d = numbers.shape
     return Evenness(float(qmc.discrepancy(numbers, method="CD")), ((5 / 4) ** d - (13 / 12) ** d) / n)
 
 
 def farthest_points(points: Points, count: int) -> NDArray[np.int64]:
-    """Choose points so that the least distance between two of them is large, in the order in which they are chosen.
+    """Choose points so that the smallest distance between two of them is large.
 
-    Greedy: begin in the middle, then always take the point that is farthest from all taken ones (Gonzalez 1985: at
-    least half the best possible distance). The first m of the n chosen are what would be chosen for m.
+    Greedy: begin in the middle, then always take the point that is farthest from all chosen ones (Gonzalez 1985: at
+    least half the best possible distance). The first m of n chosen points are those that would be chosen for m.
 
     Args:
         points: shape (n, d).
-        count: how many to choose, n at most.
+        count: number of points to choose, at most n.
+
+    Returns:
+        Numbers of the points, in the order in which they are chosen.
     """
     chosen = [int(np.argmin(np.linalg.norm(points - np.median(points, axis=0), axis=1)))]
     away = cdist(points, points[chosen])[:, 0]

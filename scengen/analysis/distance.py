@@ -1,4 +1,4 @@
-"""How far scenarios and pools are from training and from each other."""
+"""Distances of scenarios and pools from training and from each other."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,40 +17,40 @@ from ..scenario import Scenario
 from ..symmetry import motions
 from .space import Batch, Points, of_tables, scale
 
-MOST_PAIRS = 10_000
-"""Near duplicates after which no more are looked for: a line or a plane of a million scenarios has billions."""
-AT_A_TIME = 10_000
-"""Points whose neighbours are counted at a time."""
-ENERGY_OF = 2000
-"""Scenarios of each of two pools at most, the first ones, whose energy distance is taken: it needs a matrix of all
-distances, and permutations of it."""
-CLOSE = 0.01
-"""Scenarios that differ by less than this in every parameter are near duplicates [training widths]. The jitter of the
-robustness check moves more: actions that solve one of them solve the other."""
+MAX_PAIRS = 10_000
+"""Maximum number of near duplicates that are searched: a line or a plane of a million scenarios has billions."""
+NEIGHBOUR_BATCH = 10_000
+"""Number of points whose neighbours are counted at a time."""
+MAX_ENERGY_SCENARIOS = 2000
+"""Maximum number of scenarios of each of two pools, the first ones, of which an energy distance is computed: it needs a
+matrix of all distances, and permutations of it."""
+NEAR_DUPLICATE_DISTANCE = 0.01
+"""Difference in every parameter below which two scenarios are near duplicates [training widths]. The jitter of the
+robustness check is larger: actions that solve one of them solve the other."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How far a value lies from the training support of its parameter."""
+    """Distance of a value from the training support of its parameter."""
 
     parameter: str
     value: float
     gap: float
-    """In the parameter's unit, signed: negative below the nearest training value."""
+    """Signed gap, negative below the nearest training value [unit of the parameter]."""
     relative: float
-    """The gap in training widths; in widths of the parameter's bounds where training knows one value only."""
+    """Absolute gap [training widths; widths of the parameter's bounds if training has one value only]."""
 
 
 @dataclass(frozen=True)
 class Energy:
-    """The energy distance of two samples, and whether chance explains it."""
+    """The energy distance of two samples, with a permutation test."""
 
     distance: float
-    """sqrt(2 E|X - Y| - E|X - X'| - E|Y - Y'|), in the unit of the coordinates; 0 for equal distributions only."""
+    """Distance sqrt(2 E|X - Y| - E|X - X'| - E|Y - Y'|) [unit of the coordinates]; 0 only for equal distributions."""
     pvalue: float
     """Share of permutations of the two samples that are as far apart."""
     chance: float = 0.0
-    """Mean distance of the permutations: what finite samples of equal distributions show."""
+    """Mean distance of the permutations: the distance of finite samples of equal distributions."""
 
     def __str__(self) -> str:
         """In words: `0.42 (by chance 0.11, p = 0.001)`."""
@@ -61,7 +61,7 @@ class Energy:
 
 @dataclass(frozen=True)
 class NearDuplicate:
-    """Two scenarios that are nearly the same, their symmetries considered."""
+    """Two scenarios that are nearly the same up to the family's symmetries."""
 
     one: str
     other: str
@@ -82,15 +82,15 @@ def offsets(task: Task, scenario: Scenario) -> list[Offset]:
 def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: bool = False) -> Energy:
     """Energy distance of two samples of vectors (Szekely and Rizzo 2013), with a permutation test.
 
-    In one dimension the distance is that of `scipy.stats.energy_distance`. Nothing is told from chance where a sample
-    is a single vector.
+    In one dimension the distance is that of `scipy.stats.energy_distance`. If a sample is a single vector, the test is
+    not possible and the p value is 1.
 
     Args:
         x, y: shapes (n, d) and (m, d).
-        permutations: size of the test; all permutations where there are fewer.
-        seed: of the permutations.
-        twins: number i of both samples differs in what is examined and in nothing else; then pairs change sides, and
-            what twins have in common hides no difference.
+        permutations: number of permutations; all permutations if there are fewer.
+        seed: seed of the permutations.
+        twins: whether number i of both samples are twins, which differ only in what is examined. Then the members of a
+            pair are exchanged, so that the variation that twins share does not hide a difference.
     """
     if twins and np.array_equal(x, y):
         return Energy(0.0, 1.0)
@@ -122,15 +122,15 @@ def energy(x: Points, y: Points, permutations: int = 999, seed: int = 0, twins: 
 
 
 def near_duplicates(
-    task: Task, batch: Batch, others: Batch | None = None, within: float = CLOSE
+    task: Task, batch: Batch, others: Batch | None = None, within: float = NEAR_DUPLICATE_DISTANCE
 ) -> list[NearDuplicate]:
-    """Pairs of scenarios that differ by less than `within` in every parameter, nearest first, of `MOST_PAIRS` at most.
+    """Pairs of scenarios that differ by less than `within` in every parameter, nearest first, at most `MAX_PAIRS`.
 
-    Between two pools this is leakage; within one pool (`others` left out) these are repetitions. Every symmetric image
-    of a scenario is compared, so that two identical cubes that have changed places do not hide a pair.
+    Between two pools such pairs are leakage; within one pool (`others` left out) they are repetitions. Every symmetric
+    image of a scenario is compared, so that two identical cubes that have changed places do not hide a pair.
 
     Args:
-        within: largest difference of any parameter that counts [training widths].
+        within: maximum difference of any parameter [training widths].
     """
     beside = batch if others is None else others
     if not len(batch) or not len(beside):
@@ -148,21 +148,21 @@ def near_duplicates(
                     continue
                 apart, pair = float(np.abs(here[i] - there[number]).max()), (batch.name(i), other)
                 least[pair] = min(apart, least.get(pair, np.inf))
-                if len(least) == MOST_PAIRS:
+                if len(least) == MAX_PAIRS:
                     return _nearest_first(least)
     return _nearest_first(least)
 
 
 def _neighbours(tree: KDTree, points: Points, within: float) -> Iterator[tuple[int, list[int]]]:
-    """Every point that has neighbours in the tree, by its number, and theirs."""
-    for start in range(0, len(points), AT_A_TIME):
-        some = points[start : start + AT_A_TIME]
+    """Every point that has neighbours in the tree: its number, and the numbers of the neighbours."""
+    for start in range(0, len(points), NEIGHBOUR_BATCH):
+        some = points[start : start + NEIGHBOUR_BATCH]
         for k in np.flatnonzero(tree.query_ball_point(some, within, p=np.inf, return_length=True)):
             yield start + int(k), tree.query_ball_point(some[k], within, p=np.inf)
 
 
 def _with_a_coordinate(points: Points) -> Points:
-    """Points that have a coordinate: where nothing varies all are one scenario."""
+    """The points with at least one coordinate: if no parameter varies, all points coincide."""
     return points if points.shape[1] else np.zeros((len(points), 1))
 
 
@@ -171,7 +171,7 @@ def _nearest_first(least: Mapping[tuple[str, str], float]) -> list[NearDuplicate
 
 
 def per_parameter(task: Task, batch: Batch) -> dict[str, tuple[float, float]]:
-    """Least and mean distance of a pool from training, by parameter that leaves it [training widths]."""
+    """Minimum and mean distance of a pool from training, by parameter that leaves training [training widths]."""
     found = {}
     for name, column in batch.values.items():
         support, period = task.training[name].support, task.known[name].period

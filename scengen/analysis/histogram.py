@@ -1,4 +1,4 @@
-"""Histograms of what was drawn: accepted over proposed, beside training."""
+"""Histograms of parameters and features: accepted and proposed draws, and training."""
 
 from dataclasses import dataclass
 
@@ -9,23 +9,34 @@ from numpy.typing import NDArray
 from ..samplers.task import Task
 
 BARS = 12
-"""Bars of a histogram, of equal width."""
-FEW, OFTEN = 6, 3
-"""At most so many different values have one bar each, if each of them was drawn so often on average."""
-TRAINING, PROPOSED, ACCEPTED = "#8a8a8a", "#c9d3de", "#4a7fb5"
+"""Number of bars of a histogram, of equal width."""
+MAX_CHOICES = 6
+"""Maximum number of different values that get a bar each."""
+MIN_DRAWS_PER_CHOICE = 3
+"""Minimum mean number of draws per value, if each value is to get a bar."""
+TRAINING_COLOUR = "#8a8a8a"
+"""Colour of the outline of training."""
+PROPOSED_COLOUR = "#c9d3de"
+"""Colour of the bars of proposed draws."""
+ACCEPTED_COLOUR = "#4a7fb5"
+"""Colour of the bars of accepted draws."""
 
 
 @dataclass(frozen=True)
 class Histogram:
-    """One parameter or feature: how many draws fall into each of some bars."""
+    """Numbers of draws by value of one parameter or feature."""
 
     name: str
     edges: tuple[float, ...]
-    """Ends of the bars, one more than there are bars; of choices, their values."""
+    """Edges of the bars, one more than there are bars; for choices, their values."""
     choices: bool
+    """Whether every value has a bar of its own."""
     proposed: tuple[int, ...]
+    """Number of proposed draws in each bar."""
     accepted: tuple[int, ...]
+    """Number of accepted draws in each bar."""
     training: tuple[int, ...]
+    """Number of training scenarios in each bar."""
 
 
 def histogram(
@@ -35,12 +46,12 @@ def histogram(
 
     Args:
         proposed: values, shape (n,).
-        accepted: which of them were accepted, shape (n,).
+        accepted: whether each of them was accepted, shape (n,).
         training: values in training, shape (m,).
     """
     every = np.concatenate([proposed, training])
     values = np.unique(every)
-    choices = len(values) <= FEW and len(every) >= OFTEN * len(values)
+    choices = len(values) <= MAX_CHOICES and len(every) >= MIN_DRAWS_PER_CHOICE * len(values)
     edges = values if choices else np.histogram_bin_edges(every, BARS)
 
     def counted(column: NDArray[np.float64]) -> tuple[int, ...]:
@@ -58,23 +69,23 @@ def histogram(
 
 
 def label(task: Task, name: str) -> str:
-    """A parameter's name with its unit; a feature has none that is declared."""
+    """The name of a parameter with its unit, or the name of a feature, whose unit is not declared."""
     unit = task.known[name].unit.removeprefix("1") if name in task.known else ""
     return f"{name} [{unit}]" if unit else name
 
 
 def figure(histograms: tuple[Histogram, ...]) -> Figure:
-    """Accepted (blue) over proposed (pale) draws; the grey outline is training, scaled to as many draws."""
+    """Accepted draws (blue) over proposed draws (pale). The grey outline is training, scaled to the same number."""
     drawn = Figure(figsize=(2.6 * len(histograms), 1.9))
     for plot, shown in zip(drawn.subplots(1, len(histograms), squeeze=False)[0], histograms, strict=True):
         at = np.arange(len(shown.edges)) if shown.choices else np.array(shown.edges[:-1])
         width = np.full(len(at), 0.8) if shown.choices else np.diff(shown.edges)
         align = "center" if shown.choices else "edge"
         scale = sum(shown.proposed) / max(1, sum(shown.training))
-        plot.bar(at, shown.proposed, width, align=align, color=PROPOSED, edgecolor="white")
-        plot.bar(at, shown.accepted, width, align=align, color=ACCEPTED, edgecolor="white")
+        plot.bar(at, shown.proposed, width, align=align, color=PROPOSED_COLOUR, edgecolor="white")
+        plot.bar(at, shown.accepted, width, align=align, color=ACCEPTED_COLOUR, edgecolor="white")
         trained = [scale * count for count in shown.training]
-        plot.bar(at, trained, width, align=align, fill=False, edgecolor=TRAINING, linewidth=1)
+        plot.bar(at, trained, width, align=align, fill=False, edgecolor=TRAINING_COLOUR, linewidth=1)
         if shown.choices:
             plot.set_xticks(at, [f"{value:.4g}" for value in shown.edges])
         plot.set_title(shown.name, fontsize=8)

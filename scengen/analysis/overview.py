@@ -1,4 +1,4 @@
-"""The report of whole pools: what was lost, how far out they are, selection bias of certification, what leaks."""
+"""The report of whole pools: rejections, distance from training, selection bias of certification, leakage."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -14,61 +14,76 @@ from ..errors import Infeasible
 from ..pictures import render
 from ..pictures.plots import svg
 from ..pictures.report import LARGEST_PAGE, template, thumbnail
+from ..pool import Pool
 from ..pool.library import names
-from ..pool.pool import Pool
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..work.targets import write
 from .bias import Bias, bias
 from .coverage import Evenness, evenness
-from .distance import CLOSE, ENERGY_OF, MOST_PAIRS, Energy, NearDuplicate, energy, near_duplicates, per_parameter
+from .distance import (
+    MAX_ENERGY_SCENARIOS,
+    MAX_PAIRS,
+    NEAR_DUPLICATE_DISTANCE,
+    Energy,
+    NearDuplicate,
+    energy,
+    near_duplicates,
+    per_parameter,
+)
 from .histogram import Histogram, figure, histogram, label
-from .redraw import batch_of, first_scenarios, redrawn, task_of, told
+from .redraw import batch_of, first_scenarios, redrawn, sampled_indices, task_of
 from .space import Batch, measured, of_features
 
-SHOWN = 4
-"""Marginals that are drawn of each pool, the most telling ones, and scenes that are shown."""
-PAIRS = 5
-"""Near duplicates of two pools that are named."""
-TRAINED = 500
-"""Training scenarios at most with which the draws of a pool are compared."""
+SHOWN_SCENES = 4
+"""Number of scenes that are shown of each pool."""
+SHOWN_MARGINALS = 4
+"""Number of histograms of each pool, the parameters with the largest changes first."""
+SHOWN_PAIRS = 5
+"""Number of near duplicates that are named for two pools."""
+MAX_TRAINING = 500
+"""Maximum number of training scenarios with which the draws of a pool are compared."""
 
 
 @dataclass(frozen=True)
 class Overview:
-    """What is known of one pool."""
+    """The report of one pool."""
 
     folder: str
     task: str
     split: str
     scenarios: int
+    """Number of scenarios in the pool."""
     sample: str
-    """Of which indices coverage, bias and histograms tell; empty for all."""
+    """Indices to which coverage, bias and histograms refer, in words; empty for all."""
     funnel: Mapping[str, int]
+    """Number of draws that passed each step of certification."""
     reasons: Mapping[str, int]
+    """Number of rejected draws by reason."""
     outside: Mapping[str, tuple[float, float]]
-    """Least and mean distance from training by parameter that leaves it [training ranges]."""
+    """Minimum and mean distance from training, by parameter that leaves training [training ranges]."""
     evenness: Evenness | None
-    """None for a chosen subset, which was not drawn."""
+    """Evenness of the certified draws; None for a chosen subset, which was not drawn."""
     bias: Bias | None
-    """Certified against feasible draws; None as above."""
+    """Selection bias of certified against feasible draws; None for a chosen subset."""
     histograms: tuple[Histogram, ...]
-    """Of what the axes move, then of the parameters and features that selection changed most; none as above."""
+    """Histograms of the moved parameters, then of those that selection changed most; empty for a chosen subset."""
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """What is known of two pools of one task."""
+    """The comparison of two pools of one task."""
 
     one: str
     other: str
     energy: Energy
+    """Energy distance between the features of the two pools [training ranges]."""
     shared: list[NearDuplicate]
-    """Near duplicates: leakage, if one is for training and the other for evaluation."""
+    """Near duplicates: leakage, if one pool is for training and the other for evaluation."""
 
 
 def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Overview], list[Contrast]]:
-    """Look at every pool, and at every two of one task.
+    """Report on every pool, and compare every two pools of one task.
 
     Args:
         search: folders of other packages with tasks, see `task_files.search_path`.
@@ -84,12 +99,16 @@ def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Over
 
 
 def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequence[Contrast], path: Path) -> str:
-    """Write the report as one HTML file. Returns why it has no pictures, or nothing."""
+    """Write the report as one HTML file.
+
+    Returns:
+        The reason why pictures are missing; empty if none is missing.
+    """
     remark, pictures, plots, size = "", {}, {}, 0
     for pool, overview in zip(pools, overviews, strict=True):
         shown: list[str] = []
         try:
-            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), 0 if remark else SHOWN)
+            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), 0 if remark else SHOWN_SCENES)
             shown = [thumbnail(*scene)[0] for scene in scenes]
         except render.NoPictures as error:
             remark = str(error)
@@ -100,7 +119,7 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
             break
         pictures[overview.folder] = shown
         plots |= {overview.folder: plot} if plot else {}
-    told = [(contrast, contrast.shared[:PAIRS]) for contrast in contrasts]
+    told = [(contrast, contrast.shared[:SHOWN_PAIRS]) for contrast in contrasts]
     text = template("report.html").render(
         overviews=overviews,
         contrasts=contrasts,
@@ -108,11 +127,11 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
         plots=plots,
         steps=("proposed", *STAGES),
         names=names(pools, [id_ for _, pairs in told for pair in pairs for id_ in (pair.one, pair.other)]),
-        pairs=PAIRS,
-        most=MOST_PAIRS,
-        energy_of=ENERGY_OF,
+        pairs=SHOWN_PAIRS,
+        most=MAX_PAIRS,
+        energy_of=MAX_ENERGY_SCENARIOS,
         remark=remark,
-        close=CLOSE,
+        close=NEAR_DUPLICATE_DISTANCE,
     )
     write(path, text)
     return remark
@@ -125,40 +144,46 @@ def plain(overviews: Sequence[Overview], contrasts: Sequence[Contrast]) -> dict[
 
 def _overview(pool: Pool, task: Task, batch: Batch, search: Sequence[str]) -> Overview:
     even, biased, histograms = None, None, ()
-    if len(batch) and not pool.chosen:
-        drawn = [p for p in redrawn(pool, search=search) if p.feasible]
-        numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
-        even = evenness(numbers) if numbers.size else None
-        rows = [measured(p.scenario) for p in drawn]
-        table = {name: np.array([row[name] for row in rows], float) for name in rows[0]}
-        certified = np.array([p.certified for p in drawn])
-        biased = bias(table, certified)
-        training = _training(pool, task)
-        names = list(dict.fromkeys([*task.shifts(pool.split), *(m.name for m in biased.marginals)]))[:SHOWN]
-        histograms = tuple(
-            histogram(label(task, n), table[n], certified, np.array([row[n] for row in training])) for n in names
-        )
+    if len(batch) and not pool.manifest.is_subset:
+        even, biased, histograms = _selection(pool, task, search)
     return Overview(
-        str(pool.folder),
-        task.name,
-        pool.split,
-        len(batch),
-        told(pool) if histograms else "",
-        pool.funnel,
-        pool.reasons,
-        per_parameter(task, batch),
-        even,
-        biased,
-        histograms,
+        folder=str(pool.folder),
+        task=task.name,
+        split=pool.split,
+        scenarios=len(batch),
+        sample=sampled_indices(pool) if histograms else "",
+        funnel=pool.manifest.funnel,
+        reasons=pool.manifest.reasons,
+        outside=per_parameter(task, batch),
+        evenness=even,
+        bias=biased,
+        histograms=histograms,
     )
 
 
+def _selection(pool: Pool, task: Task, search: Sequence[str]) -> tuple[Evenness | None, Bias, tuple[Histogram, ...]]:
+    """Evenness, selection bias and histograms of a pool, from all its draws, which are made again."""
+    drawn = [p for p in redrawn(pool, search=search) if p.feasible]
+    numbers = np.array([list(p.quantiles.values()) for p in drawn if p.certified])
+    even = evenness(numbers) if numbers.size else None
+    rows = [measured(p.scenario) for p in drawn]
+    table = {name: np.array([row[name] for row in rows], float) for name in rows[0]}
+    certified = np.array([p.certified for p in drawn])
+    biased = bias(table, certified)
+    training = _training(pool, task)
+    names = list(dict.fromkeys([*task.shifts(pool.split), *(m.name for m in biased.marginals)]))[:SHOWN_MARGINALS]
+    histograms = tuple(
+        histogram(label(task, n), table[n], certified, np.array([row[n] for row in training])) for n in names
+    )
+    return even, biased, histograms
+
+
 def _training(pool: Pool, task: Task) -> list[dict[str, float]]:
-    """The training scenarios of the first indices of a pool: the twins, where it is out of distribution."""
-    found = []
-    for index in range(min(pool.indices, TRAINED)):
+    """The training scenarios of the first indices of a pool: the twins, if the pool is out of distribution."""
+    drawn, found = pool.manifest.config, []
+    for index in range(min(pool.manifest.indices, MAX_TRAINING)):
         with suppress(Infeasible):
-            found.append(measured(task.draw(ID, pool.seed, index, task.design(pool.sampler)).scenario))
+            found.append(measured(task.draw(ID, drawn.seed, index, task.design(drawn.sampler)).scenario))
     return found
 
 
@@ -167,7 +192,7 @@ Side = tuple[Pool, Batch]
 
 def _contrast(task: Task, one: Side, other: Side) -> Contrast:
     (a, here), (b, there) = one, other
-    ones, others = (first_scenarios(task, pool, ENERGY_OF) for pool in (a, b))
+    ones, others = (first_scenarios(task, pool, MAX_ENERGY_SCENARIOS) for pool in (a, b))
     space = of_features(task, ones, others)
     apart = energy(space.points(ones), space.points(others))
     return Contrast(str(a.folder), str(b.folder), apart, near_duplicates(task, here, there))

@@ -1,4 +1,4 @@
-"""What a pool was chosen from: its manifest and seed are enough to draw every proposal again."""
+"""All draws of the run that made a pool: its manifest and seed are enough to repeat every proposal."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,19 +6,19 @@ from itertools import islice
 
 import numpy as np
 
-from .. import config
+from .. import compose
 from ..errors import BadConfig, Infeasible, PoolError
 from ..params import Value, values
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate import survey
 from ..validate.stored import task_of_manifest
 from .space import Batch
 
-MOST = 10_000
-"""Indices at most that are drawn again: in whatever design they were drawn, the first ones are a sample of all. Shares
-come out to 1 %, and the discrepancy, whose cost grows with the square, takes seconds."""
+MAX_REDRAWN = 10_000
+"""Maximum number of indices that are drawn again: in every design, the first ones are a sample of all. Shares are
+accurate to 1 %, and the discrepancy, whose cost grows with the square, takes seconds."""
 
 
 @dataclass(frozen=True)
@@ -28,63 +28,64 @@ class Redrawn:
     index: int
     scenario: Scenario
     quantiles: Mapping[str, float]
-    """What the design gave for each parameter that varies, in (0, 1)."""
+    """Number of the design for each parameter that varies, in (0, 1)."""
     feasible: bool
-    """Whether the family's own constraints let it through to the certifier."""
+    """Whether the draw satisfies the family's own constraints, so that the certifier examined it."""
     certified: bool
+    """Whether the pool holds the draw."""
 
 
 def task_of(pool: Pool, search: Sequence[str] = ()) -> Task:
-    """The task as it was when the pool was made: its numbers from the manifest, its family from the installed file.
+    """The task as it was when the pool was made: numbers from the manifest, the family from the installed file.
 
     Args:
         search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
-        ScengenError: there is no such task, or the family is another one or has changed so that the task does not fit.
+        ScengenError: there is no such task, its family is another one, or the family has changed and does not fit.
     """
-    return task_of_manifest(pool, config.task(pool.task, search))
+    return task_of_manifest(pool, compose.load_task(pool.task, search))
 
 
 def redrawn(
     pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None, search: Sequence[str] = ()
 ) -> list[Redrawn]:
-    """Draw again what the pool's run has drawn at its first `MOST` indices, infeasible tries included.
+    """Repeat all draws of the pool's run at its first `MAX_REDRAWN` indices, infeasible ones included.
 
     Args:
-        progress: told how many of how many indices are done.
+        progress: called with the number of indices done, and their total.
         search: see `task_of`.
 
     Raises:
-        BadConfig: the pool is a chosen subset, for which there are no proposals.
-        PoolError: other scenarios come out than the pool holds, or more draws than it counts; or it counts so many
-            that no run can have made them.
+        BadConfig: the pool is a chosen subset, which has no proposals of its own.
+        PoolError: a scenario differs from that of the pool, there are more draws than the pool counts, or it counts so
+            many that no run can have made them.
     """
-    if pool.chosen:
+    if pool.manifest.is_subset:
         raise BadConfig(f"{pool.folder} is a subset of another pool, chosen and not drawn; give the pool it came from")
-    if why := survey.too_large(pool):
+    if why := survey.too_large(pool.manifest):
         raise PoolError(f"{pool.folder}: {why}")
     task = task_of(pool, search)
-    design = task.design(pool.sampler)
-    count = min(pool.indices, MOST)
+    design = task.design(pool.manifest.config.sampler)
+    count = min(pool.manifest.indices, MAX_REDRAWN)
     places = np.flatnonzero(pool.directory.indices < count).tolist()
     ids = {int(pool.directory.indices[place]): pool.directory.id(place) for place in places}
     found: list[Redrawn] = []
-    untold = 0  # tries at a training scenario that an axis could not start from
+    uncounted = 0  # tries at a training scenario from which the axis could not start
     for index in range(count):
-        if why := survey.too_many(pool, index, len(found) + untold):
+        if why := survey.too_many(pool.manifest, index, len(found) + uncounted):
             raise PoolError(f"{pool.folder}: {why}")
         try:
-            for p in task.proposals(pool.split, pool.seed, index, design):
+            for p in task.proposals(pool.split, pool.manifest.config.seed, index, design):
                 certified = index in ids and p.refutation is None
                 if certified and ids[index] != p.scenario.id:
                     raise PoolError(
-                        f"{pool.folder}: index {index} comes out as {p.scenario.id}, but the pool holds {ids[index]}; "
+                        f"{pool.folder}: index {index} gives {p.scenario.id}, but the pool holds {ids[index]}; "
                         "the family has changed since, generate the pool again"
                     )
                 found.append(Redrawn(index, p.scenario, p.quantiles, p.refutation is None, certified))
         except Infeasible as error:
-            untold += error.tries  # there was no training scenario of this index that the axis could move
+            uncounted += error.tries  # this index has no training scenario that the axis can move
         progress(index + 1, count)
     return found
 
@@ -93,9 +94,9 @@ def batch_of(task: Task, pool: Pool) -> Batch:
     """The scenarios of a pool by their parameter values.
 
     Raises:
-        ScengenError: a scenario stands in it twice, or has other parameters than the task or values out of bounds.
+        ScengenError: the pool holds a scenario twice, or one with parameters that are not the task's or out of bounds.
     """
-    if id_ := pool.directory.twice:
+    if id_ := pool.directory.repeated:
         raise PoolError(f"{pool.folder} holds scenario {id_} twice; see scengen verify")
     rows = (_complete(task, params) for (params,) in pool.columns("params"))
     batch = Batch.read(pool.directory.ids, rows)
@@ -111,10 +112,11 @@ def _complete(task: Task, params: Mapping[str, Value]) -> Mapping[str, Value]:
 
 
 def first_scenarios(task: Task, pool: Pool, count: int) -> list[Scenario]:
-    """The first so many scenarios of a pool."""
+    """The first `count` scenarios of a pool."""
     return [task.scenario(params) for (params,) in islice(pool.columns("params"), count)]
 
 
-def told(pool: Pool) -> str:
-    """Of how many indices `redrawn` speaks, if not of all."""
-    return f"of the first {MOST} of {pool.indices} indices" if pool.indices > MOST else ""
+def sampled_indices(pool: Pool) -> str:
+    """The indices that `redrawn` repeats, in words; empty if it repeats all."""
+    indices = pool.manifest.indices
+    return f"of the first {MAX_REDRAWN} of {indices} indices" if indices > MAX_REDRAWN else ""

@@ -1,4 +1,4 @@
-"""From a failing scenario to the few parameters that make it fail."""
+"""Reduction of a failing scenario to the few parameters that make it fail."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,40 +7,42 @@ from ..errors import BadConfig
 from ..params import Value
 from ..samplers.dists import Dist
 
-STEPS = 5
-"""Halvings of the distance to the centre: the values found are within 1/32 of it."""
+HALVINGS = 5
+"""Number of halvings of the distance to the centre: the values found are accurate to 1/32 of it."""
 
 Fails = Callable[[Mapping[str, Value]], bool]
-"""Whether a scenario with these parameter values fails in the way that is to be explained."""
+"""Test whether a scenario with these parameter values fails in the way that is to be explained."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A parameter that cannot be at its centre if the scenario is to fail."""
+    """A parameter without which the scenario does not fail: put to its centre alone, the failure disappears."""
 
     parameter: str
     centre: Value
+    """Median of the parameter in training."""
     value: Value
-    """The value nearest to the centre with which it was seen to fail."""
+    """Value nearest to the centre with which the scenario failed."""
     began: Value
-    """The value before shrinking."""
+    """Value before shrinking."""
     departure: float
-    """How far the value is from the centre [training widths]."""
+    """Distance of the value from the centre [training widths]."""
 
 
 @dataclass(frozen=True)
 class Shrunk:
-    """A failing scenario as near to the centre as could be found."""
+    """The failing scenario nearest to the centre that was found."""
 
     values: Mapping[str, Value]
+    """Values of all parameters."""
     causes: tuple[Cause, ...]
-    """Put any one of them alone to its centre, the others being what they were: no failure. Farthest first."""
+    """Parameters that the failure needs, the farthest from its centre first."""
     tries: int
-    """How many scenarios were judged."""
+    """Number of scenarios that were judged."""
 
 
 def centre(training: Mapping[str, Dist]) -> dict[str, Value]:
-    """The median of every training distribution."""
+    """The medians of the training distributions."""
     return {name: dist.quantile(0.5) for name, dist in training.items()}
 
 
@@ -49,14 +51,13 @@ def shrink(
 ) -> Shrunk:
     """Move a failing scenario towards a centre while it still fails.
 
-    First delta debugging (Zeller and Hildebrandt 2002): put as many parameters as possible to their centre, groups at a
-    time, until none can be. Then the distances of those that remain are halved, one after the other. No scenario is
-    judged twice.
+    First, delta debugging (Zeller and Hildebrandt 2002) puts as many parameters as possible to their centre, in groups.
+    Then the distances of the remaining parameters are halved, one after the other. No scenario is judged twice.
 
     Args:
-        begin, middle: values of all parameters of a failing scenario and of the centre.
-        scales: what to measure the departure of each parameter in, as `scengen.analysis.space.scale` has it.
-        fails: judged often; the cheaper the better.
+        begin, middle: values of all parameters of the failing scenario and of the centre.
+        scales: unit of each parameter's departure, see `scengen.analysis.space.scale`.
+        fails: test that is called often; the cheaper the better.
 
     Raises:
         BadConfig: the scenario does not fail, or the centre fails too.
@@ -72,7 +73,7 @@ def shrink(
     if not failing(begin):
         raise BadConfig("the scenario does not fail; there is nothing to shrink")
     if failing(middle):
-        raise BadConfig("the centre of training fails in the same way: no parameter is to blame, but the family")
+        raise BadConfig("the centre of training fails in the same way: the family is at fault, not a parameter")
     differ = [name for name in begin if begin[name] != middle[name]]
     needed = _fewest(differ, lambda kept: failing({**middle, **{n: begin[n] for n in kept}}))
     values = {**middle, **{n: begin[n] for n in needed}}
@@ -83,7 +84,7 @@ def shrink(
 
 
 def _fewest(items: Sequence[str], fails: Callable[[Sequence[str]], bool]) -> list[str]:
-    """A subset that fails, and from which no single item can be taken away: the algorithm ddmin."""
+    """A failing subset from which no single item can be removed (the algorithm ddmin)."""
     kept, parts = list(items), 2
     while len(kept) > 1:
         groups = list(_split(kept, min(parts, len(kept))))
@@ -100,15 +101,15 @@ def _fewest(items: Sequence[str], fails: Callable[[Sequence[str]], bool]) -> lis
 
 
 def _split(items: Sequence[str], parts: int) -> Iterator[list[str]]:
-    """Cut a list into parts of nearly equal length."""
+    """Cut a list into parts of nearly equal lengths."""
     for i in range(parts):
         yield list(items[i * len(items) // parts : (i + 1) * len(items) // parts])
 
 
 def _nearer(values: Mapping[str, Value], name: str, middle: Value, failing: Fails) -> dict[str, Value]:
-    """Halve the distance of one parameter between a value that fails and one that does not."""
+    """Move one parameter towards the centre by bisection while the scenario still fails."""
     good, bad = middle, values[name]
-    for _ in range(STEPS):
+    for _ in range(HALVINGS):
         between = (good + bad) / 2
         if isinstance(bad, int):
             between = round(between)

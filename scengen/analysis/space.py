@@ -1,4 +1,4 @@
-"""Scenarios as points: parameters or features in units of the training range, periods closed to circles."""
+"""Scenarios as points: parameters or features in units of the training range, those with a period on circles."""
 
 import math
 from array import array
@@ -14,7 +14,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 
 Points = NDArray[np.float64]
-"""Shape (n, d): one row per scenario."""
+"""Points of shape (n, d): one row per scenario."""
 
 
 Table = Mapping[str, NDArray[np.float64]]
@@ -23,23 +23,24 @@ Table = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenarios by the values of their parameters: a million of them take some hundred MB."""
+    """Parameter values of many scenarios; a million scenarios take some hundred MB."""
 
     ids: NDArray[np.str_] | NDArray[np.bytes_]
-    """Any names that tell them apart, shape (n,)."""
+    """Unique names of the scenarios, shape (n,)."""
     values: Table
+    """Values by parameter, each of shape (n,)."""
 
     def __len__(self) -> int:
         return len(self.ids)
 
     @classmethod
     def of(cls, scenarios: Mapping[str, Scenario]) -> "Batch":
-        """Scenarios by their names."""
+        """The batch of some scenarios, given by name."""
         return cls.read(np.array(list(scenarios), str), map(values, scenarios.values()))
 
     @classmethod
     def read(cls, ids: NDArray[np.str_] | NDArray[np.bytes_], rows: Iterable[Mapping[str, float]]) -> "Batch":
-        """Scenarios whose parameter values come one after the other, all of one family."""
+        """The batch of scenarios of one family whose parameter values are read one after the other."""
         columns: dict[str, array[float]] = {}
         for row in rows:
             columns = columns or {name: array("d") for name in row}
@@ -48,13 +49,13 @@ class Batch:
         return cls(ids, {name: _column(np.frombuffer(column)) for name, column in columns.items()})
 
     def name(self, number: int) -> str:
-        """The name of one of them."""
+        """The name of a scenario, by its number."""
         name = self.ids[number]
         return name.decode() if isinstance(name, bytes) else str(name)
 
 
 def _column(column: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same numbers; one number in the memory of all, if they are equal."""
+    """The same numbers, stored once if all are equal."""
     equal = len(column) > 0 and bool((column == column[0]).all())
     return np.broadcast_to(column[0].copy(), column.shape) if equal else column
 
@@ -65,9 +66,9 @@ def measured(scenario: Scenario) -> dict[str, float]:
 
 
 def scale(task: Task, name: str) -> float:
-    """The unit in which differences of a parameter are measured, in its own unit.
+    """The width of a parameter's training range, or of its bounds if training has one value only [its unit].
 
-    The width of the training range; where training knows one value only, the width of its bounds.
+    Differences of the parameter are divided by it.
     """
     known = task.known[name]
     return width(task.training[name].support) or (known.high - known.low) or 1.0
@@ -75,14 +76,14 @@ def scale(task: Task, name: str) -> float:
 
 @dataclass(frozen=True)
 class Column:
-    """One coordinate, or two for a parameter with a period: a place on a circle of that circumference."""
+    """One coordinate; two for a parameter with a period, which lies on a circle of that circumference."""
 
     name: str
     scale: float
     period: float | None = None
 
     def of(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """The coordinates of some values, each of shape (n,)."""
+        """The coordinates of values, each of shape (n,)."""
         if self.period is None:
             return (values / self.scale,)
         radius, angle = self.period / self.scale / math.tau, math.tau * values / self.period
@@ -100,10 +101,10 @@ class Space:
         return tuple(column.name for column in self.columns)
 
     def of(self, table: Table, count: int) -> Points:
-        """Scenarios as points, whose values stand in a table.
+        """The scenarios of a table as points.
 
         Args:
-            count: how many they are; without coordinates all are one point.
+            count: number of scenarios; without coordinates all of them are one point.
         """
         found = [x for column in self.columns for x in column.of(table[column.name])]
         return np.column_stack(found) if found else np.zeros((count, 0))
@@ -115,7 +116,7 @@ class Space:
 
 
 def of_tables(task: Task, *tables: Table) -> Space:
-    """Coordinates of those parameters in which scenarios differ, in training widths."""
+    """Coordinates of those parameters in which the scenarios of the tables differ, in training widths."""
     found = [table for table in tables if table]
     varied = [n for n in task.known if any((table[n] != found[0][n][0]).any() for table in found)]
     return Space(tuple(Column(n, scale(task, n), task.known[n].period) for n in varied))
@@ -127,7 +128,7 @@ def of_parameters(task: Task, scenarios: Sequence[Scenario]) -> Space:
 
 
 def of_features(task: Task, training: Sequence[Scenario], others: Sequence[Scenario]) -> Space:
-    """Coordinates of the family's features in ranges of a training sample; of its parameters if it declares none."""
+    """Coordinates of the family's features in ranges of a training sample; of its parameters if it has no features."""
     every = [dict(scenario.features()) for scenario in training]
     if not any(every):
         return of_parameters(task, [*training, *others])

@@ -1,1 +1,1 @@
-"""Evidence on an OOD axis: features, replayed actions, boundaries, cards."""
+"""Evidence on an OOD axis (features, memories, boundaries, cards), and a search for axes."""

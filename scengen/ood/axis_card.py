@@ -18,7 +18,7 @@ NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
 
 @dataclass(frozen=True)
 class AxisSettings:
-    """Settings of `scengen axis`; conf/command/axis.yaml explains them."""
+    """Settings of `scengen probe`; conf/command/probe.yaml explains them."""
 
     axis: str = ""
     n: int = 50
