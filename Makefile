@@ -88,7 +88,7 @@ TASKS ?=
 certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(TASKS) $(SPLITS)
 
-# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis, and names of tasks to select them.
+# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)

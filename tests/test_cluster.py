@@ -17,7 +17,7 @@ from faults import lost, work
 
 from scengen import cli
 from scengen.commands.settings import read
-from scengen.commands.verify import Settings as Asked
+from scengen.commands.verify import VerifySettings
 from scengen.errors import BadConfig, ScengenError
 from scengen.runs.progress import ProgressBar
 from scengen.work import cluster
@@ -66,7 +66,7 @@ def test_without_ray_a_line_says_what_to_install(monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "ray" else find(name))
     with pytest.raises(ClusterError, match=r"pip install 'scengen\[ray\]'"):
-        read("verify", ["pool=x", "executor=ray"], Asked)
+        read("verify", ["pool=x", "executor=ray"], VerifySettings)
 
 
 def test_commands_do_not_import_ray_unless_it_is_asked_for():
@@ -257,5 +257,5 @@ def test_a_token_that_is_wrong_or_missing_is_one_line(nodes, tmp_path):
 
 def test_settings_name_workers_by_number_or_executor():
     with pytest.raises(BadConfig, match="workers = 2.5"):
-        read("verify", ["pool=x", "workers=2.5"], Asked)
-    assert read("verify", ["pool=x", "workers=3", "executor=local"], Asked).workers == 3
+        read("verify", ["pool=x", "workers=2.5"], VerifySettings)
+    assert read("verify", ["pool=x", "workers=3", "executor=local"], VerifySettings).workers == 3

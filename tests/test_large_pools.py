@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,16 @@ from synthetic_pool import synthetic
 
 from scengen import cli
 from scengen.analysis import redraw
-from scengen.analysis.distance import MOST_PAIRS, near_duplicates
+from scengen.analysis.distance import MAX_PAIRS, near_duplicates
 from scengen.analysis.space import Batch
 from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError
 from scengen.pictures import report, sheet
-from scengen.pool import pool, shards
+from scengen.pool import Pool, shards, writing
 from scengen.pool.directory import Directory
 from scengen.pool.library import Library
 from scengen.pool.names import NoScenario
-from scengen.pool.pool import Pool
+from scengen.pool.writing import write_pool, write_rows
 
 N = 1000
 SHARD = 400
@@ -34,8 +35,8 @@ SHARD = 400
 def large(tmp_path_factory):
     """A thousand scenarios in three shards of ten small groups of rows each."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pool, "SHARD_ROWS", SHARD)
-        patch.setattr(shards, "GROUP_ROWS", 40)
+        patch.setattr(writing, "SHARD_ROWS", SHARD)
+        patch.setattr(writing, "GROUP_ROWS", 40)
         return synthetic(Pool.open(REFERENCE), N, tmp_path_factory.mktemp("large") / "pool").folder
 
 
@@ -65,7 +66,7 @@ def touched(monkeypatch):
 
 def test_every_row_is_found_by_place_id_index_and_name(large):
     of, rows = Pool.open(large), list(Pool.open(large).rows())
-    assert len(rows) == len(of) == N and [s["rows"] for s in of.manifest["shards"]] == [SHARD, SHARD, N - 2 * SHARD]
+    assert len(rows) == len(of) == N and [entry.rows for entry in of.manifest.shards] == [SHARD, SHARD, N - 2 * SHARD]
     for place in (0, 39, 40, 399, 400, 401, 799, 800, N - 1):
         row = rows[place]
         assert of.at(place) == of.row(row.id) == of.row(str(row.name)) == of.of_index(row.index) == row
@@ -90,7 +91,7 @@ def test_one_row_unpacks_one_group_and_no_other(large, touched):
 def test_ids_and_indices_are_read_without_anything_else(large, touched):
     directory = Pool.open(large).directory
     assert len(directory) == N and {names for names, _ in touched} == {frozenset({"id", "index"})}
-    assert directory.twice == ""
+    assert directory.repeated == ""
     Pool.open(large).kinds("split")
     assert touched[-1][0] == {"split"}
 
@@ -107,14 +108,14 @@ def test_the_beginning_of_an_id_finds_what_a_scan_finds(ids, start):
     directory = Directory(np.array(ids, "S12"), np.arange(len(ids)))
     first = {id_: place for place, id_ in reversed(list(enumerate(ids)))}
     assert directory.beginning(start) == sorted(place for id_, place in first.items() if id_.startswith(start))
-    assert bool(directory.twice) == (len(first) < len(ids))
+    assert bool(directory.repeated) == (len(first) < len(ids))
 
 
 def test_a_shard_with_other_rows_than_the_manifest_says_is_told(large, tmp_path):
-    other = pool.write(tmp_path / "other", Pool.open(large).about, Pool.open(large).some(range(5)))
-    manifest = dict(other.manifest)
+    other = write_pool(tmp_path / "other", Pool.open(large).manifest.without_files(), Pool.open(large).some(range(5)))
+    manifest = other.manifest
     for rows, says in ((4, "more than 4 rows"), (6, "holds 5 rows")):
-        told = Pool(other.folder, {**manifest, "shards": [{**manifest["shards"][0], "rows": rows}]})
+        told = Pool(other.folder, replace(manifest, shards=(replace(manifest.shards[0], rows=rows),)))
         with pytest.raises(PoolError, match=says):
             _ = told.directory
         with pytest.raises(PoolError, match="5 rows, and the manifest promises"):
@@ -138,8 +139,8 @@ def test_showing_a_pool_reads_no_witness_and_says_what_it_leaves_out(large, touc
 
 
 def test_statistics_read_no_witness_and_say_of_what_they_are(large, touched, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(redraw, "MOST", 100)
-    commands = (["compare"], ["bias"], ["report", f"to={tmp_path / 'r.html'}"])
+    monkeypatch.setattr(redraw, "MAX_REDRAWN", 100)
+    commands = (["compare"], ["audit"], ["report", f"to={tmp_path / 'r.html'}"])
     for command in commands:
         assert cli.run([*command, f"pool={large}"]) == 0, capsys.readouterr().err
     told = capsys.readouterr().out
@@ -212,7 +213,7 @@ def test_near_duplicates_of_a_crowd_come_to_an_end():
     values = dict(next(Pool.open(REFERENCE).columns("params"))[0])
     rows = ({**values, "x": values["x"] + 1e-9 * k} for k in range(300))
     found = near_duplicates(task, Batch.read(np.array([f"{k:012x}" for k in range(300)], "S12"), rows))
-    assert len(found) == MOST_PAIRS
+    assert len(found) == MAX_PAIRS
 
 
 # --- memory ----------------------------------------------------------------------------------------------------
@@ -223,12 +224,12 @@ def test_rows_are_written_while_they_come(tmp_path):
     source, seen = Pool.open(REFERENCE).at(0), []
 
     def rows():
-        for k in range(5 * shards.GROUP_ROWS):
+        for k in range(5 * writing.GROUP_ROWS):
             seen.append(sum(path.stat().st_size for path in tmp_path.iterdir()))
-            yield {**source.plain(), "index": k}, source.witness
+            yield replace(source, index=k)
 
-    entry = shards.write(tmp_path / "some.parquet", rows())
-    assert seen[-1] > entry["bytes"] / 2 and [path.name for path in tmp_path.iterdir()] == ["some.parquet"]
+    entry = write_rows(tmp_path / "some.parquet", rows())
+    assert seen[-1] > entry.bytes / 2 and [path.name for path in tmp_path.iterdir()] == ["some.parquet"]
     assert pq.read_metadata(tmp_path / "some.parquet").num_row_groups == 5
 
 

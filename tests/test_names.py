@@ -69,7 +69,7 @@ def test_what_finds_none_or_several_ends_in_one_line_with_their_names(text, erro
 
 @pytest.mark.parametrize("id_", ["12e4", "1e400", "007", "8e12e4000000", "domino_single/wide_gaps@2@7/8e12", "a+b/1_0"])
 def test_hydra_takes_no_id_for_a_number(id_):
-    assert read("show", ["pool=here", f"id={id_}"], show.Settings).id == id_
+    assert read("show", ["pool=here", f"id={id_}"], show.ShowSettings).id == id_
 
 
 def test_commands_and_environments_take_names(capsys):

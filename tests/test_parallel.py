@@ -8,7 +8,7 @@ import pytest
 from faults import lost, work
 
 from scengen.commands.settings import read
-from scengen.commands.verify import Settings as Asked
+from scengen.commands.verify import VerifySettings
 from scengen.errors import BadConfig
 from scengen.work import parallel
 from scengen.work.parallel import Limits, WorkerDied, cores, each
@@ -71,6 +71,6 @@ def test_no_more_cores_are_used_than_a_container_is_given(quota, bound, told, tm
 
 def test_workers_auto_are_as_many_as_there_are_cores(monkeypatch):
     monkeypatch.setattr("scengen.commands.settings.cores", lambda: 5)
-    assert read("verify", ["pool=x", "workers=auto"], Asked).workers == 5
+    assert read("verify", ["pool=x", "workers=auto"], VerifySettings).workers == 5
     with pytest.raises(BadConfig, match="workers = 'many'"):
-        read("verify", ["pool=x", "workers=many"], Asked)
+        read("verify", ["pool=x", "workers=many"], VerifySettings)

@@ -10,14 +10,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from scengen import cli, config
+from scengen import cli, list_tasks, load_task
 from scengen.analysis.distance import Energy
 from scengen.ood.axis_card import NOT_SEARCHED
 
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
 
-Written by `make axes`; each line sums up one axis card (`scengen axis`), and each column says how much was tried.
+Written by `make axes`; each line sums up one axis card (`scengen probe`), and each column says how much was tried.
 
 * **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
   **physics**: which of the features that the family declares leave training (sampled, 300 draws).
@@ -29,7 +29,7 @@ Written by `make axes`; each line sums up one axis card (`scengen axis`), and ea
   is the scenario remembered, with the axis' own parameters redrawn within training; for **any**, and where training
   knows one value only (marked *held out*), it is a training scenario that nobody remembers. Twins count that the
   oracle solves in both arms. `weak`: it solves less than 30 % of its control, and tells nothing.
-  *cosmetic to memory*: some memory solves most of the axis; what is new there is for the eye, if for anything. In a
+  *solved by memory*: some memory solves most of the axis; what is new there is for the eye, if for anything. In a
   task that asks for a choice (`domino_select`) the memory of the twin knows the answer: no axis that makes the choice
   harder to see can break it, and whether a policy still chooses rightly is for `scengen evaluate` to say.
 * **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
@@ -55,9 +55,9 @@ def main(*arguments: str) -> None:
     settings = [argument for argument in arguments if "=" in argument]
     tasks = [argument for argument in arguments if "=" not in argument]
     failed = []
-    for task in tasks or config.tasks():
-        for axis in config.task(task).axes:
-            if cli.run(("axis", f"task={task}", f"axis={axis}", "workers=2", *settings)):
+    for task in tasks or list_tasks():
+        for axis in load_task(task).axes:
+            if cli.run(("probe", f"task={task}", f"axis={axis}", "workers=2", *settings)):
                 failed.append(f"{task}/{axis}")
     PAGE.write_text(HEAD.format(titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
@@ -67,8 +67,8 @@ def _lines() -> list[str]:
     """A line for each card, in the order of the task files; where there is no card, the line that the page has."""
     written = PAGE.read_text().splitlines(keepends=True) if PAGE.is_file() else []
     lines = []
-    for task in config.tasks():
-        for axis in config.task(task).axes:
+    for task in list_tasks():
+        for axis in load_task(task).axes:
             path = Path(f"generated/axes/{task}-{axis}/card.json")
             if path.is_file():
                 lines.append(_line(json.loads(path.read_text())))

@@ -26,7 +26,7 @@ COMMANDS = {
     "show to=, 10 images": "show pool={pool} to={to}.html images=10 films=0",
     "report": "report pool={pool} to={to}.html",
     "compare": "compare pool={pool}",
-    "bias": "bias pool={pool}",
+    "audit": "audit pool={pool}",
     "subset n=100": "subset pool={pool} n=100 to={to}",
     "evaluate, 5 scenarios": "evaluate pool={pool} policy=idle seeds=5 rollouts=1 to={to}",
     "record n=2": "record pool={pool} n=2 cameras=none to={to}",

@@ -16,44 +16,20 @@ from types import FrameType
 from typing import NoReturn
 
 from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest
+from .verbs import CONTINUING, GROUPS, RENAMED, VERBS
 
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
-
-VERBS = (
-    "generate",
-    "verify",
-    "drift",
-    "show",
-    "film",
-    "view",
-    "export",
-    "record",
-    "card",
-    "tasks",
-    "new",
-    "asset",
-    "evaluate",
-    "attack",
-    "axis",
-    "discover",
-    "report",
-    "robosuite",
-    "power",
-    "bias",
-    "compare",
-    "subset",
-    "shrink",
-    "bench",
-)
-
-CONTINUING = ("generate", "evaluate", "attack", "axis", "discover")
-"""Commands that keep what is finished when they are interrupted, and go on from there."""
+OK = 0
+"""Exit status of a command that succeeded."""
+BAD_INPUT = 2
+"""Exit status after wrong input or a fault of the machine."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 COMPLETING = ("--completion", "--complete")
-"""What shells ask for."""
+"""Options that shells use."""
 GRACE = 1.5
-"""How long an interrupted command may take to put things in order before it is ended [s]."""
-LONGEST = 3000
-"""Letters of an error line: more than any list of known names takes."""
+"""Time that an interrupted command has to clean up before it is ended [s]."""
+MAX_LINE = 3000
+"""Largest length of an error line [characters]: longer than any list of known names."""
 
 
 def main() -> NoReturn:
@@ -70,37 +46,37 @@ def main() -> NoReturn:
 
 
 class Signals:
-    """What Ctrl-C and SIGTERM do: the first ends the command in order, within `GRACE`, the second one at once."""
+    """Handlers of Ctrl-C and SIGTERM: the first ends the command in order, within `GRACE`, the second one at once."""
 
     def __init__(self) -> None:
         self.status = INTERRUPTED
         self.working = False
-        """Whether the command has begun; before, while modules are imported, nothing has to be put in order."""
-        self._came = False
+        """Whether the command has begun. Before that, while modules are imported, nothing has to be cleaned up."""
+        self._received = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._receive)
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self.status = 128 + number
-        if self._came or not self.working:
+        if self._received or not self.working:
             self.end()
-        self._came = True
+        self._received = True
         timer = threading.Timer(GRACE, self.end)
         timer.daemon = True
         timer.start()
         raise KeyboardInterrupt
 
     def end(self) -> NoReturn:
-        """Leave without a further step of Python's, and leave nobody behind."""
+        """Leave without a further step of Python, and end child processes."""
         if not self.working:
             with suppress(OSError):
-                os.write(2, b"scengen: interrupted, nothing was begun\n")
+                os.write(2, b"scengen: interrupted; the command had not started\n")
         end_children()
         os._exit(self.status)
 
 
 def end_children() -> None:
-    """Kill processes that this one has started: a worker that is still importing does not know yet whom to follow."""
+    """Kill the child processes: a worker that is still importing modules does not end with its parent yet."""
     for path in Path("/proc/self/task").glob("*/children"):
         with suppress(OSError):
             for child in path.read_text().split():
@@ -108,25 +84,30 @@ def end_children() -> None:
 
 
 def run(argv: Sequence[str], signals: Signals | None = None) -> int:
-    """Run one verb: 0 all well, 1 something did not hold, 2 bad input or a fault of the machine."""
+    """Run one command.
+
+    Returns:
+        Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 130 interrupted.
+    """
     try:
         return _run(argv, signals)
     except ScengenError as error:
-        return _told(str(error), _kept(error) if isinstance(error, ForeignCode) else "")
+        return _failed(str(error), _write_traceback(error) if isinstance(error, ForeignCode) else "")
     except KeyboardInterrupt:
-        kept = "what is finished is kept, the same command continues"
-        _line(f"scengen: interrupted; {kept if argv[0] in CONTINUING else 'the same command begins anew'}")
+        continues = RENAMED.get(argv[0], argv[0]) in CONTINUING
+        remedy = "finished work is kept; repeat the command to continue" if continues else "repeat it to start over"
+        _print_error(f"scengen: interrupted; {remedy}")
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return OK
     except MemoryError as error:
-        return _told("the memory is used up; ask for less at once, or use fewer workers", _kept(error))
+        return _failed("out of memory; ask for less at once, or use fewer workers", _write_traceback(error))
     except OSError as error:
-        from ..work.targets import remedy
+        from ..work.targets import remedy as disk_remedy
 
-        if told := remedy(error):
-            return _told(f"{cut(str(error.filename or 'a file'))}: {told}")
+        if what := disk_remedy(error):
+            return _failed(f"{cut(str(error.filename or 'a file'))}: {what}")
         return _unforeseen(error)
     except Exception as error:
         return _unforeseen(error)
@@ -138,6 +119,9 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         print(_help())
         return OK
     verb, *arguments = argv
+    if verb in RENAMED:
+        _print_error(f"scengen: `{verb}` is now `{RENAMED[verb]}`; the old name goes with 0.3")
+        verb = RENAMED[verb]
     if verb == "--version":
         from ..versions import versions
 
@@ -153,7 +137,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         print(usage(verb, [a for a in arguments if not a.startswith("-")]), end="")
         return OK
 
-    # What follows takes seconds to import on a busy machine; nothing above needs it.
+    # These modules take seconds to import on a busy machine; nothing above needs them.
     from ..commands import out
     from ..control import compilation, native
     from .completion import BASH, completions
@@ -162,20 +146,20 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     native.silence()  # MuJoCo's warnings are counted and reported; it would also print them and write a log file
     if verb == "--completion":
         if arguments != ["bash"]:
-            raise BadConfig(f"{cut(' '.join(argv))}; expected --completion bash: no other shell is known")
+            raise BadConfig(f"{cut(' '.join(argv))}; expected --completion bash; other shells are not supported")
         out.print(BASH, end="", soft_wrap=True)
         return OK
     if verb == "--complete":
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
-    if verb == "generate":  # several values are a sweep there, with Hydra's option or without it
+    if verb == "generate":  # multiple values are a sweep there, with or without Hydra's option
         arguments = [a for a in arguments if a not in ("-m", "--multirun")]
     flags = [a for a in arguments if a.startswith("-")]
-    if flags and flags[0].partition("=")[0] in SHOWING:
+    if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
-        raise BadConfig(f"{cut(repr(flags[0]))} is no option; {known}; see scengen {verb} --help")
+        raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
     command = import_module(f"scengen.commands.{verb}").command
     if signals:
         signals.working = True
@@ -183,17 +167,17 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
 
 
 def _check_platform() -> None:
-    """Raise `BadConfig` where scengen cannot run, before modules are imported that fail there in many lines."""
+    """Raise `BadConfig` on a platform where scengen cannot run, before an import fails there with many lines."""
     if sys.platform != "linux":  # the control loop is compiled against the libmujoco.so of MuJoCo's Linux wheel
         raise BadConfig(f"scengen runs on Linux, this is {sys.platform}; use its Dockerfile, or WSL on Windows")
 
 
-SHOWING = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--info"}
-"""Hydra's options that show a configuration, by how they may be written."""
+SHOW_OPTIONS = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--info"}
+"""Hydra's options that show a configuration, by their spellings."""
 
 
 def _show(verb: str, arguments: Sequence[str]) -> int:
-    """Show what a command would work with, or where it comes from: `--cfg job`, `--info defaults`."""
+    """Print the configuration of a command, or its origin: `--cfg job`, `--info defaults`."""
     from .. import compose
     from ..commands import out
 
@@ -203,39 +187,49 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     if not what and place < len(words):
         what = words.pop(place)
     if others := [word for word in words if word.startswith("-")]:
-        raise BadConfig(f"{cut(repr(others[0]))} cannot be said together with {option}; say one of them")
-    if SHOWING[option] == "--info":
+        raise BadConfig(f"{cut(repr(others[0]))} cannot be combined with {option}; give one of them")
+    if SHOW_OPTIONS[option] == "--info":
         compose.show_origin(verb, words, what)
     elif what == "job":
         out.print(compose.shown(verb, words), end="", soft_wrap=True)
     else:
-        raise BadConfig(f"{option} {cut(repr(what))}; the configuration of a command is that of its job, say --cfg job")
+        raise BadConfig(f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command")
     return OK
 
 
-def _line(text: str) -> None:
-    """One line on standard error, whatever stands in the text."""
+def _print_error(text: str) -> None:
+    """Print one line on standard error; control characters are spelled out."""
     from ..work.printed import printable
 
     words = re.sub(r"\S{1000,}", lambda found: cut(found[0]), printable(text))
-    if len(words) > LONGEST:  # what would be right stands at the end
-        words = f"{words[: LONGEST // 2]} ... {words[-LONGEST // 2 :]}"
+    if len(words) > MAX_LINE:  # the remedy is at the end
+        words = f"{words[: MAX_LINE // 2]} ... {words[-MAX_LINE // 2 :]}"
     print(words, file=sys.stderr, flush=True)
 
 
-def _told(text: str, file: str = "") -> int:
-    _line(f"scengen: {text}{f'; the traceback is in {file}' if file else ''}")
+def _failed(text: str, file: str = "") -> int:
+    """Print an error and where its traceback is.
+
+    Returns:
+        Exit status.
+    """
+    _print_error(f"scengen: {text}{f'; the traceback is in {file}' if file else ''}")
     return BAD_INPUT
 
 
 def _unforeseen(error: Exception) -> int:
-    """The last net: whatever nobody thought of is one line too."""
+    """Print an error that no check has foreseen, as one line too."""
     what = cut(" ".join(str(error).split()))
-    return _told(f"unforeseen {type(error).__name__}: {what}; please report it", _kept(error) or "(no file: no room)")
+    file = _write_traceback(error) or "(no file: no room)"
+    return _failed(f"unforeseen {type(error).__name__}: {what}; please report it", file)
 
 
-def _kept(error: BaseException) -> str:
-    """The file that a traceback was written to; empty if there is no room for one."""
+def _write_traceback(error: BaseException) -> str:
+    """Write a traceback to a temporary file.
+
+    Returns:
+        Name of the file; empty if it cannot be written.
+    """
     try:
         with tempfile.NamedTemporaryFile(
             "w", prefix="scengen-", suffix=".txt", delete=False, errors="backslashreplace"
@@ -247,17 +241,15 @@ def _kept(error: BaseException) -> str:
 
 
 def _help() -> str:
+    """The commands by purpose, each with the docstring of its module."""
     folder = Path(__file__).parents[1] / "commands"
-    told = {verb: ast.get_docstring(ast.parse((folder / f"{verb}.py").read_text())) for verb in VERBS}
-    return "\n".join(
-        [
-            "scengen: physical puzzles for robot manipulation, each proved solvable",
-            "",
-            "usage: scengen COMMAND [key=value ...]      settings of a command: scengen COMMAND --help",
-            "",
-            *(f"  {verb:<10}{what}" for verb, what in told.items()),
-            "",
-            "example: scengen generate task=domino_single split=diagonal n=100 workers=2 pool=generated/diagonal",
-            'completion in bash: eval "$(scengen --completion bash)"',
-        ]
-    )
+    lines = ["scengen: physical puzzles for robot manipulation, each verified to be solvable", ""]
+    lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen COMMAND --help", ""]
+    for purpose, verbs in GROUPS.items():
+        lines.append(f"{purpose}:")
+        for verb in verbs:
+            lines.append(f"  {verb:<12}{ast.get_docstring(ast.parse((folder / f'{verb}.py').read_text()))}")
+        lines.append("")
+    lines.append("example: scengen generate task=domino_single split=diagonal n=100 workers=2 pool=generated/diagonal")
+    lines.append('completion in bash: eval "$(scengen --completion bash)"')
+    return "\n".join(lines)

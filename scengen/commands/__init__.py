@@ -10,11 +10,10 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import BadConfig, cut
-from ..pool import collection
+from ..pool import Pool, PoolRow, collection
 from ..pool.library import Library
 from ..pool.library import names as names  # for the commands
 from ..pool.names import Misnamed
-from ..pool.pool import Pool, PoolRow
 from ..work.printed import PlainConsole, printable
 from ..work.targets import write as write  # for the commands
 

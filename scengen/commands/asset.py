@@ -1,4 +1,4 @@
-"""what scenes are made of, as meshes; a mesh of yours as one more"""
+"""list assets, write one as a mesh, or import a mesh as a new asset"""
 
 import json
 from dataclasses import dataclass, fields
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen asset`; meanings stand in conf/command/asset.yaml."""
+class AssetSettings:
+    """Settings of `scengen asset`; conf/command/asset.yaml explains them."""
 
     name: str | None
     to: str | None
@@ -47,7 +47,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("asset", arguments, Settings)
+    settings = read("asset", arguments, AssetSettings)
     settings.check()
     if settings.mesh is not None:
         return _take_in(settings, Path(str(settings.to)))
@@ -75,7 +75,7 @@ def _write_mesh(name: str, target: Path) -> int:
     return OK
 
 
-def _take_in(settings: Settings, folder: Path) -> int:
+def _take_in(settings: AssetSettings, folder: Path) -> int:
     asset = intake("asset")
     names = [field.name for field in fields(asset.IntakeRequest)]
     request = asset.IntakeRequest(**{name: getattr(settings, name) for name in names})

@@ -1,4 +1,4 @@
-"""the built-in adversary: whether a goal can be reached without what the task is about"""
+"""search with the built-in adversary for unintended ways to reach a goal"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

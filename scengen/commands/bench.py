@@ -1,4 +1,4 @@
-"""the costs that scengen promises, as ratios within one run"""
+"""measure the costs that scengen documents, as ratios within one run"""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen bench`; meanings stand in conf/command/bench.yaml."""
+class BenchSettings:
+    """Settings of `scengen bench`; conf/command/bench.yaml explains them."""
 
     json: str | None
     repeats: int
@@ -21,7 +21,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("bench", arguments, Settings)
+    settings = read("bench", arguments, BenchSettings)
     at_least(settings, repeats=1)
     try_file(settings.json)
     tables: list[Table]

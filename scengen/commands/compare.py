@@ -1,4 +1,4 @@
-"""how far pools are from training and from each other, and what leaks from one to the other"""
+"""measure the distances of pools from training and from each other, and leakage"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..analysis.coverage import evenness
-from ..analysis.distance import ENERGY_OF, MOST_PAIRS, NearDuplicate, energy, near_duplicates, per_parameter
-from ..analysis.redraw import batch_of, first_scenarios, redrawn, task_of, told
+from ..analysis.distance import MAX_ENERGY_SCENARIOS, MAX_PAIRS, NearDuplicate, energy, near_duplicates, per_parameter
+from ..analysis.redraw import batch_of, first_scenarios, redrawn, sampled_indices, task_of
 from ..analysis.space import Batch, of_features
-from ..analysis.tables import SHOWN, pairs_table
+from ..analysis.tables import SHOWN_PAIRS, pairs_table
 from ..errors import BadConfig, at_least
 from ..pool import Pool
 from ..samplers.task import Task
@@ -21,8 +21,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen compare`; meanings stand in conf/command/compare.yaml."""
+class CompareSettings:
+    """Settings of `scengen compare`; conf/command/compare.yaml explains them."""
 
     pool: str | list[str]
     within: float
@@ -31,7 +31,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("compare", arguments, Settings)
+    settings = read("compare", arguments, CompareSettings)
     try_file(settings.json)
     at_least(settings, permutations=1)
     if not 0 < settings.within <= 1000:
@@ -50,7 +50,7 @@ def command(arguments: Arguments) -> int:
     return FAILED if any(r["near_duplicates"] for r in result) else OK
 
 
-def _alone(task: Task, pool: Pool, batch: Batch, settings: Settings, search: Sequence[str]) -> dict[str, Any]:
+def _alone(task: Task, pool: Pool, batch: Batch, settings: CompareSettings, search: Sequence[str]) -> dict[str, Any]:
     """How far one pool is from training, how even it is, and whether it repeats itself."""
     away = per_parameter(task, batch)
     far = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
@@ -61,7 +61,7 @@ def _alone(task: Task, pool: Pool, batch: Batch, settings: Settings, search: Seq
         certified = [list(p.quantiles.values()) for p in redrawn(pool, search=search) if p.certified]
         if certified[0]:
             even = evenness(np.array(certified))
-            of = f", {told(pool)}" if told(pool) else ""
+            of = f", {sampled_indices(pool)}" if sampled_indices(pool) else ""
             say(f"  discrepancy: {even.relative:.2f} times that of as many independent draws{of}")
     pairs = near_duplicates(task, batch, within=settings.within)
     if pairs:
@@ -77,13 +77,13 @@ def _alone(task: Task, pool: Pool, batch: Batch, settings: Settings, search: Seq
 Side = tuple[Pool, Batch]
 
 
-def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, Any]:
+def _pair(task: Task, one: Side, other: Side, settings: CompareSettings) -> dict[str, Any]:
     """How far a pool is from the first one, and what they share."""
     (pool, here), (beside, there) = one, other
-    ones, others = (first_scenarios(task, of, ENERGY_OF) for of in (pool, beside))
+    ones, others = (first_scenarios(task, of, MAX_ENERGY_SCENARIOS) for of in (pool, beside))
     space = of_features(task, ones, others)
     apart = energy(space.points(ones), space.points(others), settings.permutations)
-    few = f" of the first {ENERGY_OF} scenarios" if max(len(here), len(there)) > ENERGY_OF else ""
+    few = f" of the first {MAX_ENERGY_SCENARIOS} scenarios" if max(len(here), len(there)) > MAX_ENERGY_SCENARIOS else ""
     say(
         f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
         f"[training ranges], p = {apart.pvalue:.3f}{few}"
@@ -91,7 +91,7 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
         out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside], _ids(pairs))))
-    more = " or more" if len(pairs) == MOST_PAIRS else ""
+    more = " or more" if len(pairs) == MAX_PAIRS else ""
     say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs{more}")
     return {
         "pools": [str(pool.folder), str(beside.folder)],
@@ -103,4 +103,4 @@ def _pair(task: Task, one: Side, other: Side, settings: Settings) -> dict[str, A
 
 def _ids(pairs: Sequence[NearDuplicate]) -> list[str]:
     """Ids of the scenarios that are told."""
-    return [id_ for pair in pairs[:SHOWN] for id_ in (pair.one, pair.other)]
+    return [id_ for pair in pairs[:SHOWN_PAIRS] for id_ in (pair.one, pair.other)]

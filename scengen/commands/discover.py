@@ -1,4 +1,4 @@
-"""a search for OOD axes: where memory fails and the oracle does not"""
+"""search for OOD axes: where memory of training fails and the oracle does not"""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def command(arguments: Arguments) -> int:
     out.print(_table(task.name, search))
     say("trials: " + ", ".join(f"{count} {what}" for what, count in search.spent.items()))
     write(folder / "axes.yaml", search.as_yaml(task))
-    say(f"wrote {folder / 'axes.yaml'}: copy what says something into the task file, and measure it with scengen axis")
+    say(f"wrote {folder / 'axes.yaml'}: copy what says something into the task file, and measure it with scengen probe")
     return OK
 
 

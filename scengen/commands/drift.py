@@ -1,4 +1,4 @@
-"""verdicts of a pool under several versions of MuJoCo: same bits, same verdict, flipped"""
+"""compare a pool under several versions of MuJoCo: same bits, same verdict, flipped"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ MODULE = "scengen.drift.judge"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen drift`; meanings stand in conf/command/drift.yaml."""
+class DriftSettings:
+    """Settings of `scengen drift`; conf/command/drift.yaml explains them."""
 
     pool: str | list[str]
     mujoco: str | list[str]
@@ -34,7 +34,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("drift", arguments, Settings)
+    settings = read("drift", arguments, DriftSettings)
     if settings.level not in LEVELS:
         raise BadConfig(f"level = {settings.level}; it must be {', '.join(LEVELS[:-1])} or {LEVELS[-1]}")
     at_least(settings, n=1, workers=1, limit_seconds=1, limit_mb=200)
@@ -60,7 +60,9 @@ def command(arguments: Arguments) -> int:
     return BAD_INPUT if any(told[UNKNOWN] for told in totals.values()) else OK
 
 
-def _judged(place: Environment, pools: Sequence[Pool], settings: Settings, search: Sequence[str]) -> dict[str, Any]:
+def _judged(
+    place: Environment, pools: Sequence[Pool], settings: DriftSettings, search: Sequence[str]
+) -> dict[str, Any]:
     """What the checks of some pools say in an environment: its `fingerprint`, and by folder what was `judged`.
 
     Raises:

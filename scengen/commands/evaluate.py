@@ -1,4 +1,4 @@
-"""how often a policy succeeds, in and out of distribution, with intervals"""
+"""measure the success rate of a policy, in and out of distribution, with intervals"""
 
 from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""write scenes that open in plain MuJoCo from anywhere"""
+"""write scenes as MJCF files that open in plain MuJoCo from any folder"""
 
 from dataclasses import dataclass
 from functools import partial
@@ -14,8 +14,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen export`; meanings stand in conf/command/export.yaml."""
+class ExportSettings:
+    """Settings of `scengen export`; conf/command/export.yaml explains them."""
 
     pool: str | list[str]
     id: str | None
@@ -24,7 +24,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("export", arguments, Settings)
+    settings = read("export", arguments, ExportSettings)
     try_folder(settings.to)
     pool = Pool.open(one(settings.pool)).check() if settings.id is None else holder(settings.pool, settings.id)
     rows = pool.rows(witness=False) if settings.id is None else [chosen(pool, settings.id)]

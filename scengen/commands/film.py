@@ -1,4 +1,4 @@
-"""a film strip or a video of a witness, of a shortcut that fails, or of what the adversary did"""
+"""write a strip or a video of a witness, of a failing shortcut, or of the adversary"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +24,8 @@ STRIP = 100_000_000
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen film`; meanings stand in conf/command/film.yaml."""
+class FilmSettings:
+    """Settings of `scengen film`; conf/command/film.yaml explains them."""
 
     pool: str | list[str] | None
     id: str | None
@@ -57,7 +57,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("film", arguments, Settings)
+    settings = read("film", arguments, FilmSettings)
     settings.check()
     try_file(settings.to)
     take = _hit(settings, arguments) if settings.hit else _of_pool(settings, arguments)
@@ -71,7 +71,7 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _of_pool(settings: Settings, arguments: Arguments) -> Take:
+def _of_pool(settings: FilmSettings, arguments: Arguments) -> Take:
     """The witness of a scenario in a pool, or one of its shortcuts."""
     pool = holder(settings.pool, str(settings.id))
     row = check_row(chosen(pool, str(settings.id)))
@@ -84,7 +84,7 @@ def _of_pool(settings: Settings, arguments: Arguments) -> Take:
     return take
 
 
-def _hit(settings: Settings, arguments: Arguments) -> Take:
+def _hit(settings: FilmSettings, arguments: Arguments) -> Take:
     """What the adversary did."""
     hit = Hit.load(Path(str(settings.hit)))
     search = search_path(arguments)

@@ -1,4 +1,4 @@
-"""draw scenarios, certify them, and store the first n that hold in a pool"""
+"""draw scenarios, certify them, and store the first n certified ones in a pool"""
 
 import re
 from collections import Counter

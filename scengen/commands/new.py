@@ -1,4 +1,4 @@
-"""a package of your own, with a task that certifies as it stands"""
+"""write a package with a task that certifies as it is, to change into your own"""
 
 import keyword
 import re
@@ -24,8 +24,8 @@ TAKEN = {"task": ("conf",), "package": ("conf", "scengen", "test", "tests")}
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen new`; meanings stand in conf/command/new.yaml."""
+class NewSettings:
+    """Settings of `scengen new`; conf/command/new.yaml explains them."""
 
     task: str
     package: str
@@ -45,7 +45,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("new", arguments, Settings)
+    settings = read("new", arguments, NewSettings)
     settings.check()
     folder = Path(settings.to or settings.package)
     try_folder(folder)

@@ -1,4 +1,4 @@
-"""the smallest drop in success that a number of seeds and rollouts can tell from chance"""
+"""compute the smallest drop in success that seeds and rollouts can detect"""
 
 from dataclasses import asdict, dataclass
 
@@ -12,8 +12,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen power`; meanings stand in conf/command/power.yaml."""
+class PowerSettings:
+    """Settings of `scengen power`; conf/command/power.yaml explains them."""
 
     seeds: int
     rollouts: int
@@ -28,7 +28,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("power", arguments, Settings)
+    settings = read("power", arguments, PowerSettings)
     if not 0 < settings.success <= 1:
         raise BadConfig(f"success = {settings.success:g}; it must lie above 0 and at most at 1")
     if settings.drop is not None and not 0 < settings.drop <= settings.success:

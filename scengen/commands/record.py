@@ -1,4 +1,4 @@
-"""write witnesses as a LeRobot data set or for robomimic, with proprioception, forces, touch and pictures"""
+"""write witnesses as a LeRobot data set or a robomimic file, with forces and pictures"""
 
 from collections import defaultdict
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""a page about whole pools: losses, distance from training, certification bias, coverage, leakage"""
+"""write a page about pools: losses, distance from training, bias, coverage, leakage"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +13,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen report`; meanings stand in conf/command/report.yaml."""
+class ReportSettings:
+    """Settings of `scengen report`; conf/command/report.yaml explains them."""
 
     pool: str | list[str]
     to: str
@@ -22,7 +22,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("report", arguments, Settings)
+    settings = read("report", arguments, ReportSettings)
     if Path(settings.to).suffix != ".html":
         raise BadConfig(f"to = {settings.to}; name an .html file")
     try_file(settings.to)

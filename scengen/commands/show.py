@@ -1,4 +1,4 @@
-"""what is in a pool, or one scenario of it; pictures on request"""
+"""print the contents of a pool or of one scenario, and draw them"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +20,8 @@ TOLD = 3
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen show`; meanings stand in conf/command/show.yaml."""
+class ShowSettings:
+    """Settings of `scengen show`; conf/command/show.yaml explains them."""
 
     pool: str | list[str]
     id: str | None
@@ -31,7 +31,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("show", arguments, Settings)
+    settings = read("show", arguments, ShowSettings)
     target = Path(settings.to) if settings.to else None
     if settings.id is None:
         at_least(settings, images=0, films=0)

@@ -1,4 +1,4 @@
-"""the two or three parameters that make a scenario fail its certificate"""
+"""find the two or three parameters that make a scenario fail its certificate"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -22,8 +22,8 @@ from .settings import read_task
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen shrink`; meanings stand in conf/command/shrink.yaml."""
+class ShrinkSettings:
+    """Settings of `scengen shrink`; conf/command/shrink.yaml explains them."""
 
     split: str
     sampler: str
@@ -33,7 +33,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify_settings = read_task("shrink", arguments, Settings)
+    settings, task, certify_settings = read_task("shrink", arguments, ShrinkSettings)
     at_least(settings, seed=0, index=0)
     try_file(settings.json)
     scenario = _proposed(task, settings)
@@ -59,7 +59,7 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _proposed(task: Task, settings: Settings) -> Scenario:
+def _proposed(task: Task, settings: ShrinkSettings) -> Scenario:
     """The scenario of an index: the first feasible try, or the first one where none is feasible."""
     tries = list(task.proposals(settings.split, settings.seed, settings.index, task.design(settings.sampler)))
     return (tries[0] if tries[-1].refutation else tries[-1]).scenario

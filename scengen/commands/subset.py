@@ -1,4 +1,4 @@
-"""choose the scenarios of a pool that cover most of it, as a pool of their own"""
+"""choose the scenarios that cover a pool best, and write them as a new pool"""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -19,8 +19,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen subset`; meanings stand in conf/command/subset.yaml."""
+class SubsetSettings:
+    """Settings of `scengen subset`; conf/command/subset.yaml explains them."""
 
     pool: str | list[str]
     n: int
@@ -28,7 +28,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("subset", arguments, Settings)
+    settings = read("subset", arguments, SubsetSettings)
     pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
     if not target.name:
         raise BadConfig(f"to = {settings.to}; name a folder of its own for the new pool")

@@ -1,4 +1,4 @@
-"""what can be generated: tasks, parameters, splits and their proofs"""
+"""list the tasks; for one task, its parameters, bounds, splits and axes"""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ PAPER = "paper"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen tasks`; meanings stand in conf/command/tasks.yaml."""
+class TasksSettings:
+    """Settings of `scengen tasks`; conf/command/tasks.yaml explains them."""
 
     axes: str | None
 
 
 def command(arguments: Arguments) -> int:
-    settings, name = read("tasks", arguments, Settings), compose.chosen_task("tasks", arguments)
+    settings, name = read("tasks", arguments, TasksSettings), compose.chosen_task("tasks", arguments)
     if settings.axes not in (None, PAPER):
         raise UnknownName("choice of axes", settings.axes, [PAPER])
     search = search_path(arguments)

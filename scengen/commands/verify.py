@@ -1,4 +1,4 @@
-"""check what a pool claims: rebuild, draw again, replay, and repeat its checks"""
+"""check the claims of a pool: rebuild, draw again, replay, and repeat its checks"""
 
 import secrets
 from collections import Counter
@@ -40,8 +40,8 @@ WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen verify`; meanings stand in conf/command/verify.yaml."""
+class VerifySettings:
+    """Settings of `scengen verify`; conf/command/verify.yaml explains them."""
 
     pool: str | list[str] | None
     hits: str | None
@@ -59,7 +59,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("verify", arguments, Settings)
+    settings = read("verify", arguments, VerifySettings)
     for name, known in (("expired", EXPIRED), ("level", LEVELS), ("others", OTHERS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")

@@ -1,4 +1,4 @@
-"""a scenario in MuJoCo's viewer, still or with its witness in real time"""
+"""open a scenario in MuJoCo's viewer, still or with its witness in real time"""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen view`; meanings stand in conf/command/view.yaml."""
+class ViewSettings:
+    """Settings of `scengen view`; conf/command/view.yaml explains them."""
 
     pool: str | list[str]
     id: str
@@ -20,7 +20,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("view", arguments, Settings)
+    settings = read("view", arguments, ViewSettings)
     pool = holder(settings.pool, settings.id)
     row = chosen(pool, settings.id)
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)

@@ -116,12 +116,12 @@ def test_a_manifest_that_counts_more_indices_than_it_tells_of_draws_does_not_kee
 
 
 def test_the_command_tells_about_a_pool_and_refuses_a_chosen_one(made, tmp_path, capsys):
-    assert cli.run(("bias", f"pool={made}", f"json={tmp_path / 'b.json'}")) == 0
+    assert cli.run(("audit", f"pool={made}", f"json={tmp_path / 'b.json'}")) == 0
     assert json.loads((tmp_path / "b.json").read_text())["certified"]["accepted"] == 2
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'one'}")) == 0
     assert len(Pool.open(tmp_path / "one").check()) == 1
     capsys.readouterr()
-    assert cli.run(("bias", f"pool={tmp_path / 'one'}")) == 2 and "chosen and not drawn" in capsys.readouterr().err
+    assert cli.run(("audit", f"pool={tmp_path / 'one'}")) == 2 and "chosen and not drawn" in capsys.readouterr().err
     assert cli.run(("subset", f"pool={made}", "n=3", f"to={tmp_path / 'two'}")) == 2
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'one'}")) == 2
 

@@ -21,13 +21,13 @@ def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
 
 
 def robosuite(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
-    """`scengen robosuite`, a second checker with another simulation loop and robosuite's own controller.
+    """`scengen crosscheck`, a second checker with another simulation loop and robosuite's own controller.
 
     It judges what the witness does in the scene of the file, and nothing else.
     """
     from scengen import cli
 
-    return cli.run(["robosuite", f"pool={folder}", "limit=1"])
+    return cli.run(["crosscheck", f"pool={folder}", "limit=1"])
 
 
 def always(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
@@ -136,11 +136,11 @@ COMMANDS: dict[str, Checker] = {
     "record": _command("record", "to=out", "cameras=none", "n=1"),
     "evaluate": _command("evaluate", "policy=idle", "seeds=1", "rollouts=1", "to=out"),
     "attack": _command("attack", "n=1", "budget=2", "to=out", *LIMITED),
-    "bias": _command("bias"),
+    "bias": _command("audit"),
     "compare": _command("compare"),
     "report": _command("report", "to=out.html"),
     "subset": _command("subset", "n=1", "to=out"),
-    "robosuite_one": _command("robosuite", "first=1", *LIMITED),
+    "robosuite_one": _command("crosscheck", "first=1", *LIMITED),
 }
 CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)} | COMMANDS
 CONTROLS = ("always", "parse", "hashes")

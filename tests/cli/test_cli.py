@@ -72,7 +72,7 @@ GENERATE = ("generate", "task=domino_single")
         ((*GENERATE, "keep=good"), "keep = good; it must be refuted, unknown, or both"),
         ((*GENERATE, "task.horizon=-1"), "it must be a positive number of seconds"),
         ((*GENERATE, "split=a=b"), "'split=a=b' is no override"),
-        ((*GENERATE, "--workers=2"), "'--workers=2' is no option"),
+        ((*GENERATE, "--workers=2"), "'--workers=2' is not an option"),
         (("verify",), "verify needs either pool="),
         (("verify", "pool=nowhere"), "no pool at nowhere"),
         (("show", "pool=nowhere"), "no pool at nowhere"),
@@ -149,7 +149,7 @@ def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatc
     status, text = said(capsys, verb)
     head = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text().split("# Example")[0]
     continues = "to continue" in head
-    assert status == 130 and ("is kept" in text) == continues and ("begins anew" in text) != continues
+    assert status == 130 and ("is kept" in text) == continues and ("start over" in text) != continues
 
 
 def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
@@ -260,15 +260,15 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
 @pytest.mark.parametrize(
     ("verb", "kind", "given"),
     [
-        ("generate", generate.Settings, {}),
-        ("axis", axis_card.AxisSettings, {"axis": "diagonal"}),
+        ("generate", generate.GenerateSettings, {}),
+        ("probe", axis_card.AxisSettings, {"axis": "diagonal"}),
         ("discover", discovery.DiscoverSettings, {}),
         ("evaluate", rollouts.EvaluateSettings, {"policy": "idle", "pool": "here"}),
         ("record", recording.RecordSettings, {"pool": "here", "to": "there"}),
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
-    task = ["task=domino_single"] if verb in ("generate", "axis", "discover") else []
+    task = ["task=domino_single"] if verb in ("generate", "probe", "discover") else []
     assert read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 

@@ -88,7 +88,7 @@ def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_
 def test_other_commands_say_that_they_take_one_value(capsys):
     status, shown = said(capsys, "shrink", DOMINO, "index=0,1")
     assert status == 2 and "names several values; give one" in shown.err
-    assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is no option")
+    assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
 
 
 # --- what a command would work with ----------------------------------------------------------
@@ -98,7 +98,7 @@ def test_cfg_job_is_what_the_command_works_with(capsys):
     asked = ("task=seesaw_balance", "n=3", "certify.robust.runs=5", "task.id.x=0.01")
     status, shown = said(capsys, "generate", *asked, "--cfg", "job")
     plain = yaml.safe_load(shown.out)
-    settings, task, certify_settings = read_task("generate", asked, generate.Settings)
+    settings, task, certify_settings = read_task("generate", asked, generate.GenerateSettings)
     assert status == 0 and plain["n"] == settings.n == 3 and plain["task"]["id"]["x"] == 0.01
     assert plain["certify"]["robust"]["runs"] == certify_settings.robust.runs == 5
     assert plain["certify"]["rest"] == vars(certify_settings.rest), "with what the task's file changes"
@@ -117,11 +117,11 @@ def test_info_tells_where_it_comes_from(capsys):
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        (("--cfg", "all"), "say --cfg job"),
-        (("--cfg",), "say --cfg job"),
+        (("--cfg", "all"), "expected --cfg job"),
+        (("--cfg",), "expected --cfg job"),
         (("--info", "default"), "did you mean 'defaults'?"),
-        (("--cfg", "job", "--info", "defaults"), "say one of them"),
-        (("--nope",), "'--nope' is no option"),
+        (("--cfg", "job", "--info", "defaults"), "give one of them"),
+        (("--nope",), "'--nope' is not an option"),
         (("workrs=2", "--cfg", "job"), "did you mean 'workers'?"),
     ],
 )
@@ -162,7 +162,7 @@ def test_the_help_of_a_chosen_task_tells_its_splits_alone():
         ("scengen generate task=domino_single,pac", ["task=domino_single,packing"]),
         ("scengen generate task=packing split=t", ["split=tight", "split=turned_bin", "split=thin_heavy"]),
         ("scengen generate task=packing split=tight+l", ["split=tight+large_turns", "split=tight+large_pieces"]),
-        ("scengen axis task=packing axis=i", []),
+        ("scengen probe task=packing axis=i", []),
         ("scengen generate wor", ["workers="]),
         ("scengen generate task=packing certify=", ["certify=full", "certify=quick"]),
         ("scengen generate task=packing certify.robust.r", ["certify.robust.runs="]),

@@ -202,7 +202,7 @@ class Grammar:
             suffix = {"film": ".png", "report": ".html", "asset": ".stl"}.get(verb, "")
             found.append(("to", str(self.place / "new" / f"target{suffix}")))
         given = {
-            "axis": ("axis", "wide_gaps"),
+            "probe": ("axis", "wide_gaps"),
             "film": ("id", "0"),
             "view": ("id", "0"),
             "evaluate": ("policy", "idle"),

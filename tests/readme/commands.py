@@ -32,9 +32,9 @@ APART = {
     "scengen film hit=": "the name is that of a hit, which differs from machine to machine",
     "scengen verify hits=": "the hits are those of scengen attack",
     "scengen record": "scenarios before four cameras: a quarter of an hour without a graphics card",
-    "scengen robosuite": "10 episodes under robosuite's own controller: 2 minutes",
+    "scengen crosscheck": "10 episodes under robosuite's own controller: 2 minutes",
     "pytest --scengen-task": "wants the package of scengen new to be installed",
-    "scengen axis": "an hour",
+    "scengen probe": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
 }

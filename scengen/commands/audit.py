@@ -1,4 +1,4 @@
-"""whether certification has changed a pool's distribution: what was accepted against what was proposed"""
+"""test whether certification has changed a pool's distribution"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ..analysis.bias import Bias, acceptance_map, bias
-from ..analysis.redraw import MOST, Redrawn, redrawn, told
+from ..analysis.redraw import MAX_REDRAWN, Redrawn, redrawn, sampled_indices
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
 from ..pool import Pool
@@ -18,21 +18,21 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen bias`; meanings stand in conf/command/bias.yaml."""
+class AuditSettings:
+    """Settings of `scengen audit`; conf/command/audit.yaml explains them."""
 
     pool: str | list[str]
     json: str | None
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("bias", arguments, Settings)
+    settings = read("audit", arguments, AuditSettings)
     try_file(settings.json)
     pool = Pool.open(one(settings.pool)).check()
-    with ProgressBar(err, f"draw {pool.folder} again", min(pool.manifest.indices, MOST)) as progress_bar:
+    with ProgressBar(err, f"draw {pool.folder} again", min(pool.manifest.indices, MAX_REDRAWN)) as progress_bar:
         drawn = redrawn(pool, lambda done, total: progress_bar.show(done), search_path(arguments))
-    if told(pool):
-        say(f"a sample: {told(pool)}")
+    if sampled_indices(pool):
+        say(f"a sample: {sampled_indices(pool)}")
     feasible = [p for p in drawn if p.feasible]
     stages = {
         "feasible": ("feasible draws against all draws: what the family's constraints leave out", drawn),

@@ -1,4 +1,4 @@
-"""write a folder for the Hugging Face Hub: pools that verify, and a README.md that tells what is in them"""
+"""verify pools and write them as a folder for the Hugging Face Hub"""
 
 import secrets
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ LONGEST = 300
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen card`; meanings stand in conf/command/card.yaml."""
+class PublishSettings:
+    """Settings of `scengen publish`; conf/command/publish.yaml explains them."""
 
     pool: str | list[str]
     to: str
@@ -36,7 +36,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("card", arguments, Settings)
+    settings = read("publish", arguments, PublishSettings)
     for name, known in (("expired", EXPIRED), ("level", LEVELS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")

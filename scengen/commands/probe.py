@@ -1,4 +1,4 @@
-"""all the evidence about one OOD axis on one page: the axis card"""
+"""collect all evidence about an OOD axis on one page, the axis card"""
 
 from pathlib import Path
 
@@ -14,11 +14,11 @@ from .settings import read_task
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify_settings = read_task("axis", arguments, AxisSettings)
+    settings, task, certify_settings = read_task("probe", arguments, AxisSettings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     try_folder(folder)
-    with ProgressBar(err, f"axis {task.name}/{settings.axis}", settings.n, settings.workers) as progress_bar:
+    with ProgressBar(err, f"probe {task.name}/{settings.axis}", settings.n, settings.workers) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:
             progress_bar.of(min(done, total), total, what)

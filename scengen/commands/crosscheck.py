@@ -1,4 +1,4 @@
-"""replay every witness in robosuite and report where it differs"""
+"""replay every witness in robosuite and report differences"""
 
 from collections import defaultdict
 from dataclasses import asdict, dataclass
@@ -16,8 +16,8 @@ from .settings import read
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of `scengen robosuite`; meanings stand in conf/command/robosuite.yaml."""
+class CrosscheckSettings:
+    """Settings of `scengen crosscheck`; conf/command/crosscheck.yaml explains them."""
 
     pool: str | list[str]
     first: int | None
@@ -35,7 +35,7 @@ class Settings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("robosuite", arguments, Settings)
+    settings = read("crosscheck", arguments, CrosscheckSettings)
     settings.check()
     try_file(settings.json)
     pools = [Pool.open(folder) for folder in several(settings.pool)]
@@ -46,7 +46,7 @@ def command(arguments: Arguments) -> int:
     from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
 
     limits = Limits(settings.limit_seconds, settings.limit_mb)
-    with ProgressBar(err, "robosuite", total, settings.workers) as progress_bar:
+    with ProgressBar(err, "crosscheck", total, settings.workers) as progress_bar:
         found = compare_all(pools, settings.workers, progress_bar.show, settings.first, search_path(arguments), limits)
     called, tasks = names(pools, [c.id for c in found if not c.agrees]), defaultdict(list)
     for comparison in found:
