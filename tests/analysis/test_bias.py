@@ -108,7 +108,7 @@ def test_a_manifest_that_counts_more_indices_than_it_tells_of_draws_does_not_kee
     manifest = json.loads((other / "manifest.json").read_text())
     told = manifest["funnel"]["proposed"]
     (other / "manifest.json").write_text(json.dumps({**manifest, "indices": 12_000}))
-    with pytest.raises(PoolError, match=f"funnel tells of {told} draws"):
+    with pytest.raises(PoolError, match=f"funnel counts {told} draws"):
         redrawn(Pool.open(other))
     (other / "manifest.json").write_text(json.dumps({**manifest, "indices": 12_000_000}))
     with pytest.raises(PoolError, match="12000000 indices for 2 scenarios are too many"):
