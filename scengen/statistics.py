@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CONFIDENCE = 0.95
-"""Confidence of intervals."""
-Z = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
+"""Confidence level of the intervals."""
+NORMAL_QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 """Half width of a 95 % interval in standard errors."""
 ORDERINGS = 8192
 """Number of random orderings from which Gaffke's bound takes its quantile: the confidence is exact within +-0.2
@@ -177,6 +177,7 @@ def correlation(successes: Sequence[Sequence[bool]]) -> float:
 
 def wilson(value: float, n: float) -> tuple[float, float]:
     """Wilson's 95 % score interval of a proportion observed in `n` independent trials."""
-    centre = (value + Z**2 / (2 * n)) / (1 + Z**2 / n)
-    half = Z / (1 + Z**2 / n) * np.sqrt(value * (1 - value) / n + Z**2 / (4 * n**2))
+    z = NORMAL_QUANTILE
+    centre = (value + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(value * (1 - value) / n + z**2 / (4 * n**2))
     return float(max(0.0, centre - half)), float(min(1.0, centre + half))
