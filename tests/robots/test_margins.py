@@ -35,7 +35,7 @@ TAKEN_AT = TABLE_TOP + 0.03
 """Height of the grip site of a hand that takes a thing from the table [m]."""
 
 RINGS = {
-    "take a block": indirect_push.HAND,
+    "take a block": (indirect_push.MIN_DISTANCE, indirect_push.MAX_DISTANCE),
     "take what has fallen": (stack_collapse_recovery.MIN_DISTANCE, stack_collapse_recovery.MAX_DISTANCE),
     "meet a ball": (launched_ball.MIN_DISTANCE, launched_ball.MAX_DISTANCE),
     "grasp a hook": (hook.MIN_HAND_DISTANCE, tool_retrieve.ARM),

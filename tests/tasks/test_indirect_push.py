@@ -24,7 +24,7 @@ from scengen.robots import ik
 from scengen.robots.jaw import TIP_BELOW
 from scengen.robots.panda import BASE
 from scengen.sim.world import ROBOT
-from scengen.tasks.indirect_push import COASTING, FRONT, INSIDE, ZONE, IndirectPush, Spot
+from scengen.tasks.indirect_push import END_MARGIN, MAX_COAST_SPEED, MAX_PUSH_DISTANCE, ZONE_SIZE, IndirectPush, Spot
 
 TASK = load_task("indirect_push")
 NOMINAL = IndirectPush()
@@ -39,13 +39,13 @@ def solved():
 
 
 def test_a_chain_brings_the_target_as_far_as_its_blocks_are_long():
-    """The tips at FRONT, n blocks, and half of the target: the least n that brings that into the zone is needed."""
+    """The tips at MAX_PUSH_DISTANCE, n blocks and half of the target: the least n for the zone is needed."""
     for split, blocks in (("id", 2), ("far_zone", 3), ("small_blocks", 3)):
         for index in range(5):
             s = TASK.draw(split, 0, index).scenario
-            inside = s.distance + s.way - ZONE / 2 + INSIDE
+            inside = s.distance + s.way - ZONE_SIZE / 2 + END_MARGIN
             assert s.needed == blocks
-            assert FRONT + (blocks + 0.5) * s.edge >= inside > FRONT + (blocks - 0.5) * s.edge
+            assert MAX_PUSH_DISTANCE + (blocks + 0.5) * s.edge >= inside > MAX_PUSH_DISTANCE + (blocks - 0.5) * s.edge
 
 
 def test_the_chain_stands_in_contact_between_hand_and_target_when_the_push_ends(solved):
@@ -65,15 +65,15 @@ def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do(beyond,
 def test_one_block_pushed_to_full_stretch_comes_too_short():
     w = load(TASK, NOMINAL)
     assert not play_shortcut(TASK, NOMINAL, "push_one_block", w).solved
-    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2 - 0.005
+    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2 - 0.005
 
 
 def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
     """It must slide at least as far as from where one block leaves it: v^2 = 2 mu g s."""
     for friction in (0.35, 0.65):
         s = replace(NOMINAL, friction=friction)
-        short = s.distance + s.way - ZONE / 2 - s.stretch - 1.5 * s.edge
-        assert (s.infeasible() is None) == (short > COASTING**2 / (2 * 9.81 * friction))
+        short = s.distance + s.way - ZONE_SIZE / 2 - s.stretch - 1.5 * s.edge
+        assert (s.infeasible() is None) == (short > MAX_COAST_SPEED**2 / (2 * 9.81 * friction))
     w = load(TASK, NOMINAL)
     mujoco.mj_forward(w.model, w.data)
     for speed, struck in ((0.07, False), (0.09, True)):
@@ -109,7 +109,7 @@ def test_the_arm_stretched_out_for_the_target_never_touches_it():
 def test_without_the_head_of_the_chain_the_same_motion_leaves_the_target_before_the_zone():
     ended, w = ablated(TASK, NOMINAL)["one_block_less"]
     assert not ended.solved
-    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE / 2
+    assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2
 
 
 @pytest.mark.parametrize("split", ["far_zone", "other_side"])
@@ -126,7 +126,7 @@ def test_a_memorised_motion_serves_no_other_distance_and_no_other_line(split):
 def test_the_targets_middle_must_be_over_the_zone(solved, along, beyond, counts):
     state, direction = solved.state(), NOMINAL.u if along else NOMINAL.side
     pose = solved.data.joint("target_free").qpos
-    pose[:2] = (NOMINAL.at(NOMINAL.distance + NOMINAL.way) + (ZONE / 2 + beyond) * direction)[:2]
+    pose[:2] = (NOMINAL.at(NOMINAL.distance + NOMINAL.way) + (ZONE_SIZE / 2 + beyond) * direction)[:2]
     mujoco.mj_kinematics(solved.model, solved.data)
     assert NOMINAL.success(solved) == counts
     solved.restore(state)

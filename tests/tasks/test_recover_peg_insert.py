@@ -24,7 +24,15 @@ from scengen.assets.slot_board import PLATE_THICKNESS, SlotBoard
 from scengen.episode import Episode
 from scengen.geometry import about_z, axes, between
 from scengen.sim.world import World
-from scengen.tasks.recover_peg_insert import ALIGNED, BESIDE, DEEP, FLUSH, HINGE, HOME, RecoverPegInsert
+from scengen.tasks.recover_peg_insert import (
+    ALIGN_ANGLE,
+    HINGE,
+    INSERTED_SHARE,
+    MAX_INSERTED_SHARE,
+    MIN_INSERTED_SHARE,
+    SIDE_TOLERANCE,
+    RecoverPegInsert,
+)
 from scengen.validate.rollout import Jitter, run
 
 TASK = load_task("recover_peg_insert")
@@ -63,11 +71,11 @@ def world():
         ({"before": NOMINAL.distance - 1e-4}, True),
         ({"before": NOMINAL.distance + 1e-4}, False),
         ({"before": -1e-4}, False),
-        ({"before": 0.02, "askew": ALIGNED - 1e-3}, True),
-        ({"before": 0.02, "askew": -ALIGNED - 1e-3}, False),
-        ({"before": 0.02, "aside": BESIDE - 1e-4}, True),
-        ({"before": 0.02, "aside": -BESIDE - 1e-4}, False),
-        ({"before": 0.02, "above": BESIDE + 1e-4}, False),
+        ({"before": 0.02, "askew": ALIGN_ANGLE - 1e-3}, True),
+        ({"before": 0.02, "askew": -ALIGN_ANGLE - 1e-3}, False),
+        ({"before": 0.02, "aside": SIDE_TOLERANCE - 1e-4}, True),
+        ({"before": 0.02, "aside": -SIDE_TOLERANCE - 1e-4}, False),
+        ({"before": 0.02, "above": SIDE_TOLERANCE + 1e-4}, False),
         ({"before": 0.02, "above": -NOMINAL.board.centre}, False),
     ],
 )
@@ -131,27 +139,33 @@ def solved():
 
 @pytest.mark.parametrize(
     ("share", "counts"),
-    [(DEEP - 0.005, False), (DEEP + 0.005, True), (HOME, True), (FLUSH - 0.005, True), (FLUSH + 0.005, False)],
+    [
+        (MIN_INSERTED_SHARE - 0.005, False),
+        (MIN_INSERTED_SHARE + 0.005, True),
+        (INSERTED_SHARE, True),
+        (MAX_INSERTED_SHARE - 0.005, True),
+        (MAX_INSERTED_SHARE + 0.005, False),
+    ],
 )
 def test_so_much_of_its_length_must_be_beyond_the_mouth(solved, share, counts):
     put(solved, -share * NOMINAL.peg.length)
-    assert NOMINAL.progress(solved) == pytest.approx(share)
+    assert NOMINAL.inserted_share(solved) == pytest.approx(share)
     assert NOMINAL.success(solved) == counts
 
 
 @pytest.mark.parametrize("off", [{"aside": 0.016}, {"above": 0.016}, {"above": -0.016}])
 def test_above_or_beside_the_slot_is_not_in_it(solved, off):
-    put(solved, -HOME * NOMINAL.peg.length, **off)
+    put(solved, -INSERTED_SHARE * NOMINAL.peg.length, **off)
     assert not NOMINAL.success(solved)
 
 
 def test_from_behind_counts_as_well_and_without_the_turn_nothing_does(solved, world):
-    share = (1.0 - HOME) * NOMINAL.peg.length + NOMINAL.board.depth
+    share = (1.0 - INSERTED_SHARE) * NOMINAL.peg.length + NOMINAL.board.depth
     put(solved, -share, back=-1)
     assert NOMINAL.success(solved)
     world.reset()
-    put(world, -HOME * NOMINAL.peg.length)
-    assert NOMINAL.progress(world) == pytest.approx(HOME) and not NOMINAL.success(world)
+    put(world, -INSERTED_SHARE * NOMINAL.peg.length)
+    assert NOMINAL.inserted_share(world) == pytest.approx(INSERTED_SHARE) and not NOMINAL.success(world)
 
 
 # --- who gets in --------------------------------------------------------------------------
@@ -172,7 +186,7 @@ def test_a_peg_that_is_shifted_but_not_turned_meets_the_back_plate(turn):
 def test_who_is_beside_the_mouth_does_not_even_get_so_far(name):
     world = load(TASK, NOMINAL)
     assert not play_shortcut(TASK, NOMINAL, name, world).solved
-    assert NOMINAL.progress(world) < 0.2
+    assert NOMINAL.inserted_share(world) < 0.2
 
 
 def test_the_oracle_copes_with_a_peg_that_sits_askew_and_with_late_and_noisy_actions():
@@ -191,7 +205,7 @@ def test_a_memorised_motion_serves_no_other_turn_pin_or_moment(changed):
 def test_where_there_is_no_slot_nothing_goes_in():
     (name, (end, world)), *others = ablated(TASK, NOMINAL).items()
     assert name == "no_slot" and not others
-    assert not end.solved and NOMINAL.progress(world) < 0.1
+    assert not end.solved and NOMINAL.inserted_share(world) < 0.1
 
 
 # --- invalid scenarios --------------------------------------------------------------------

@@ -16,15 +16,16 @@ from controls import (
     solution,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import LoadedCube
 from scengen.assets.prop import TABLE_TOP
 from scengen.episode import Episode
 from scengen.geometry import UP
+from scengen.physics import GRAVITY
 from scengen.sim.world import IDLE
-from scengen.tasks.stack_collapse_recovery import GRAVITY, NAMES, Blow, StackCollapseRecovery
+from scengen.tasks.stack_collapse_recovery import NAMES, Blow, StackCollapseRecovery
 
-TASK = config.task("stack_collapse_recovery")
+TASK = load_task("stack_collapse_recovery")
 NOMINAL = StackCollapseRecovery()
 ALONE = replace(NOMINAL, blow_0=Blow(both=0))
 SETTLED = 2.5
@@ -72,7 +73,7 @@ def test_the_blow_comes_when_the_tower_has_stood_for_its_time(collapse):
 def test_each_struck_cube_takes_the_way_and_the_momentum_of_its_blow_and_the_lowest_none(collapse):
     """Less what friction takes in the same period: Coulomb's 5 %, and more where the cubes slide fast on each other."""
     struck = next(velocities for _, blows, _, _, velocities in collapse if blows == 1.0)
-    for name, velocity in NOMINAL.struck(NOMINAL.blow_0).items():
+    for name, velocity in NOMINAL.velocities(NOMINAL.blow_0).items():
         assert 0.65 < struck[name][3:] @ velocity / (velocity @ velocity) < 1.0
         assert abs(struck[name][3:] @ np.cross(velocity, UP)) < 0.02
     assert np.linalg.norm(struck["bottom"][3:]) < 0.01
@@ -91,7 +92,7 @@ def test_the_top_cube_falls_freely_between_the_tower_and_the_table(collapse):
 def test_after_the_blow_energy_is_lost_and_never_gained(collapse):
     """From two periods on, when contacts that the blow has pressed together have let go."""
     history = np.array([joules for _, blows, joules, *_ in collapse if blows])[2:]
-    given = sum(NOMINAL.cubes[n].mass * v @ v / 2 for n, v in NOMINAL.struck(NOMINAL.blow_0).items())
+    given = sum(NOMINAL.cubes[n].mass * v @ v / 2 for n, v in NOMINAL.velocities(NOMINAL.blow_0).items())
     before = next(joules for _, blows, joules, *_ in collapse if not blows)
     assert 0.45 * given < history[0] - before < given
     assert np.diff(history).max() < 0.03 * given
@@ -115,7 +116,7 @@ def test_what_is_struck_falls_and_comes_to_rest_no_farther_than_friction_allows(
     world = load(TASK, scenario)
     watched(scenario, lambda w: None, world=world)
     assert world.touching("middle", "bottom") == (not both) and world.touching("top", "table")
-    for name, spot in zip(scenario.struck(scenario.blow_0), scenario.spots(scenario.blow_0), strict=True):
+    for name, spot in zip(scenario.velocities(scenario.blow_0), scenario.spots(scenario.blow_0), strict=True):
         come, far = (math.dist(at[:2], scenario.feet[0][:2]) for at in (world.com(name), spot))
         assert 0.4 < come / far < 1.3
         assert world.rot(name)[2] == pytest.approx(np.round(world.rot(name)[2]), abs=0.01)  # on a face
