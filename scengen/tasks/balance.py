@@ -1,23 +1,23 @@
 """T31 balance-medium and T32 balance-hard: lay a rod across a narrow ridge so that it stays level by itself.
 
         ______________________[#]____
-                            |_|              side view; a heavy slug sits unseen somewhere inside the rod
+                            |_|              side view; a heavy slug is hidden somewhere inside the rod
         ____________________|_|_____
 
-Bottleneck: the centre of mass must come to lie over the ridge, which is 12 or 8 mm wide, and nobody can see where it
-is. Held in the hand the rod tells: the torque at the wrist over its weight is the distance of its centre of mass from
-the hand. A wrong try costs the episode, so that it has to be known before the rod is let go.
+Bottleneck: the centre of mass must be over the ridge, which is 12 or 8 mm wide, and it is not visible. A held rod
+reveals it: the torque at the wrist over the rod's weight is the distance of the centre of mass from the hand. A failed
+attempt ends the episode, so the robot must measure it before it releases the rod.
 
-Decisions where the paper (App. B, T31 and T32) is silent or of two minds:
+Decisions where the paper (App. B, T31 and T32) is silent or contradicts itself:
 
 * It asks for a rod that "stands within 10 deg of vertical" on a ridge, but its policies grasp the rod near its centre
   of mass, and its shifts are yaws of base and rod and a displaced centre of mass (App. I, App. J, 4.3). So the rod lies
   across the ridge, as a beam on its fulcrum, and the 10 deg are those of its upward side.
-* It has to cross the ridge within 30 deg of a right angle: laid along it, it needs no balance.
-* Were the centre of mass always in the middle, the middle of the rod over the middle of the ridge would solve every
-  scene. Here it is up to 9 cm to either side, never near the middle, and what the rod weighs is unknown too: the torque
-  alone does not tell. Chance: one fixed place along the rod balances 9 % of training, with 8 mm 6 %.
-* A rod that is let go and tips by more than 10 deg is lost. One might be caught before: it takes 0.1 s.
+* The rod has to cross the ridge within 30 deg of a right angle: along the ridge it needs no balance.
+* If the centre of mass were always in the middle, the middle of the rod over the middle of the ridge would solve every
+  scene. Here it is up to 9 cm to either side, never near the middle, and the weight of the rod is unknown too: the
+  torque alone does not suffice. Chance: one fixed place along the rod balances 9 % of training, with 8 mm 6 %.
+* A rod that is released and tips by more than 10 deg is lost. It might be caught before: that takes 0.1 s.
 """
 
 import math
@@ -41,24 +41,22 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
 
-LEVEL = math.radians(10.0)
-"""Largest tilt of the rod (paper, App. B)."""
-ACROSS = math.radians(30.0)
-"""Largest angle between the rod and the level normal of the ridge."""
-TIPS = 1.15
-"""How much higher than needed the ridge is for a rod that is laid wrongly to tip by more than `LEVEL`."""
-CLEARLY = 0.006
-"""How far beyond the ridge's edge, at least, the centre of mass of a rod is that is laid by its middle [m]."""
-UPPER = 0.004
-"""Of the grip site above the middle of the rod [m]: the finger tips stay 7 mm over the ridge."""
-LIFT, OVER = 0.10, 0.015
-"""How far the rod is lifted to be weighed; how far over the ridge it is brought [m]."""
-EXACT, STEADIES = Pace(0.08, 0.0015), 0.25
-"""Over the ridge: a quarter of what the narrower one forgives; how long the rod then swings in the hand [s]."""
-SLOWLY, DEPTH = Pace(0.03, 0.001), 0.03
-"""Down to the ridge, until it is felt; to where the hand would go without it [m]."""
-EXPECTED = 0.125
-"""What one would expect the rod to weigh without having felt it [kg]: the middle of training."""
+MAX_TILT = math.radians(10.0)
+"""Largest tilt of the rod [rad] (paper, App. B)."""
+CROSSING_TOLERANCE = math.radians(30.0)
+"""Largest angle between the rod and the level normal of the ridge [rad]."""
+MISS_MARGIN = 0.006
+"""Least distance beyond the ridge's edge of the centre of mass of a rod that is laid by its middle [m]."""
+LIFT_HEIGHT = 0.10
+"""Height to which the rod is lifted to be weighed [m]."""
+CARRY_HEIGHT = 0.015
+"""Height over the ridge at which the rod is aligned [m]."""
+AIM_PACE = Pace(0.08, 0.0015)
+"""Pace over the ridge; its tolerance is a quarter of what the narrower ridge forgives."""
+LOWER_PACE = Pace(0.03, 0.001)
+"""Pace down to the ridge."""
+EXPECTED_MASS = 0.125
+"""Mass that a guess assumes without having weighed the rod [kg]: the middle of training."""
 RIDGE = "stand/ridge"
 
 
@@ -71,11 +69,11 @@ class Balance(Scenario):
     rod_x: float = param(-0.16, "m", -0.4, 0.4)
     rod_y: float = param(0.0, "m", -0.4, 0.4)
     rod_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """At 0 the rod lies along y."""
+    """Yaw of the rod; at 0 it lies along y."""
     ridge_x: float = param(0.06, "m", -0.4, 0.4)
     ridge_y: float = param(0.0, "m", -0.4, 0.4)
     ridge_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """At 0 the ridge runs along x."""
+    """Yaw of the ridge; at 0 it runs along x."""
     rod: Rod = Rod(com=0.05)
     ridge: Ridge = Ridge()
 
@@ -90,45 +88,46 @@ class Balance(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        crossing = abs(world.rot("rod")[:, 1] @ self.normal) >= math.cos(ACROSS)
-        return bool(world.tilt("rod") <= LEVEL and crossing and rests_on(world, "rod", RIDGE))
+        crossing = abs(world.rot("rod")[:, 1] @ self.normal) >= math.cos(CROSSING_TOLERANCE)
+        return bool(world.tilt("rod") <= MAX_TILT and crossing and rests_on(world, "rod", RIDGE))
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "rod"):
             return "the rod fell off the table"
         let_go = not world.touching(ROBOT, "rod")
-        return "the rod was let go and tipped" if let_go and world.tilt("rod") > LEVEL else None
+        return "the rod was let go and tipped" if let_go and world.tilt("rod") > MAX_TILT else None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Take the rod in the middle, feel where its weight pulls, lay it down with that over the ridge."""
+        """Grasp the rod in the middle, measure its centre of mass, lay it down with that over the ridge."""
         yield from self.lift(world)
         weight, torque = yield from self.feel(world)
         yield from self.lay(world, self.held_at(world) + torque / weight)
 
     def lift(self, world: World) -> Plan:
-        """Take the rod in the middle, with joint 7 as far from its limits as can be: it is to be turned further."""
+        """Grasp the rod in the middle, with joint 7 as far from its limits as possible: it must turn further."""
         arm, closing = world.arm, world.rot("rod")[:, 0]
-        middle = world.pos("rod") + (self.rod.width / 2 + UPPER) * UP
+        # 4 mm above the middle of the rod, the finger tips stay 7 mm over the ridge.
+        middle = world.pos("rod") + (self.rod.width / 2 + 0.004) * UP
         yaw = WRIST_MIDDLE + math.remainder(math.atan2(-closing[0], closing[1]) - WRIST_MIDDLE, math.pi)
-        yield from go_to(arm, middle + LIFT * UP, facing_down(yaw), COARSE, OPEN)
-        yield from pick(arm, middle, closing, lift=LIFT)
+        yield from go_to(arm, middle + LIFT_HEIGHT * UP, facing_down(yaw), COARSE, OPEN)
+        yield from pick(arm, middle, closing, lift=LIFT_HEIGHT)
 
     def feel(self, world: World) -> Generator[Action, None, tuple[float, float]]:
-        """Weight [N] of the held rod, and its torque about the hand [N m], positive where its far end goes down."""
+        """Weight of the held rod [N], and its torque about the hand [N m], positive if its far end goes down."""
         load = yield from weigh(world.arm)
         return float(load[2]), float(np.cross(world.rot("rod")[:, 1], UP) @ load[3:])
 
     def held_at(self, world: World) -> float:
-        """How far from the middle the hand has the rod, along it [m]."""
+        """Place of the hand along the rod, from its middle [m]."""
         return float((world.arm.hand - world.pos("rod")) @ world.rot("rod")[:, 1])
 
     def lay(self, world: World, along: float, yaw: float = 0.0) -> Plan:
-        """Lay the held rod across the ridge and let go.
+        """Lay the held rod across the ridge and release it.
 
         Args:
-            along: which place of the rod comes over the ridge, from its middle [m].
+            along: place of the rod that comes over the ridge, from its middle [m].
             yaw: angle to the ridge's normal [rad].
         """
         yield from self.bring(world, along, yaw)
@@ -141,18 +140,19 @@ class Balance(Scenario):
         arm, across = world.arm, about_z(yaw) @ self.normal
         wrist = closing_along(arm, np.cross(across, UP)) @ arm.hand_rot.T
         across = math.copysign(1.0, float(wrist @ world.rot("rod")[:, 1] @ across)) * across
-        for over, pace in ((OVER, STEADY), (OVER, EXACT), (-DEPTH, SLOWLY)):
+        # The last move ends where the rod touches the ridge; after the others it swings in the hand for 0.25 s.
+        for height, pace in ((CARRY_HEIGHT, STEADY), (CARRY_HEIGHT, AIM_PACE), (-0.03, LOWER_PACE)):
             rod = world.rot("rod")[:, 1]
             turn, spot = shortest(rod, across), world.pos("rod") + along * rod
-            there = self.top + over * UP + turn @ (arm.hand - spot)
+            there = self.top + height * UP + turn @ (arm.hand - spot)
             yield from until(go_to(arm, there, turn @ arm.hand_rot, pace), lambda: world.touching("rod", RIDGE))
-            yield from hold(arm, STEADIES if over > 0 else 0.0)
+            yield from hold(arm, 0.25 if height > 0 else 0.0)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """A guess of the weight misleads where it misses the ridge, and is tempting there only."""
-        weight_matters = abs(self.rod.com * (self.rod.mass / EXPECTED - 1.0)) >= self.ridge.width / 2 + CLEARLY
+        """The shortcut with a guessed weight is included only if its error is wider than the ridge."""
+        weight_matters = abs(self.rod.com * (self.rod.mass / EXPECTED_MASS - 1.0)) >= self.ridge.width / 2 + MISS_MARGIN
         return {
             "by_the_middle": Shortcut(lambda world: self._lay(world, 0.0)),
             "by_the_other_side": Shortcut(lambda world: self._lay(world, -self.rod.com)),
@@ -162,29 +162,30 @@ class Balance(Scenario):
         }
 
     def _lay(self, world: World, along: float, yaw: float = 0.0) -> Plan:
+        """Lift the rod and lay it down by a given place; see `lay`."""
         yield from self.lift(world)
         yield from self.lay(world, along, yaw)
 
     def _hold(self, world: World) -> Plan:
-        """Level, on the ridge, and in the hand: it is not balanced."""
+        """Hold the rod level on the ridge by hand: it is not balanced."""
         yield from self.lift(world)
         yield from self.bring(world, 0.0)
         yield from hold(world.arm, 2 * self.HOLD)
 
     def _torque_alone(self, world: World) -> Plan:
-        """Feel the torque, and take it for that of a common rod."""
+        """Measure the torque, and assume the weight of a common rod."""
         yield from self.lift(world)
         _, torque = yield from self.feel(world)
-        yield from self.lay(world, self.held_at(world) + torque / (EXPECTED * GRAVITY))
+        yield from self.lay(world, self.held_at(world) + torque / (EXPECTED_MASS * GRAVITY))
 
     def answer(self) -> Answer:
-        """A place along the rod, from its middle [m]. One try: a rod that tips is lost."""
+        """Place along the rod, from its middle [m]. One try: a rod that tips is lost."""
         places = tuple(round(0.004 * k, 3) for k in range(-30, 31))
         right = self.ridge.width / 2
         return Answer(places, self._lay, lambda along: abs(along - self.rod.com) <= right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the ridge there is nothing to lie on; with the slug elsewhere what was felt is not true."""
+        """Without the ridge the rod has no support; with the slug elsewhere the witness's measurement is wrong."""
         scene = self.build()
         scene.delete(scene.geom("stand/wall"))
         elsewhere = replace(self, rod=replace(self.rod, com=-self.rod.com))
@@ -196,9 +197,10 @@ class Balance(Scenario):
         rod, ridge = self.rod, self.ridge
         room = (rod.length - SLUG_EDGE) / 2
         yield require(abs(rod.slug) <= room, "the slug sticks out of the rod", slug=abs(rod.slug), room=room)
-        off = abs(rod.com) - ridge.width / 2
-        yield require(off >= CLEARLY, "the rod balances on its middle", beyond_the_edge=off, needed=CLEARLY)
-        drop = TIPS * math.sin(LEVEL) * (rod.length / 2 + abs(rod.com))
+        beyond = abs(rod.com) - ridge.width / 2
+        needed = MISS_MARGIN
+        yield require(beyond >= needed, "the rod balances on its middle", beyond_the_edge=beyond, needed=needed)
+        drop = 1.15 * math.sin(MAX_TILT) * (rod.length / 2 + abs(rod.com))
         yield require(ridge.height >= drop, "a rod laid wrongly does not tip", height=ridge.height, needed=drop)
         torque = rod.mass * GRAVITY * abs(rod.com)
         hold = pinch(rod.width) * rod.friction * PAD / 2
@@ -206,12 +208,12 @@ class Balance(Scenario):
         yield on_table("the rod or the stand", [*self.outline, *self.stand])
         air = gap(self.hand_over_rod, self.stand)
         yield require(air >= 0.0, "the hand has no room beside the stand", air=air)
-        yield within_reach("the rod", self.start + LIFT * UP)
-        far = self.top + OVER * UP + abs(rod.com) * np.array([[1.0], [-1.0]]) * self.normal
+        yield within_reach("the rod", self.start + LIFT_HEIGHT * UP)
+        far = self.top + CARRY_HEIGHT * UP + abs(rod.com) * np.array([[1.0], [-1.0]]) * self.normal
         yield within_reach("the hand over the ridge", *far)
 
     def features(self) -> Mapping[str, float]:
-        """Where the rod balances, in half lengths, and how exactly; its weight [kg]; how high it has to go [m]."""
+        """Balancing place in half lengths, tolerance in lengths, mass of the rod [kg], height of the ridge [m]."""
         return {
             "centre_of_mass": abs(self.rod.com) / (self.rod.length / 2),
             "tolerance": self.ridge.width / self.rod.length,
@@ -223,17 +225,17 @@ class Balance(Scenario):
 
     @property
     def start(self) -> Vec3:
-        """Under the middle of the rod [m]."""
+        """Point under the middle of the rod [m]."""
         return np.array([self.rod_x, self.rod_y, TABLE_TOP])
 
     @property
     def foot(self) -> Vec3:
-        """Under the middle of the ridge [m]."""
+        """Point under the middle of the ridge [m]."""
         return np.array([self.ridge_x, self.ridge_y, TABLE_TOP])
 
     @property
     def top(self) -> Vec3:
-        """The middle of the ridge's upper face [m]."""
+        """Middle of the ridge's upper face [m]."""
         return self.foot + self.ridge.height * UP
 
     @property
@@ -243,16 +245,16 @@ class Balance(Scenario):
 
     @property
     def outline(self) -> Outline:
-        """Of the rod [m]."""
+        """Outline of the rod [m]."""
         return corners(self.start, math.radians(self.rod_yaw), self.rod.size)
 
     @property
     def hand_over_rod(self) -> Outline:
-        """Of the palm over the rod, before it is lifted [m]."""
+        """Outline of the palm over the rod, before it is lifted [m]."""
         return corners(self.start, math.radians(self.rod_yaw), [2 * PALM_ALONG, 2 * PALM_ACROSS])
 
     @property
     def stand(self) -> Outline:
-        """Of the plate under the ridge [m]."""
+        """Outline of the plate under the ridge [m]."""
         size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]
         return corners(self.foot, math.radians(self.ridge_yaw), size)

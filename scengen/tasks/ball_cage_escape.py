@@ -1,4 +1,4 @@
-"""T22 ball-cage-escape: get a ball out of a cage whose only hole is blocked by the stool that it stands on.
+"""T22 ball-cage-escape: get a ball out of a cage whose only hole is blocked by the stool on which the cage stands.
 
       ________________
      |    (_)         |    seen from the side: the ball lies between two sills. Beyond one is the hole, in the floor,
@@ -6,20 +6,21 @@
      |___|[==========]
             |     |
 
-Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted; the sill holds the ball, so that
-no lift helps before the cage is tilted past the angle at which it rolls over: cos(tilt) = 1 - sill / radius (43.4 deg
-nominally). Over the other sill it rolls at 23.1 deg, into a pit deeper than its radius, out of which no tilt leads. At
-which end the hole is has to be seen: it is a choice among two, and half of the guesses are right.
+Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted. The sill holds the ball, so that
+no lift helps before the cage is tilted past the angle at which the ball rolls over it: cos(tilt) = 1 - sill / radius
+(43.4 deg nominally). Over the other sill it rolls at 23.1 deg, into a pit deeper than its radius, out of which no tilt
+leads. The robot must see at which end the hole is; of two ends, a guess is right in half of the scenes.
 
 Decisions. The paper gives the story, no numbers. (1) Sills and trap are ours. On a bare floor the ball lies wherever
-the last jerk has left it, lifting alone empties the cage, and a wrong tilt costs nothing. The ball has 5 mm of room
-between the sills: with more it takes a run-up and jumps at half the angle. (2) Tilting counts, shaking does not. A sill
-holds the ball up to an acceleration of g tan(tilt), 4.2 m/s^2 before the trap and 9.3 before the hole. A blind shake
-fills the trap first; one to a side, or of a cage that is half tilted, may free the ball. So it must pass the sill while
-the floor is tilted as the law says, less `GIVE`. (3) The jaw holds the cage across its width, the one edge that it can
-span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a tipping one would be another task.
-(5) The ball must come to rest on the table. It rolls like felt (coefficient 0.04); a steel ball would leave the table.
-(6) The cage may not touch the table: knocked off its stool it tilts without anybody's thought.
+the last jerk has left it, lifting alone empties the cage, and a wrong tilt costs nothing. The ball has 5 mm of
+clearance between the sills: with more it takes a run-up and jumps at half the angle. (2) The cage must be tilted, not
+shaken. A sill holds the ball up to an acceleration of g tan(tilt), 4.2 m/s^2 before the trap and 9.3 before the hole. A
+blind shake fills the trap first; a shake to one side, or of a half tilted cage, may free the ball. So the ball must
+pass the sill while the floor has the tilt of the law, less `TILT_TOLERANCE`. (3) The jaw holds the cage across its
+width, the one edge that it can span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a
+tipping one would be another task. (5) The ball must come to rest on the table. Its rolling resistance is that of felt
+(coefficient 0.04); a steel ball would leave the table. (6) The cage may not touch the table: knocked off its stool, it
+would tilt without a plan.
 """
 
 import math
@@ -43,32 +44,21 @@ from ..sim.world import Arm, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, turn_about_vertical, turn_to, wait
 
-STILL = 0.02
-"""Speed below which the ball counts as lying [m/s]: at the nominal rolling friction it stops within 1 mm."""
-LEAST_HELD = math.radians(20.0)
-"""Least tilt that each sill must withstand [rad]. A hand that carries the cage level tilts it by up to 3 deg, and
-brakes at up to 2 m/s^2, which tilts the apparent gravity by 12 deg."""
-STEEPEST = math.radians(72.0)
+REST_SPEED = 0.02
+"""Speed below which the ball counts as at rest [m/s]: at the nominal rolling resistance it stops within 1 mm."""
+MAX_HAND_TILT = math.radians(72.0)
 """Tilt that the hand reaches at every heading that `present` may choose [rad], tried for x from -0.2 to 0 m."""
-SPARE = math.radians(10.0)
-"""How far past the least tilt the oracle goes [rad]: the ball must roll, not creep, and the grip gives some degrees."""
-HOLD_AT_END = 0.25
-"""For a hole in a side: component of gravity that keeps the ball at the hole's end meanwhile, over the other ones."""
-HANDLE = 0.030
+TILT_MARGIN = math.radians(10.0)
+"""Angle by which the oracle exceeds the least tilt [rad]: the ball must roll, not creep, and the grip gives some
+degrees."""
+TILT_TOLERANCE = math.radians(6.0)
+"""Angle below the law's at which the ball may still pass the sill [rad]. If the floor turns at up to 2 rad/s the ball
+passes at 1.2 deg above that angle or more (120 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 8 deg
+below."""
+GRIP_HEIGHT = 0.030
 """Height of the grip site above the foot of the cage [m]: the finger tips, 9 mm lower, stay 21 mm above the stool."""
-ROOM = 0.040
-"""Free height below the lowest edge of the tilted cage [m]; the ball passes under it."""
-ASIDE = 0.19
-"""How far from the stool the cage is emptied [m]: the tilted cage and the stool reach 0.07 m each."""
-WIDEST = math.radians(55.0)
-"""How far from straight ahead, to the middle, the cage is emptied at most [rad]: the ball has half a metre there."""
-CLEAR = 0.004
-"""Least air between trap and stool, and between trap and table [m]: nobody places a cage more exactly than 2 mm."""
-GIVE = math.radians(6.0)
-"""How far below the angle of the law the ball may pass the sill [rad]. Where the floor turns at up to 2 rad/s it
-passes at 1.2 deg above it or more (120 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 8 deg below."""
-LEVEL = Pace(0.20, 0.01)
-"""With the cage in the hand: slow enough for the sill to hold the ball."""
+CARRY_PACE = Pace(0.20, 0.01)
+"""Pace with the cage in the hand: slow enough for the sill to hold the ball."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,13 +70,13 @@ class BallCageEscape(Scenario):
     x: float = param(-0.08, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -120.0, 240.0, period=360.0)
-    """Where the end with the hole points; at 0 straight away from the robot."""
+    """Direction of the end with the hole; 0 is straight away from the robot."""
     ball_x: float = param(-0.0195, "m", -0.1, 0.1)
     ball_y: float = param(0.0, "m", -0.04, 0.04)
     stool_x: float = param(0.022, "m", -0.1, 0.1)
-    """Middle of the stool; 22 mm leave 0.5 mm of plate beyond the hole, and 10 mm of air before the trap."""
+    """Middle of the stool; 22 mm leave 0.5 mm of plate beyond the hole, and a gap of 10 mm before the trap."""
     rolling: float = param(0.04, "1", 0.0, 0.2)
-    """Resistance to rolling of the felt-covered ball, as a share of the load."""
+    """Rolling resistance of the felt-covered ball, as a share of the load."""
     cage: HoledCage = HoledCage()
     ball: Ball = Ball(radius=0.015, density=1400.0, friction=0.5, rgba=(0.85, 0.20, 0.15, 1.0))
     stool: Stool = Stool()
@@ -105,7 +95,7 @@ class BallCageEscape(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return world.touching("ball", "table") and still(world, "ball", STILL) and self.out(world)
+        return world.touching("ball", "table") and still(world, "ball", REST_SPEED) and self.out(world)
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "ball", below=0.0):
@@ -115,7 +105,7 @@ class BallCageEscape(Scenario):
         at, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
         if self.cage.traps(at, r):
             return "the ball fell into the trap"
-        if self.cage.on_sill(at, r) and lean(world.rot("cage")) < self.cage.tilt_over_sill(r) - GIVE:
+        if self.cage.on_sill(at, r) and lean(world.rot("cage")) < self.cage.tilt_over_sill(r) - TILT_TOLERANCE:
             return "the ball was shaken over the sill"
         return None
 
@@ -127,7 +117,7 @@ class BallCageEscape(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Lift the cage, carry it aside, tip it until the ball is over the sill, and on until it is out."""
+        """Lift the cage, carry it aside, and tip it until the ball is over the sill and out."""
         yield from self.pick_up(world)
         yield from self.present(world, self.tilts()[-1])
         back = [lowered(math.radians(tilt)) for tilt in (10.0, -5.0) * 3]  # for a ball that has passed the hole
@@ -136,43 +126,49 @@ class BallCageEscape(Scenario):
                 break
             yield from self.tip(world, down)
             yield from hold(world.arm, 0.3)
-            yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", STILL), give_up=3.0)
+            yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", REST_SPEED), give_up=3.0)
         yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def tilts(self) -> list[Vec3]:
-        """Where down must be, in the cage's axes, one after the other: unit vectors."""
-        steep = self.least_tilt + SPARE
+        """Unit vectors in the cage's axes that must point down, one after the other."""
+        steep = self.least_tilt + TILT_MARGIN
         if self.cage.face != SIDE:
             return [lowered(steep)]
-        aside = np.array([HOLD_AT_END, math.sin(steep), -math.cos(steep)])
-        return [lowered(self.cage.tilt_over_sill(self.ball.radius) + SPARE), aside / np.linalg.norm(aside)]
+        # For a hole in a side, 0.25 times gravity keeps the ball at the hole's end meanwhile.
+        sideways = np.array([0.25, math.sin(steep), -math.cos(steep)])
+        return [lowered(self.cage.tilt_over_sill(self.ball.radius) + TILT_MARGIN), sideways / np.linalg.norm(sideways)]
 
     def pick_up(self, world: World) -> Plan:
         """Take the cage by its width and lift it clear of the stool."""
         yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=0.05)
 
     def present(self, world: World, down: Vec3) -> Plan:
-        """Carry the cage level to a free place, low over the table, and turn it until `down` can come to point down.
+        """Carry the cage level to a free place, low over the table, and turn it so that `down` can come to point down.
 
-        The place is towards the middle, but to the left where the end must face about: there joint 7 has half a turn.
+        The place is towards the middle. If the end must face about, it is to the left: there joint 7 has half a turn.
         """
         arm, steep, leaning = world.arm, math.acos(-down[2]), world.rot("cage") @ down
         side = -1.0 if self.y > 0 and (leaning[0] > 0 or self.cage.face == SIDE) else 1.0
-        low = math.hypot(self.cage.length, self.cage.width) / 2 * math.sin(steep) + HANDLE * math.cos(steep) + ROOM
-        spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * ASIDE, TABLE_TOP + low])
-        yield from go_to(arm, [spot[0], spot[1], max(arm.hand[2], spot[2])], pace=LEVEL)
-        yield from go_to(arm, spot, pace=LEVEL)
+        # The ball passes under the lowest edge of the tilted cage, 40 mm over the table. The place is 0.19 m beside the
+        # stool; the tilted cage and the stool reach 0.07 m each.
+        half = math.hypot(self.cage.length, self.cage.width) / 2
+        low = half * math.sin(steep) + GRIP_HEIGHT * math.cos(steep) + 0.040
+        spot = np.array([min(max(self.x, -0.15), -0.05), self.y + side * 0.19, TABLE_TOP + low])
+        yield from go_to(arm, [spot[0], spot[1], max(arm.hand[2], spot[2])], pace=CARRY_PACE)
+        yield from go_to(arm, spot, pace=CARRY_PACE)
         yield from turn_about_vertical(arm, self._turn_to_front(arm, world.rot("cage") @ down, -side))
 
     def _turn_to_front(self, arm: Arm, leaning: Vec3, side: float) -> float:
-        """The least turn of the hand that takes a direction to the front, or up to `WIDEST` to a side of it [rad].
+        """Least turn of the hand that brings a direction to the front, or up to 55 deg to one side of it [rad].
 
-        With a hole in a side it is the straightest: the end, which is lowered first, must not point to the robot.
+        There the ball has half a metre of table. For a hole in a side it is the turn that brings it straightest to the
+        front: the end, which is lowered first, must not point to the robot.
         """
         heading, laps = math.atan2(leaning[1], leaning[0]), (-2 * math.pi, 0.0, 2 * math.pi)
-        aside = {side * front - heading + lap: front for front in np.linspace(0.0, WIDEST, 12) for lap in laps}
-        possible = [turn for turn in aside if can_turn(arm, turn)]
-        return min(possible, key=aside.__getitem__ if self.cage.face == SIDE else abs, default=0.0)
+        fronts = np.linspace(0.0, math.radians(55.0), 12)
+        angles = {side * front - heading + lap: front for front in fronts for lap in laps}
+        possible = [turn for turn in angles if can_turn(arm, turn)]
+        return min(possible, key=angles.__getitem__ if self.cage.face == SIDE else abs, default=0.0)
 
     def tip(self, world: World, down: Vec3, rate: float = 1.0) -> Plan:
         """Turn the cage about the hand, the shortest way, until `down` in its axes points down, or the ball is out."""
@@ -182,7 +178,7 @@ class BallCageEscape(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        half, steep = self.least_tilt / 2, self.least_tilt + SPARE
+        half, steep = self.least_tilt / 2, self.least_tilt + TILT_MARGIN
         return {
             "lift_it_off_the_stool": Shortcut(lambda world: self.tip_only(world, 0.0)),
             "tip_it_half_as_far": Shortcut(lambda world: self.tip_only(world, half)),
@@ -195,7 +191,7 @@ class BallCageEscape(Scenario):
         }
 
     def tip_only(self, world: World, *tilts: float) -> Plan:
-        """As the oracle, with other tilts [rad], and nothing after them."""
+        """Do as the oracle, with other tilts [rad], and stop after them."""
         yield from self.pick_up(world)
         yield from self.present(world, lowered(tilts[-1]))
         for tilt in tilts:
@@ -203,7 +199,7 @@ class BallCageEscape(Scenario):
             yield from hold(world.arm, 1.0)
 
     def _shake(self, world: World, tilt: float = 0.0, spin: float = 0.0) -> Plan:
-        """Shake it along its length as hard as the hand can, while the wrist turns to and fro, if `spin` is not 0."""
+        """Shake the cage along its length as hard as the hand can; if `spin` is not 0, the wrist turns to and fro."""
         yield from self.tip_only(world, tilt)
         end = world.time + 4.0
         while world.time < end:
@@ -217,13 +213,13 @@ class BallCageEscape(Scenario):
         yield from poke(world.arm, beside, 0.15 * across, until=lambda: world.touched("cage", "table"))
 
     def answer(self) -> Answer:
-        """The heading in which the cage is leaned [deg], told without a look at which end has the hole."""
+        """Heading in which the cage is tilted [deg], chosen without looking which end has the hole."""
 
         def right(heading: float) -> bool:
             return math.cos(math.radians(heading - self.yaw)) > 0
 
         def act(world: World, heading: float) -> Plan:
-            yield from self.tip_only(world, math.copysign(self.least_tilt + SPARE, right(heading) - 0.5))
+            yield from self.tip_only(world, math.copysign(self.least_tilt + TILT_MARGIN, right(heading) - 0.5))
 
         return Answer(tuple(map(float, range(-90, 270, 15))), act, right, tries=1)
 
@@ -240,9 +236,9 @@ class BallCageEscape(Scenario):
         near = cage.offset - cage.hole
         beyond = cage.face not in (BOTTOM, SIDE) or near >= cage.sill_x + cage.wall / 2
         yield require(beyond, "the hole is not beyond the sill", hole=near, sill=cage.sill_x)
-        yield require(cage.face != TOP, "the hole looks up, and the hand cannot turn over", steepest=STEEPEST)
-        tilt = self.least_tilt + SPARE
-        yield require(tilt <= STEEPEST, "the ball stays in at every tilt of the hand", tilt=tilt, steepest=STEEPEST)
+        yield require(cage.face != TOP, "the hole looks up, and the hand cannot turn over", steepest=MAX_HAND_TILT)
+        tilt, steepest = self.least_tilt + TILT_MARGIN, MAX_HAND_TILT
+        yield require(tilt <= steepest, "the ball stays in at every tilt of the hand", tilt=tilt, steepest=steepest)
 
         # It stays in until the cage is tilted, and a wrong tilt costs it.
         fits = 2 * r <= cage.cavity[2] and r + abs(self.ball_y) <= cage.cavity[1] / 2
@@ -251,18 +247,22 @@ class BallCageEscape(Scenario):
         behind = low <= self.ball_x <= high
         yield require(behind, "the ball does not lie between the sills", x=self.ball_x, least=low, largest=high)
         tilt, other = cage.tilt_over_sill(r), cage.tilt_into_trap(r)
-        yield require(other >= LEAST_HELD, "the sill does not hold the ball", tilt=other, least=LEAST_HELD)
+        # A hand that carries the cage level tilts it by up to 3 deg, and brakes at up to 2 m/s^2, which tilts the
+        # apparent gravity by 12 deg.
+        least = math.radians(20.0)
+        yield require(other >= least, "the sill does not hold the ball", tilt=other, least=least)
         yield require(other < tilt, "the trap does not fill before the ball is free", trap=other, hole=tilt)
         length, tilt = cage.trap_length, cage.tilt_out_of_trap(r)
         yield require(2 * r <= length, "the trap does not take the ball", length=length, radius=r)
-        yield require(tilt > STEEPEST, "the ball rolls out of the trap again", tilt=tilt, steepest=STEEPEST)
+        yield require(tilt > MAX_HAND_TILT, "the ball rolls out of the trap again", tilt=tilt, steepest=MAX_HAND_TILT)
 
         # The cage stands by itself, in reach.
         half, far = stool.length / 2, abs(cage.offset - self.stool_x) + cage.hole
         covered = cage.face != BOTTOM or (far <= half and cage.hole <= stool.width / 2)
         yield require(covered, "the stool does not cover the hole", far=far, hole=cage.hole, width=stool.width)
         beside = min(self.stool_x - half - cage.trap_x - cage.wall / 2, stool.height - cage.trap)
-        yield require(beside >= CLEAR, "the trap has no room beside the stool", room=beside, least=CLEAR)
+        least = 0.004  # [m]; the robot places a cage to 2 mm
+        yield require(beside >= least, "the trap has no room beside the stool", room=beside, least=least)
         moment = cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x
         lever = abs(moment / (cage.mass + self.ball.mass) - self.stool_x)
         yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
@@ -270,25 +270,25 @@ class BallCageEscape(Scenario):
         yield within_reach("the cage", self.handle)
 
     def features(self) -> Mapping[str, float]:
-        """How far the cage must be tilted [rad], and the air round the ball in the hole."""
+        """Least tilt that frees the ball [rad], and clearance of the ball in the hole over its radius."""
         return {"least_tilt": self.least_tilt, "air_over_radius": self.cage.hole / self.ball.radius - 1}
 
     # --- geometry ---------------------------------------------------------------------------
 
     @property
     def axes(self) -> Mat3:
-        """The cage's axes at the start."""
+        """Axes of the cage at the start."""
         return about_z(math.radians(self.yaw))
 
     @property
     def foot(self) -> Vec3:
-        """Where the cage stands [m]: the centre of its foot."""
+        """Centre of the cage's foot at the start [m]."""
         return np.array([self.x, self.y, TABLE_TOP + self.stool.height])
 
     @property
     def handle(self) -> Vec3:
-        """Where the hand takes the cage [m]."""
-        return self.foot + HANDLE * UP
+        """Place at which the hand grasps the cage [m]."""
+        return self.foot + GRIP_HEIGHT * UP
 
     @property
     def least_tilt(self) -> float:

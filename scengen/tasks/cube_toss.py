@@ -1,4 +1,4 @@
-"""T10 cube-toss: throw a cube into a tray that stands farther away than the arm can stretch.
+"""T10 cube-toss: throw a cube into a tray that is farther away than the arm can reach.
 
           __
       ===|hand|-> o  .                seen from the side; the swing runs out from the robot along +u
@@ -7,29 +7,30 @@
       |      |     |      .
       |      |     |    |___| tray    on the floor, 1.00 to 1.05 m from its axis
 
-Bottleneck: the hand never gets over the tray. Where the cube comes down is settled when it is let go, by where it is
-then, how fast it is and which way it goes; nothing can be put right afterwards.
+Bottleneck: the hand never gets over the tray. The landing place is decided at release, by the cube's position, speed
+and direction; nothing can be corrected afterwards.
 
-How far a Panda throws. Under OSC_POSE the hand does 0.30 m/s along an axis. A pitch added to it drags the hand along,
-as position and rotation are controlled as if they were independent: from straight down, 0.63 m from its axis, the hand
-swings out and up and leaves the cube 0.90 m from the axis with at least 0.33 m/s outwards and 0.42 m/s upwards. Half a
-second later the cube comes down on the floor, at 1.07 to 1.10 m, at bearings from 30 to 65 deg on either side. No
-posture holds it farther out than 0.94 m (`panda.REACH`). The tray stands between the two; straight ahead the table is
-in the way.
+How far a Panda throws. Under OSC_POSE the hand moves at 0.30 m/s along an axis. A pitch added to it drags the hand
+along, as position and rotation are controlled as if they were independent. From pointing straight down, 0.63 m from the
+first axis, the hand swings out and up and releases the cube 0.90 m from the axis with at least 0.33 m/s outwards and
+0.42 m/s upwards. Half a second later the cube lands on the floor, at 1.07 to 1.10 m, at bearings from 30 to 65 deg on
+either side. No posture holds the cube farther out than 0.94 m (`panda.REACH`). The tray is between the two distances;
+straight ahead the table is in the way.
 
 Decisions, where the paper (App. B, T10) is silent or contradicts itself:
 
 * "A gripper holds a cube" (set-up), "lift the cube and throw it" (plan): the cube lies on the table and is picked up.
-* It gives no distances, and speaks of a goal zone. All of the table is within reach, so the zone is on the floor; and
-  as a cube that falls from 1.1 m tumbles on where it lands, it is a tray with walls, which faces the robot.
-* There is one throw: the floor, on which a cube is lost, is out of reach.
-* On an axis of ours the tray rides on a rail around the robot, from a moment that nobody knows beforehand: the same
-  throw, to where the tray is going to be. "Comes to rest inside the goal zone" then means relative to the tray.
+* The paper gives no distances, and speaks of a goal zone. All of the table is within reach, so the zone is on the
+  floor. A cube that falls from 1.1 m tumbles on where it lands, so the zone is a tray with walls, which faces the
+  robot.
+* There is one throw: a cube on the floor is out of reach, and lost.
+* On an axis of ours the tray rides on a rail around the robot, from a moment that the robot does not know: the same
+  throw, to the place where the tray will be. "Comes to rest inside the goal zone" then means relative to the tray.
 
-The oracle foresees in every period where the cube would come down if it were let go, and steers not the hand but that
-place: sideways and outwards, by swinging faster or slower, until it stays in the middle of the tray. Then it opens the
-jaw. Noise and a cube that sits askew are corrected on the way, and the moment hardly matters: opened 0.1 s earlier or
-later the jaw lets the cube land within 1 cm of the same place.
+In every period the oracle predicts where the cube would land if released now. It steers that place instead of the hand,
+sideways and outwards, by swinging faster or slower, until the place stays in the middle of the tray. Then it opens the
+jaw. This corrects noise and a cube that sits askew. The moment of release hardly matters: if the jaw opens 0.1 s
+earlier or later, the cube lands within 1 cm of the same place.
 """
 
 import math
@@ -57,47 +58,24 @@ from ..skills.grip import take
 from ..skills.jaw import release
 from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, hold, push, turn_to, until
 
-AXIS: Vec3 = BASE * [1.0, 1.0, 0.0]
-"""Where the robot's first axis meets the floor [m]."""
-WOUND, ARRIVED, CALM = (0.63, 0.95), 0.02, 0.2
-"""Where the swing begins, hand pointing down: distance from the axis and height of the grip site [m], how near to it is
-there [m], and how long it is held there [s]. The place where throws at all bearings go farthest, flat within 5 cm."""
-RISE, FEED = 0.3, 0.7
-"""Action upwards in a swing, and outwards once the cube would come down where it should."""
-GAIN, LEVEL = 40.0, 4.0
-"""Action per metre by which it would come down elsewhere, and per radian by which the closing axis is off the level."""
-LOST = 0.006
-"""By how much less far the cube flies than foreseen when it is let go [m]: the fingers hold it back, 4 to 10 mm."""
-EXACT, STEADY, SLOPE = (0.006, 0.012), 0.15, 5
-"""How near to the middle of the tray the cube must be bound to come down, along and across the swing [m], how fast that
-place may still move [m/s], and over how many periods this is seen."""
-TRUSTED, LONGEST, FOLLOW = 0.1, 0.9, 0.2
-"""When after its start a swing is judged first, when the jaw opens at the latest, and how long the swing goes on then
-[s]."""
-THROWN, RADIUS, HEIGHT = (0.33, 0.42), 0.90, 1.15
-"""Velocity outwards and upwards [m/s], distance from the axis and height [m] at which a full swing leaves a cube: the
-least of what was measured at bearings from 30 to 75 deg."""
-SWUNG = 75.0
-"""Largest bearing at which that was measured [deg]."""
-STILL = 0.02
-"""Speed below which the cube counts as at rest [m/s]."""
-STRETCHED = 0.92
-"""How far from its axis the arm is stretched for a drop [m]; farther out it trembles."""
-EYES = {"agentview": (2.0, 0.0, 1.9), "sideview": (1.9, 0.5, 2.1)}
-"""Where two of the arena's cameras stand, so that they see the floor on both sides of the table [m]. Elsewhere they see
-the table alone."""
-MIDDLE: Vec3 = np.array([0.1, 0.0, 0.45])
-"""What they look at [m]."""
-RAIL, RAISED = "rail", 0.01
-"""Hinge on which a tray rides around the robot, and how far over the floor [m]."""
-LEAD, ENDS = 3.2, 6.5
-"""How long after it has been picked up the cube comes down, about, and when at the latest it does [s]."""
-YELLOW = (0.95, 0.75, 0.20, 1.0)
-"""Of the tray, on a grey floor."""
+ROBOT_AXIS: Vec3 = BASE * [1.0, 1.0, 0.0]
+"""Point at which the robot's first axis meets the floor [m]."""
+RELEASE_SPEED = (0.33, 0.42)
+"""Velocity outwards and upwards of a cube that a full swing releases [m/s]: the least measured at 30 to 75 deg."""
+RELEASE_DISTANCE = 0.90
+"""Distance from the first axis at which a full swing releases a cube [m], measured at the same bearings."""
+RELEASE_HEIGHT = 1.15
+"""Height at which a full swing releases a cube [m], measured at the same bearings."""
+MAX_BEARING = 75.0
+"""Largest bearing at which throws were measured [deg]."""
+REST_SPEED = 0.02
+"""Speed relative to the tray below which the cube counts as at rest [m/s]."""
+RAIL = "rail"
+"""Hinge on which a tray rides around the robot."""
 
 Opens = Callable[[float, float, float], bool]
-"""Whether to open the jaw, asked with what is missing to the middle of the tray along the swing and across it [m], and
-how fast the former gets less [m/s]."""
+"""Whether to open the jaw, from the distance to the middle of the tray along the swing and across it [m], and the speed
+at which the former decreases [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,19 +85,19 @@ class CubeToss(Scenario):
     HOLD = 0.3
 
     distance: float = param(1.035, "m", 0.9, 1.3)
-    """Of the middle of the tray from the robot's first axis."""
+    """Distance of the middle of the tray from the robot's first axis."""
     bearing: float = param(50.0, "deg", -110.0, 110.0)
-    """Of the tray; 0 is ahead of the robot, 90 to its left."""
+    """Bearing of the tray; 0 is ahead of the robot, 90 to its left."""
     stand: float = param(0.0, "m", 0.0, 0.6)
     """Height of the post under the tray."""
     turn: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Of the tray, against facing the robot."""
+    """Angle by which the tray is turned from facing the robot."""
     opening: float = param(0.095, "m", 0.06, 0.20)
-    """Of the tray: the length of its inner sides."""
+    """Length of the tray's inner sides."""
     rate: float = param(0.0, "deg/s", -10.0, 10.0)
-    """At which the tray rides on a rail around the robot, once it does, away from straight ahead."""
+    """Rate at which the tray rides on a rail around the robot, away from straight ahead; 0: it stands still."""
     launch: float = param(2.0, "s", 0.5, 4.0)
-    """When."""
+    """Time at which the tray starts to ride."""
     x: float = param(-0.10, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
@@ -132,15 +110,17 @@ class CubeToss(Scenario):
         place(scene, self.cube, "cube", self.start, math.radians(self.yaw))
         if self.stand:
             half = self.stand / 2
-            post = scene.worldbody.add_body(name="post", pos=self.spot - half * UP)
+            post = scene.worldbody.add_body(name="post", pos=(self.spot - half * UP).tolist())
             solid(post, "post", [0.03, 0.03, half], rgba=self.tray.rgba)
         place(scene, self.tray, "tray", self.spot, math.radians(self.bearing + self.turn), free=False)
         if self.rate:
             to_axis = about_z(-math.radians(self.turn)) @ [-self.distance, 0.0, 0.0]
-            scene.body("tray").add_joint(name=RAIL, type=mujoco.mjtJoint.mjJNT_HINGE, axis=UP, pos=to_axis)
-        for name, eye in EYES.items():
+            hinge = mujoco.mjtJoint.mjJNT_HINGE
+            scene.body("tray").add_joint(name=RAIL, type=hinge, axis=UP.tolist(), pos=to_axis.tolist())
+        # From where they stand in the arena, these cameras see the table alone; here they see the floor on both sides.
+        for name, eye in {"agentview": np.array([2.0, 0.0, 1.9]), "sideview": np.array([1.9, 0.5, 2.1])}.items():
             camera = scene.camera(name)
-            camera.pos, camera.quat = eye, _towards(MIDDLE - np.array(eye))
+            camera.pos, camera.quat = eye, _camera_orientation(np.array([0.1, 0.0, 0.45]) - eye)
         return scene
 
     def events(self, world: World) -> None:
@@ -157,7 +137,7 @@ class CubeToss(Scenario):
         middle = world.pos("tray") + (tray.floor + tray.depth / 2) * UP
         lies = seated(world, "cube", "tray", middle, math.sqrt(2) * half, tray.depth / 2)
         slips = world.velocity("cube")[3:] - world.velocity("tray")[3:]
-        return lies and math.sqrt(slips @ slips) < STILL
+        return lies and math.sqrt(slips @ slips) < REST_SPEED
 
     def failure(self, world: World) -> str | None:
         return "the cube fell on the floor" if world.touching("cube", "world") else None
@@ -165,65 +145,72 @@ class CubeToss(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Pick up the cube, wind up, swing, and let go when it will come down in the middle of the tray."""
+        """Pick up the cube, wind up, swing, and release it when it will land in the middle of the tray."""
         aim = yield from self.wind_up(world)
-        yield from aim.swing(world, aim.bound)
+        yield from aim.swing(world, aim.on_target)
 
     def wind_up(self, world: World) -> Generator[Action, None, Self]:
-        """Pick up the cube and bring it to where the swing begins, the fingers on either side of the swing.
+        """Pick up the cube and bring it to the start of the swing, the fingers on either side of the swing.
 
         Returns:
-            The scenario, with the tray's bearing at the time when the cube will come down.
+            The scenario, with the tray's bearing at the time when the cube will land.
         """
-        arm = world.arm
-        yield from take(arm, "cube", lift=WOUND[1] - TABLE_TOP - self.cube.edge / 2)
-        aim = self if not self.rate else replace(self, bearing=math.degrees(polar(self.target(world, LEAD) - AXIS)[0]))
-        at, rot = AXIS + WOUND[0] * aim.u + WOUND[1] * UP, facing_down(math.radians(aim.bearing))
-        yield from until(go_to(arm, at, rot, COARSE), lambda: math.dist(arm.hand, at) < ARRIVED)
-        yield from hold(arm, CALM)
+        # Throws at all bearings go farthest from here, hand pointing down; the optimum is flat within 5 cm.
+        arm, distance, height = world.arm, 0.63, 0.95
+        yield from take(arm, "cube", lift=height - TABLE_TOP - self.cube.edge / 2)
+        aim = self
+        if self.rate:  # the cube lands about 3.2 s after it has been picked up
+            aim = replace(self, bearing=math.degrees(polar(self.tray_after(world, 3.2) - ROBOT_AXIS)[0]))
+        at, rot = ROBOT_AXIS + distance * aim.u + height * UP, facing_down(math.radians(aim.bearing))
+        yield from until(go_to(arm, at, rot, COARSE), lambda: math.dist(arm.hand, at) < 0.02)
+        yield from hold(arm, 0.2)
         return aim
 
     def swing(self, world: World, opens: Opens, wrist: float = 1.0) -> Plan:
-        """Swing the hand out and up so that the cube is bound to come down in the tray, and open the jaw on the way.
+        """Swing the hand out and up so that the cube will land in the tray, and open the jaw on the way.
 
         Args:
             opens: whether to open the jaw now.
             wrist: share of the pitch that goes with the swing.
         """
+        gain = 40.0  # action per metre of error of the landing place
+        window = 5  # periods over which the speed of the landing place is measured
         arm, short = world.arm, list[float]()
         begin, opened, fast = world.time, math.inf, 1.0 / float(np.abs(self.u).max())
-        while world.time < opened + FOLLOW:
-            seconds, place = self.foreseen(world)
-            miss = self.target(world, seconds) - place + LOST * self.u
+        while world.time < opened + 0.2:  # the swing goes on for 0.2 s after the jaw opens
+            seconds, place = self.predicted(world)
+            # The fingers hold the cube back: it flies 4 to 10 mm less far than predicted.
+            miss = self.tray_after(world, seconds) - place + 0.006 * self.u
             short.append(float(miss @ self.u))
             aside = float(miss @ self.across)
-            closes = (short[-1 - SLOPE :][0] - short[-1]) / (SLOPE * Loop.PERIOD)
-            if opened == math.inf and world.time > begin + TRUSTED:
-                if opens(short[-1], aside, closes) or world.time > begin + LONGEST:
+            closes = (short[-1 - window :][0] - short[-1]) / (window * Loop.PERIOD)
+            if opened == math.inf and world.time > begin + 0.1:  # a swing cannot be judged earlier
+                if opens(short[-1], aside, closes) or world.time > begin + 0.9:  # 0.9 s: at the latest
                     opened = world.time
-            drive = fast * min(1.0, max(-1.0, FEED + GAIN * short[-1]))
+            drive = fast * min(1.0, max(-1.0, 0.7 + gain * short[-1]))
             closing = arm.hand_rot[:, 0]
             level = np.cross(closing, math.copysign(1.0, closing @ self.across) * self.across)
             action = np.empty(7)
-            action[:3] = drive * self.u + RISE * UP + GAIN * aside * self.across
-            action[3:6] = -wrist * drive * self.across + LEVEL * (level - (level @ self.across) * self.across)
+            action[:3] = drive * self.u + 0.3 * UP + gain * aside * self.across
+            action[3:6] = -wrist * drive * self.across + 4.0 * (level - (level @ self.across) * self.across)
             action[6] = CLOSED if opened == math.inf else OPEN
             yield np.clip(action, -1.0, 1.0)
 
-    def bound(self, short: float, aside: float, closes: float) -> bool:
-        """Whether the cube is bound to come down in the middle of the tray once the jaw lets go, or gets no farther."""
-        there = abs(short - closes * self.opens) < EXACT[0] and abs(closes) < STEADY and abs(aside) < EXACT[1]
+    def on_target(self, short: float, aside: float, closes: float) -> bool:
+        """Whether a cube released now lands in the middle of the tray, or its landing place moves no farther out."""
+        # Within 6 mm along the swing and 12 mm across it, of a landing place that moves slower than 0.15 m/s.
+        there = abs(short - closes * self.opening_time) < 0.006 and abs(closes) < 0.15 and abs(aside) < 0.012
         return there or closes <= 0.0 < short
 
-    def foreseen(self, world: World) -> tuple[float, Vec3]:
-        """When and where the cube would come down if it were let go now [s, m]."""
-        return flight(world.com("cube"), world.velocity("cube")[3:], self.height)
+    def predicted(self, world: World) -> tuple[float, Vec3]:
+        """Time of flight [s] and landing place [m] of a cube that is released now."""
+        return flight(world.com("cube"), world.velocity("cube")[3:], self.landing_height)
 
-    def target(self, world: World, seconds: float) -> Vec3:
-        """Where the tray will be [m] after some time [s]."""
+    def tray_after(self, world: World, seconds: float) -> Vec3:
+        """Place of the tray [m] after a time [s]."""
         if not self.rate:
             return self.spot
-        return AXIS + about_z(world.hinge(RAIL)[1] * seconds) @ (world.pos("tray") - AXIS)
+        return ROBOT_AXIS + about_z(world.hinge(RAIL)[1] * seconds) @ (world.pos("tray") - ROBOT_AXIS)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -238,28 +225,27 @@ class CubeToss(Scenario):
         return plans
 
     def _stretch(self, world: World) -> Plan:
-        """Hold the cube out towards the tray as far as the arm goes, and let go."""
+        """Hold the cube out towards the tray as far as the arm goes, and release it."""
         aim = yield from self.wind_up(world)
         arm, end = world.arm, world.time + 4.5
         yield from go_to(arm, arm.hand + 0.2 * UP)
         yield from turn_to(arm, rotation(-0.6 * aim.across) @ arm.hand_rot, give_up=2.0)
         out = push(arm, 0.08 * aim.u, lambda: world.time > end, give_up=8.0)
-        yield from until(out, lambda: float((arm.hand - AXIS) @ aim.u) > STRETCHED)
+        yield from until(out, lambda: float((arm.hand - ROBOT_AXIS) @ aim.u) > 0.92)  # farther out the arm trembles
         yield from hold(arm, 0.3)
         yield from release(arm)
 
     def _stiff(self, world: World) -> Plan:
         """Throw with the hand pointing down throughout."""
         aim = yield from self.wind_up(world)
-        yield from aim.swing(world, aim.bound, wrist=0.0)
+        yield from aim.swing(world, aim.on_target, wrist=0.0)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """A wall in the air, beyond the hand and before the tray: what flies there strikes it."""
+        """A wall in the air, beyond the hand and before the tray, which a thrown cube strikes."""
         scene = self.build()
         near = self.distance - self.extent - 0.01
-        body = scene.worldbody.add_body(
-            name="wall", pos=AXIS + near * self.u, quat=quat("z", math.radians(self.bearing))
-        )
+        foot, turn = ROBOT_AXIS + near * self.u, quat("z", math.radians(self.bearing))
+        body = scene.worldbody.add_body(name="wall", pos=foot.tolist(), quat=turn)
         solid(body, "wall", [0.005, 0.3, 0.5], [0.0, 0.0, 0.5])
         return {"walled_off": scene}
 
@@ -273,62 +259,64 @@ class CubeToss(Scenario):
         yield require(room > 0.01, "the cube hardly fits into the tray", room=room)
         nearest = self.distance - self.extent + edge / 2
         yield require(nearest > REACH, "the cube can be dropped into the tray", nearest=nearest, reach=REACH)
-        seconds, farthest = self.farthest
+        seconds, farthest = self.farthest_throw
         needed = self.distance - half + edge
         yield require(needed < farthest, "the tray is too far away", needed=needed, farthest=farthest)
-        bearings = abs(self.bearing), abs(self.bearing) + self.rate * max(0.0, ENDS - self.launch)
-        widest = max(bearings)
-        yield require(widest <= SWUNG, "no throw was measured in that direction", bearing=widest, farthest=SWUNG)
-        over = self.distance - THROWN[0] * (seconds - self.passing)
-        beside = min(float(np.abs((AXIS + over * heading(b))[:2]).max()) - TABLE_HALF for b in bearings)
+        # The cube lands 6.5 s after the start at the latest.
+        bearings = abs(self.bearing), abs(self.bearing) + self.rate * max(0.0, 6.5 - self.launch)
+        widest, farthest = max(bearings), MAX_BEARING
+        yield require(widest <= farthest, "no throw was measured in that direction", bearing=widest, farthest=farthest)
+        crossing = self.distance - RELEASE_SPEED[0] * (seconds - self.table_crossing)
+        beside = min(float(np.abs((ROBOT_AXIS + crossing * heading(b))[:2]).max()) - TABLE_HALF for b in bearings)
         yield require(beside > edge, "the table is in the way", beside=beside, least=edge)
         stands = not (self.rate and self.stand)
         yield require(stands, "a tray on a post does not ride", rate=self.rate, stand=self.stand)
 
     def features(self) -> Mapping[str, float]:
-        """Its flight as a share of the farthest throw's, how long that one takes [s], the room for it in the tray, how
-        far to the side it goes and how the tray is turned [rad], what the fingers need to let go [s], and how fast the
-        tray is [m/s]."""
-        seconds, farthest = self.farthest
+        """Length of the flight over that of the farthest throw, time of the latter [s], size of tray over cube, bearing
+        and turn of the tray [rad], time in which the fingers release the cube [s], speed of the tray [m/s]."""
+        seconds, farthest = self.farthest_throw
         return {
-            "share_of_the_farthest_throw": (self.distance - RADIUS) / (farthest - RADIUS),
+            "share_of_the_farthest_throw": (self.distance - RELEASE_DISTANCE) / (farthest - RELEASE_DISTANCE),
             "flight_time": seconds,
             "room_over_edge": self.opening / self.cube.edge,
             "to_the_side": math.radians(abs(self.bearing)),
             "tray_turned_by": math.radians(abs(self.turn)),
-            "opening_time": self.opens,
+            "opening_time": self.opening_time,
             "tray_speed": abs(math.radians(self.rate)) * self.distance,
         }
 
     # --- mechanics and geometry ---------------------------------------------------------------
 
     @property
-    def opens(self) -> float:
+    def opening_time(self) -> float:
         """Time from the command until the jaw has let go of the cube [s]."""
         return jaw.time_to_free(self.cube.edge)
 
     @property
-    def farthest(self) -> tuple[float, float]:
-        """How long the cube flies in a full swing [s], and how far from the robot's axis it comes down [m]."""
-        return self._thrown(self.height)
+    def farthest_throw(self) -> tuple[float, float]:
+        """Time of flight after a full swing [s], and distance of the landing place from the robot's axis [m]."""
+        return self._full_throw(self.landing_height)
 
     @property
-    def passing(self) -> float:
-        """When it passes the height of the table [s]."""
-        return self._thrown(TABLE_TOP)[0]
+    def table_crossing(self) -> float:
+        """Time after which it passes the height of the table [s]."""
+        return self._full_throw(TABLE_TOP)[0]
 
-    def _thrown(self, height: float) -> tuple[float, float]:
-        seconds, place = flight(RADIUS * heading(0.0) + HEIGHT * UP, np.array([THROWN[0], 0.0, THROWN[1]]), height)
+    def _full_throw(self, height: float) -> tuple[float, float]:
+        """Time [s] and distance from the robot's axis [m] at which a cube from a full swing comes to a height [m]."""
+        start = RELEASE_DISTANCE * heading(0.0) + RELEASE_HEIGHT * UP
+        seconds, place = flight(start, np.array([RELEASE_SPEED[0], 0.0, RELEASE_SPEED[1]]), height)
         return seconds, float(place[0])
 
     @property
-    def height(self) -> float:
-        """Of the middle of a cube that lies in the tray [m]."""
+    def landing_height(self) -> float:
+        """Height of the middle of a cube that lies in the tray [m]."""
         return float(self.spot[2]) + self.tray.floor + self.cube.edge / 2
 
     @property
     def extent(self) -> float:
-        """How far the space inside the tray reaches from its middle towards the robot [m]."""
+        """Distance from the middle of the tray to its inner side towards the robot [m]."""
         a = math.radians(self.turn)
         return self.opening / 2 * (abs(math.cos(a)) + abs(math.sin(a)))
 
@@ -344,22 +332,22 @@ class CubeToss(Scenario):
 
     @property
     def tray(self) -> Bin:
-        """Lined, so that the cube does not slide; its floor is thicker than the cube comes in a time step."""
-        side = self.opening
-        return Bin(width=side, length=side, depth=0.06, wall=0.010, floor=0.020, friction=1.0, rgba=YELLOW)
+        """Lined, so that the cube does not slide; its floor is thicker than the cube moves in a time step."""
+        side, yellow = self.opening, (0.95, 0.75, 0.20, 1.0)  # on a grey floor
+        return Bin(width=side, length=side, depth=0.06, wall=0.010, floor=0.020, friction=1.0, rgba=yellow)
 
     @property
     def spot(self) -> Vec3:
         """Middle of the foot of the tray [m]."""
-        return AXIS + self.distance * self.u + (RAISED if self.rate else self.stand) * UP
+        return ROBOT_AXIS + self.distance * self.u + (0.01 if self.rate else self.stand) * UP  # a riding tray hovers
 
     @property
     def start(self) -> Vec3:
-        """Where the cube lies [m]."""
+        """Place of the cube at the start [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
 
-def _towards(ahead: Vec3) -> NDArray[np.float64]:
+def _camera_orientation(ahead: Vec3) -> NDArray[np.float64]:
     """Orientation (wxyz) of an upright camera that looks along a direction: down its own -z, its x to the right."""
     back, turn = -ahead / np.linalg.norm(ahead), np.empty(4)
     right = np.cross(UP, back)

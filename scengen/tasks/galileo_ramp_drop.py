@@ -1,4 +1,4 @@
-"""T14 galileo-ramp-drop: let a steel ball go where it will run out of speed on the patch across the valley.
+"""T14 galileo-ramp-drop: release a steel ball at the height from which it stops on the patch across the valley.
 
       hand                                seen from the side; the ball goes down here and up there
        ()  \\                       //
@@ -6,21 +6,20 @@
              \\__             __//
     [()tray]     ``--.....--``
 
-Bottleneck: nothing can be done about the ball any more once it is let go. Its height says everything about the end:
-too high and it crosses the patch, too low and it never gets there.
+Bottleneck: after the release the robot cannot influence the ball. Its height alone decides: from too high it crosses
+the patch, from too low it does not reach it.
 
-Decisions. (1) What "arrives at near-zero velocity" means; the paper gives no number. A ball that turns back on the
-patch has speed zero there, so the goal is: the ball rolled through the valley, has touched the patch, and has not gone
-past its upper edge. The patch is `Ramp.band` = 3 mm high: a sliding ball crosses its lower edge with at most
-sqrt(2 g band) = 0.24 m/s, in training a third of its speed in the valley or less. Contact is seen at the physics rate;
-on a ramp without friction no state lasts. Crossing the upper edge loses for good, and HOLD is longer than the time to
-cross the patch.
-(2) The robot may not touch the ball beyond the middle of the ramp, nor again after its run: else it is carried to the
-patch, or tried higher and higher. Nor may it fall on the ramp: a ball that bounces comes down on the patch from one of
-six fixed places. To push it on the near side is no failure, but makes it too fast. (3) The paper calls the ramp
-frictionless and ships it with 0.10 to 0.50 (App. C). Training is close to the former; App. C is an axis, where the ball
-rolls: that changes its speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not the height; the loss lies in between,
-where it slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table: a tray that moves is a tool.
+Decisions. (1) The paper gives no number for "arrives at near-zero velocity". A ball that turns back on the patch has
+speed zero there, so the goal is: the ball rolled through the valley, has touched the patch, and has not gone past its
+upper edge. The patch is `Ramp.band` = 3 mm high: a sliding ball crosses its lower edge with at most sqrt(2 g band) =
+0.24 m/s, in training a third of its speed in the valley or less. Contact is detected at the physics rate; on a ramp
+without friction no state lasts. Crossing the upper edge ends the episode, and HOLD is longer than the time to cross the
+patch. (2) The robot may not touch the ball beyond the middle of the ramp, nor again after its run: it could carry it to
+the patch, or try higher and higher. Nor may the ball fall on the ramp: from one of six fixed places a bouncing ball
+comes down on the patch. To push it on the near side is no failure, but makes it too fast. (3) The paper calls the ramp
+frictionless and ships it with 0.10 to 0.50 (App. C). Training is close to the former. App. C is an axis, where the ball
+rolls: that changes its speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not the height. The loss is in between, where
+the ball slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table: a tray that moves is a tool.
 """
 
 import math
@@ -45,14 +44,9 @@ from ..skills.jaw import carry, grasp, pick, put, release
 from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
 
 TRAY = Bin(width=0.08, length=0.15, depth=0.012, wall=0.005, floor=0.005)
-"""Long enough for the open jaw; its rim holds the ball and stays below its equator."""
-BRIM = 0.015
-"""The highest release is this far below the top of the ramp, along the incline [m]; there the ball still lies on it."""
-HOP = 0.01
-"""How far a ball that the robot does not touch may be above the floor of the ramp [m]; one that was let go there hops
-by 1 mm, on the steepest ramps by 2 mm."""
-LIFT = 0.12
-"""How high above its tray and above the floor of the ramp the ball is carried [m]: over rims and walls."""
+"""Tray of the ball, long enough for the open jaw; its rim holds the ball and is below its equator."""
+CARRY_HEIGHT = 0.12
+"""Height above the tray and above the floor of the ramp at which the ball is carried [m]: over rims and walls."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +61,7 @@ class GalileoRampDrop(Scenario):
     heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
     """Direction in which the ball rolls."""
     tray_back: float = param(0.12, "m", 0.05, 0.3)
-    """How far the tray's middle lies behind the middle of the ramp."""
+    """Distance of the tray's middle behind the middle of the ramp."""
     tray_gap: float = param(0.045, "m", 0.035, 0.1)
     """Free space between tray and ramp."""
     ramp: Ramp = Ramp()
@@ -93,57 +87,57 @@ class GalileoRampDrop(Scenario):
             return "the robot touched the ball beyond the middle of the ramp"
         if touching and world.touched("ball", "ramp/far"):
             return "the ball was touched again after its run"
-        if not touching and self.gap(world.com("ball")) > HOP:
+        if not touching and self.gap(world.com("ball")) > 0.01:  # at its release a ball hops by 1 to 2 mm
             return "the ball was not let go on the floor of the ramp"
-        if along > self.edge:
+        if along > self.patch_edge:
             return "the ball went past the patch"
         return None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Find the height by energy, bring the ball there, let it go, keep out of its way."""
-        yield from self.release_at(world, self.start)
+        """Compute the height from the energy, bring the ball there, release it and move away."""
+        yield from self.release_at(world, self.release_place)
 
     def release_at(self, world: World, s: float) -> Plan:
         """Take the ball from the tray and release it at rest on the floor of the ramp, at s [m]."""
         yield from self._drop_at(world, s)
-        yield from retreat(world.arm, LIFT)
+        yield from retreat(world.arm, CARRY_HEIGHT)
 
     def _drop_at(self, world: World, s: float) -> Plan:
-        """As `release_at`, but the open jaw stays."""
+        """As `release_at`, but the open jaw stays where it is."""
         yield from self._take(world)
         yield from self._put_at(world, s)
 
-    def _put_at(self, world: World, s: float, hover: float = LIFT) -> Plan:
-        """Lower the held ball on the floor at s and let it go. Lengths in [m]."""
+    def _put_at(self, world: World, s: float, hover: float = CARRY_HEIGHT) -> Plan:
+        """Lower the held ball on the floor at s [m], from a height `hover` [m], and release it."""
         on, down = f"ramp/{self.ramp.part(s)}", -self.axes @ self.ramp.normal(s)
         yield from put(world.arm, "ball", self.resting(s), on, hover, down)
 
     def _take(self, world: World) -> Plan:
-        """Take the ball from the tray. The hand turns first: both at once may bend the arm out of reach."""
+        """Take the ball from the tray. The hand turns first: turning on the way may bend the arm out of reach."""
         across = self.axes[:, 1]
         yield from turn_to(world.arm, closing_along(world.arm, across), rate=2.0)
-        yield from pick(world.arm, world.com("ball"), across, lift=LIFT)
+        yield from pick(world.arm, world.com("ball"), across, lift=CARRY_HEIGHT)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        start, patch = self.ramp.height(self.start), self.ramp.at_height(self.ramp.goal)
+        height, patch = self.ramp.height(self.release_place), self.ramp.at_height(self.ramp.goal)
         plans = {
             "as_high_as_possible": Shortcut(partial(self.release_at, s=self.brim)),
-            "half_as_high": Shortcut(partial(self.release_at, s=-self.ramp.at_height(start / 2))),
+            "half_as_high": Shortcut(partial(self.release_at, s=-self.ramp.at_height(height / 2))),
             "carry_it_to_the_patch": Shortcut(partial(self.release_at, s=patch)),
             "catch_it_and_try_higher": Shortcut(self._try_higher),
             "let_it_bounce_across": Shortcut(partial(self.let_fall, s=-0.05, height=0.12)),
         }
-        if start - self.ramp.goal > 1.5 * self.ramp.band:
+        if height - self.ramp.goal > 1.5 * self.ramp.band:
             plans["as_high_as_the_patch"] = Shortcut(partial(self.release_at, s=-patch))
         return plans
 
     def _try_higher(self, world: World) -> Plan:
-        """Let the ball go too low, catch it where it comes back between the fingers, and again a little higher."""
-        arm, height = world.arm, self.ramp.height(self.start) - 0.008
+        """Release the ball too low, catch it when it comes back between the fingers, and repeat a little higher."""
+        arm, height = world.arm, self.ramp.height(self.release_place) - 0.008
         yield from self._drop_at(world, -self.ramp.at_height(height))
         while True:
             yield from wait(arm, lambda: math.dist(world.com("ball"), arm.hand) > 0.12, give_up=2.0)
@@ -152,16 +146,16 @@ class GalileoRampDrop(Scenario):
             yield from self._put_at(world, -self.ramp.at_height(height := height + 0.004), hover=0.02)
 
     def let_fall(self, world: World, s: float, height: float) -> Plan:
-        """Let the ball fall on the ramp at s from a height [m]: it bounces, and may come down on the patch."""
+        """Drop the ball on the ramp at s from a height [m]: it bounces, and may come down on the patch."""
         yield from self._take(world)
-        over = self.resting(s) + height * UP
-        yield from carry(world.arm, "ball", over + 0.05 * UP, pace=COARSE)
-        yield from carry(world.arm, "ball", over)
+        above = self.resting(s) + height * UP
+        yield from carry(world.arm, "ball", above + 0.05 * UP, pace=COARSE)
+        yield from carry(world.arm, "ball", above)
         yield from release(world.arm)
-        yield from retreat(world.arm, LIFT)
+        yield from retreat(world.arm, CARRY_HEIGHT)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the near incline the ball falls from the hand to the table; without the far one nothing brakes it."""
+        """Without the near incline the ball falls to the table; without the far one nothing brakes it."""
         near, far = self.build(), self.build()
         for scene, part in ((near, "near"), (far, "far"), (far, "beyond")):
             for geom in list(scene.body(f"ramp/{part}").geoms):
@@ -170,8 +164,8 @@ class GalileoRampDrop(Scenario):
         return {"no_near_incline": near, "no_far_incline": far}
 
     def answer(self) -> Answer:
-        """The height of release as a share of the highest one. One try: once it ran, the ball may not be touched."""
-        highest, wanted = self.ramp.height(self.brim), self.ramp.height(self.start)
+        """Height of release as a share of the highest one. One try: after its run the ball may not be touched."""
+        highest, wanted = self.ramp.height(self.brim), self.ramp.height(self.release_place)
 
         def act(world: World, share: float) -> Plan:
             yield from self.release_at(world, -self.ramp.at_height(share * highest))
@@ -187,8 +181,9 @@ class GalileoRampDrop(Scenario):
         ramp, (low, high) = self.ramp, self.ramp.patch
         fits = ramp.foot <= low and high <= ramp.top
         yield require(fits, "the patch is not on the incline", low=low, high=high, foot=ramp.foot, top=ramp.top)
-        release, top, edge = ramp.height(self.start), ramp.height(self.brim), ramp.height(high)
-        yield require(self.start >= self.brim, "the ball would have to start above the ramp", release=release, top=top)
+        release, top, edge = ramp.height(self.release_place), ramp.height(self.brim), ramp.height(high)
+        fits = self.release_place >= self.brim
+        yield require(fits, "the ball would have to start above the ramp", release=release, top=top)
         climbs = ramp.climb(self.brim, self.ball.radius)
         yield require(climbs >= edge + ramp.band, "a ball from the top does not overshoot", climbs=climbs, edge=edge)
 
@@ -200,12 +195,15 @@ class GalileoRampDrop(Scenario):
         room = centre + jaw.PALM_ABOVE - jaw.PALM_ACROSS * fall - WALL_RISE / math.cos(ramp.slope)
         yield require(room >= 0.0, "the palm meets the walls before the ball meets the floor", room=room)
         yield on_table("the ramp or the tray", self.outlines)
-        yield within_reach("the ball's way", self.resting(self.start) + LIFT * UP, self.tray + LIFT * UP)
+        above = CARRY_HEIGHT * UP
+        yield within_reach("the ball's way", self.resting(self.release_place) + above, self.tray + above)
 
     def features(self) -> Mapping[str, float]:
-        """How high the ball must start [m], and whether it slips: from 2/7 on it rolls."""
-        ramp = self.ramp
-        return {"release_height": ramp.height(self.start), "friction_over_slope": ramp.friction / math.tan(ramp.slope)}
+        """Height of release [m], and friction over slope: from 2/7 on the ball rolls, below it slips."""
+        return {
+            "release_height": self.ramp.height(self.release_place),
+            "friction_over_slope": self.ramp.friction / math.tan(self.ramp.slope),
+        }
 
     # --- geometry ---------------------------------------------------------------------------
 
@@ -216,19 +214,19 @@ class GalileoRampDrop(Scenario):
 
     @property
     def middle(self) -> Vec3:
-        """The point on the table below the middle of the ramp [m]."""
+        """Point on the table below the middle of the ramp [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
     def tray(self) -> Vec3:
-        """Middle of the tray's foot [m], on that side of the ramp where the robot stands."""
+        """Middle of the tray's foot [m], on the robot's side of the ramp."""
         along, across, _ = self.axes.T
         away = self.ramp.width / 2 + WALL_THICKNESS + self.tray_gap + TRAY.wall + TRAY.length / 2
         return self.middle - self.tray_back * along + away * (across if across[0] <= 0 else -across)
 
     @property
     def outlines(self) -> tuple[Outline, Outline]:
-        """Of the ramp and of the tray."""
+        """Outlines of the ramp and of the tray [m]."""
         yaw, ramp = math.radians(self.heading), (self.ramp.span, self.ramp.width + 2 * WALL_THICKNESS)
         return corners(self.middle, yaw, ramp), corners(self.tray, yaw, TRAY.outer)
 
@@ -237,11 +235,11 @@ class GalileoRampDrop(Scenario):
         return self.middle + self.axes @ (self.ramp.floor(s) + self.ball.radius * self.ramp.normal(s))
 
     def along(self, point: Vec3) -> float:
-        """How far a point is from the middle of the ramp, along it and level [m]; positive on the far side."""
+        """Level distance of a point from the middle of the ramp, along it [m]; positive on the far side."""
         return float((point - self.middle) @ self.axes[:, 0])
 
     def gap(self, point: Vec3) -> float:
-        """How far a ball with its centre there is above the floor of the ramp [m]; not positive beside the ramp."""
+        """Gap between the floor of the ramp and a ball with its centre at a point [m]; not positive beside the ramp."""
         x, y, z = self.axes.T @ (point - self.middle)
         if abs(x) > self.ramp.span / 2 or abs(y) > self.ramp.width / 2:
             return 0.0
@@ -249,16 +247,16 @@ class GalileoRampDrop(Scenario):
         return float(([x, 0.0, z] - self.ramp.floor(s)) @ self.ramp.normal(s)) - self.ball.radius
 
     @cached_property
-    def edge(self) -> float:
-        """How far along the ramp, level, the centre of a ball is that touches the patch's upper edge [m]."""
+    def patch_edge(self) -> float:
+        """Level distance along the ramp of the centre of a ball that touches the patch's upper edge [m]."""
         return self.along(self.resting(self.ramp.patch[1]))
 
     @cached_property
-    def start(self) -> float:
-        """Where to let the ball go [m], negative on the near side."""
+    def release_place(self) -> float:
+        """Place of the right release [m], negative on the near side."""
         return -self.ramp.at_height(self.ramp.release(self.ball.radius))
 
     @property
     def brim(self) -> float:
-        """The highest place of release [m], negative on the near side."""
-        return BRIM - self.ramp.top
+        """Highest place of release [m], negative on the near side; 15 mm from the top a ball still lies on the ramp."""
+        return 0.015 - self.ramp.top

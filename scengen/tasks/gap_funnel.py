@@ -9,20 +9,20 @@
                     #
                     #
 
-Bottleneck: the ball lies beside the gap's axis, and what the hand does ends at the wall. So the ball has to be brought
-before the gap first, at rest, and then sent on: straight, and fast enough to roll as far as the zone by itself.
+Bottleneck: the ball lies beside the gap's axis, and the hand must stop at the wall. So the robot must first bring the
+ball to rest in front of the gap, and then push it: straight, and fast enough to roll as far as the zone by itself.
 
-A ball that rolls slows down by 5/7 c g, c being its resistance to rolling: from v it gets 7 v^2 / (10 c g) far.
+A ball that rolls slows down by 5/7 c g, where c is its rolling resistance: at speed v it rolls 7 v^2 / (10 c g).
 
 Decisions where the paper (App. B, T21) is silent:
 
-* A ball that strikes the wall loses the episode. Else it is rolled along the wall until it finds the gap, and whoever
-  has aimed badly tries again for nothing.
-* It may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass over it
-  while the jaw holds the ball on the table.
+* A ball that strikes the wall ends the episode. Otherwise a badly aimed ball could roll along the wall until it finds
+  the gap, or be tried again.
+* The ball may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass
+  over it while the jaw holds the ball on the table.
 * "Outside the robot's workspace" is beyond a bound that no posture of the arm exceeds (`panda.REACH`).
-* A kerb behind the zone stops what is too fast. Without it the speed would have to be right to 8 %, and a finger gives
-  a ball its own speed to 10 %: it rolls ahead of a hand that is not quite even.
+* A kerb behind the zone stops a ball that is too fast. Without it the speed would have to be right to 8 %, and the
+  speed of a ball that a finger pushes scatters by 10 %: it rolls ahead of a hand that moves unevenly.
 """
 
 import math
@@ -62,32 +62,20 @@ from ..skills.motion import (
     wait,
 )
 
-STILL = 0.02
-"""Speed below which the ball lies [m/s]: it stops within 3 mm."""
-LIFTED = 0.02
-"""How far the ball's centre may rise [m]: more than a kerb gives it, less than a wall asks for."""
-ASIDE = 0.06
-"""How far the ball lies from the gap's axis at least [m]: the jaw reaches 40 mm from there, the gap 36 mm."""
-SPARE = 1.08
-"""How much wider than the ball the gap is, at least: the hand is exact to 2 mm."""
-BEHIND, AIR = 0.03, 0.008
-"""Of the hand behind the ball at first, and before the wall in the end [m]."""
-ROOM = 0.10
-"""Way on which the hand gets as fast as the ball must be, at least [m]."""
-LOW = TIP_BELOW + 0.010
-"""Height of the grip site over the table when it pushes [m]: at the ball's middle the fingers are flat."""
-OVER = 0.09
-"""How far the hand rises over the ball [m]."""
-MORE, FASTEST = 1.1, 0.27
-"""Share of the speed that the ball needs, with which it is pushed; and the fastest that the hand goes [m/s]."""
-BACK = 3.0
-"""How far the hand moves aside for each length that the ball is off its way: it drags the ball along with it."""
-SOFTLY, FASTER = 0.04, 0.25
-"""Speed at which the hand comes up to the ball [m/s], and how much faster it gets behind it [m/s^2]."""
-EXACT = 0.001
-"""How near the hand is to where it starts to push [m]: what is left it makes up on the way."""
-DRAG = Pace(0.15, 0.002)
-"""Of the ball in the jaw, over the table."""
+REST_SPEED = 0.02
+"""Speed below which the ball counts as at rest [m/s]: it stops within 3 mm."""
+MAX_RISE = 0.02
+"""Height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall."""
+STANDOFF_DISTANCE = 0.03
+"""Gap between hand and ball before a push, and distance that the hand goes back and up after it [m]."""
+APPROACH_HEIGHT = 0.09
+"""Height over the ball from which the hand comes down [m]."""
+SPEED_FACTOR = 1.1
+"""Speed of a push over the speed that the ball needs."""
+MAX_PUSH_SPEED = 0.27
+"""Largest speed of a push [m/s]."""
+CONTACT_SPEED = 0.04
+"""Speed at which the hand approaches the ball [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,17 +86,17 @@ class GapFunnel(Scenario):
 
     wall_x: float = param(0.15, "m", 0.0, 0.3)
     gap_y: float = param(0.0, "m", -0.35, 0.35)
-    """Where the middle of the gap is."""
+    """Place of the middle of the gap."""
     yaw: float = param(0.0, "deg", -45.0, 45.0)
-    """Where the gap leads; at 0 straight away from the robot."""
+    """Direction in which the gap leads; 0 is straight away from the robot."""
     before: float = param(0.24, "m", 0.05, 0.4)
     """Distance of the ball from the middle of the wall."""
     offset: float = param(0.12, "m", -0.4, 0.4)
-    """Of the ball from the gap's axis, to the left."""
+    """Offset of the ball from the gap's axis, to the left."""
     run: float = param(0.195, "m", 0.05, 0.3)
-    """From the middle of the gap to that of the zone."""
+    """Distance from the middle of the gap to that of the zone."""
     rolling: float = param(0.008, "1", 0.003, 0.1)
-    """Resistance to rolling, as a share of the load."""
+    """Rolling resistance, as a share of the load."""
     wall: GapWall = GapWall()
     ball: Ball = Ball(radius=0.025, density=600.0, friction=0.3, rgba=(0.90, 0.45, 0.10, 1.0))
     zone: Patch = Patch(size=0.08)
@@ -118,7 +106,7 @@ class GapFunnel(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene, yaw = table(), math.radians(self.yaw)
-        left, right = (self._to_edge(side) for side in (1.0, -1.0))
+        left, right = (self._edge_distance(side) for side in (1.0, -1.0))
         place(scene, replace(self.wall, left=left, right=right), "wall", self.gap_at, yaw, free=False)
         place(scene, self.zone, "zone", self.zone_at, yaw, free=False)
         self._add_kerb(scene)
@@ -126,7 +114,7 @@ class GapFunnel(Scenario):
         return scene
 
     def _add_kerb(self, scene: mujoco.MjSpec) -> None:
-        """The kerb is part of the table: whether a ball came to it says nothing of the way that it took."""
+        """Add the kerb to the table's body: contact with the kerb says nothing about the way that a ball took."""
         top = scene.body("table")
         self.kerb.fill(top, scene)
         bar = top.geoms[-1]
@@ -135,63 +123,66 @@ class GapFunnel(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        half, high = self.zone.size / 2, self.ball.radius + LIFTED
+        half, high = self.zone.size / 2, self.ball.radius + MAX_RISE
         within = inside(world, "ball", "zone", np.array([-half, -half, 0.0]), np.array([half, half, high]))
-        return within and still(world, "ball", STILL) and not world.touching(ROBOT, "ball")
+        return within and still(world, "ball", REST_SPEED) and not world.touching(ROBOT, "ball")
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "ball"):
             return "the ball fell off the table"
         if world.touched("ball", "wall"):
             return "the ball struck the wall"
-        return "the ball was lifted" if world.com("ball")[2] - self.start[2] > LIFTED else None
+        return "the ball was lifted" if world.com("ball")[2] - self.start[2] > MAX_RISE else None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Draw the ball before the gap, let it lie, and push it through."""
-        yield from self.align(world, self.gap_at - self.before * self.n)
-        yield from self.send(world, self.gap_at, MORE)
+        """Draw the ball in front of the gap, release it, and push it through."""
+        yield from self.align(world, self.gap_at - self.before * self.normal)
+        yield from self.send(world, self.gap_at, SPEED_FACTOR)
         yield from wait(world.arm, lambda: self.success(world), give_up=6.0)
 
     def align(self, world: World, spot: Vec3) -> Plan:
-        """Take the ball across the gap's axis, draw it over the table to a spot, and let go."""
+        """Grasp the ball across the gap's axis, draw it over the table to a spot, and release it."""
         arm = world.arm
-        yield from pick(arm, world.com("ball"), self.t, above=OVER, lift=0.0)
-        yield from carry(arm, "ball", [spot[0], spot[1], world.com("ball")[2]], pace=DRAG)
+        yield from pick(arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=0.0)
+        yield from carry(arm, "ball", [spot[0], spot[1], world.com("ball")[2]], pace=Pace(0.15, 0.002))
         yield from hold(arm, 0.2)
         yield from release(arm, 0.3)
-        yield from retreat(arm, OVER)
+        yield from retreat(arm, APPROACH_HEIGHT)
 
-    def send(self, world: World, spot: Vec3, share: float) -> Plan:
-        """Push the ball from where it is towards a spot, until the hand is before the wall.
+    def send(self, world: World, spot: Vec3, factor: float) -> Plan:
+        """Push the ball towards a spot, until the hand is in front of the wall.
 
-        Slowly up to the ball, and then evenly faster: a blow makes it roll ahead, at a speed that nobody chose.
+        The hand approaches slowly and then accelerates evenly: after a blow the ball rolls ahead at an unknown speed.
 
         Args:
-            share: of the speed with which it comes to rest in the zone, wherever it leaves the hand.
+            spot: place to which the ball is pushed [m].
+            factor: speed of the push over that from which the ball comes to rest in the zone.
         """
         arm, way = world.arm, (spot - world.com("ball")) * [1.0, 1.0, 0.0]
         along = way / np.linalg.norm(way)
-        start = world.com("ball") - (self.ball.radius + FINGER_ACROSS + BEHIND) * along
-        start[2] = TABLE_TOP + LOW
+        start = world.com("ball") - (self.ball.radius + FINGER_ACROSS + STANDOFF_DISTANCE) * along
+        start[2] = TABLE_TOP + (TIP_BELOW + 0.010)  # at the height of the ball's middle the fingers are flat
         side = np.array([-along[1], along[0], 0.0])
         rot = closing_along(arm, side)
-        yield from go_to(arm, start + OVER * UP, rot, COARSE, CLOSED)
+        yield from go_to(arm, start + APPROACH_HEIGHT * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot)
-        yield from until(stay(arm, start, rot, lambda: math.dist(arm.hand, start) < EXACT), self._late(world))
-        stop, pace = self.stop + PALM_ALONG * abs(float(along @ self.t)), SOFTLY
-        while (arm.hand - self.gap_at) @ self.n < -stop:
-            if pace > SOFTLY or world.touching(ROBOT, "ball"):
-                goal = share * self.speed_for(float((self.zone_at - world.com("ball")) @ self.n))
-                pace = min(goal, FASTEST, pace + FASTER * Loop.PERIOD)
+        precise = stay(arm, start, rot, lambda: math.dist(arm.hand, start) < 0.001)
+        yield from until(precise, self._after_a_second(world))  # the push corrects the remaining error
+        stop, pace = self.stop_distance + PALM_ALONG * abs(float(along @ self.tangent)), CONTACT_SPEED
+        while (arm.hand - self.gap_at) @ self.normal < -stop:
+            if pace > CONTACT_SPEED or world.touching(ROBOT, "ball"):
+                goal = factor * self.speed_for(float((self.zone_at - world.com("ball")) @ self.normal))
+                pace = min(goal, MAX_PUSH_SPEED, pace + 0.25 * Loop.PERIOD)  # [m/s^2]
             off = float((world.com("ball") - spot) @ side)
-            on_line = start + (arm.hand - start) @ along * along  # no error along the way: making it up were a blow
-            yield steer(arm, on_line - BACK * off * side, pace * along, between(arm.hand_rot, rot), CLOSED)
-        yield from go_to(arm, arm.hand + BEHIND * (UP - along), pace=COARSE)
+            on_line = start + (arm.hand - start) @ along * along  # an error along the way is not corrected: no blow
+            # The hand moves aside by 3 times the ball's error, and drags the ball along.
+            yield steer(arm, on_line - 3.0 * off * side, pace * along, between(arm.hand_rot, rot), CLOSED)
+        yield from go_to(arm, arm.hand + STANDOFF_DISTANCE * (UP - along), pace=COARSE)
 
-    def _late(self, world: World) -> Condition:
-        """Whether a second has passed from now on."""
+    def _after_a_second(self, world: World) -> Condition:
+        """A condition that holds from one second after this call."""
         end = world.time + 1.0
         return lambda: world.time > end
 
@@ -199,30 +190,31 @@ class GapFunnel(Scenario):
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
-            "straight_ahead": Shortcut(lambda world: self.send(world, world.com("ball") + self.n, MORE)),
-            "straight_at_the_zone": Shortcut(lambda world: self.send(world, self.zone_at, MORE)),
-            "aslant_through_the_gap": Shortcut(lambda world: self.send(world, self.gap_at, MORE)),
+            "straight_ahead": Shortcut(lambda world: self.send(world, world.com("ball") + self.normal, SPEED_FACTOR)),
+            "straight_at_the_zone": Shortcut(lambda world: self.send(world, self.zone_at, SPEED_FACTOR)),
+            "aslant_through_the_gap": Shortcut(lambda world: self.send(world, self.gap_at, SPEED_FACTOR)),
             "too_slow": Shortcut(self._too_slow, to_rest=True),
             "over_the_wall": Shortcut(self._over),
         }
 
     def _too_slow(self, world: World) -> Plan:
-        """At a speed with which it gets half as far as the zone's middle, behind the gap."""
-        yield from self.align(world, self.gap_at - self.before * self.n)
+        """Push it at a speed at which it rolls half as far as the zone's middle."""
+        yield from self.align(world, self.gap_at - self.before * self.normal)
         yield from self.send(world, self.gap_at, math.sqrt(0.5))
 
     def _over(self, world: World) -> Plan:
-        """Carry it over the wall, as far as the arm gets, and let it fall there."""
-        yield from pick(world.arm, world.com("ball"), self.t, above=OVER, lift=self.wall.height + OVER)
-        yield from carry(world.arm, "ball", self.gap_at + 0.1 * self.n + (self.wall.height + OVER) * UP, pace=STEADY)
+        """Carry it over the wall, as far as the arm reaches, and release it there."""
+        height = self.wall.height + APPROACH_HEIGHT
+        yield from pick(world.arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=height)
+        yield from carry(world.arm, "ball", self.gap_at + 0.1 * self.normal + height * UP, pace=STEADY)
         yield from release(world.arm)
 
     def answer(self) -> Answer:
-        """Where the gap is along y [m]. One try: a ball beside it strikes the wall."""
+        """Place of the gap along y [m]. One try: a ball beside it strikes the wall."""
 
         def act(world: World, place: float) -> Plan:
-            yield from self.align(world, self.gap_at - self.before * self.n + (place - self.gap_y) * self.t)
-            yield from self.send(world, world.com("ball") + self.n, MORE)
+            yield from self.align(world, self.gap_at - self.before * self.normal + (place - self.gap_y) * self.tangent)
+            yield from self.send(world, world.com("ball") + self.normal, SPEED_FACTOR)
 
         def right(place: float) -> bool:
             return abs(place - self.gap_y) * math.cos(math.radians(self.yaw)) < self.wall.gap / 2 - self.ball.radius
@@ -236,30 +228,33 @@ class GapFunnel(Scenario):
 
     def constraints(self) -> Iterator[Refutation | None]:
         wide, gap = 2 * self.ball.radius, self.wall.gap
-        yield require(wide * SPARE <= gap, "the ball does not fit through the gap", gap=gap, ball=wide)
+        # The hand is exact to 2 mm.
+        yield require(wide * 1.08 <= gap, "the ball does not fit through the gap", gap=gap, ball=wide)
         yield require(wide + 0.010 <= OPEN_GAP, "the jaw cannot take the ball", ball=wide, opening=OPEN_GAP)
-        yield require(abs(self.offset) >= ASIDE, "the ball lies before the gap already", offset=self.offset)
+        # At 60 mm: the jaw reaches 40 mm from the ball, the gap 36 mm from its axis.
+        yield require(abs(self.offset) >= 0.06, "the ball lies before the gap already", offset=self.offset)
         yield on_table("the ball", self.start, margin=self.ball.radius)
-        jambs = [self.gap_at + side * gap * self.t for side in (-1, 1)]
+        jambs = [self.gap_at + side * gap * self.tangent for side in (-1, 1)]
         yield on_table("the gap", jambs)
         half = self.zone.size / 2
-        square = [self.zone_at + half * (a * self.n + b * self.t) for a in (-1, 1) for b in (-1, 1)]
-        bar = [self.kerb_at + a * self.kerb.width / 2 * self.n for a in (-1, 1)]
+        square = [self.zone_at + half * (a * self.normal + b * self.tangent) for a in (-1, 1) for b in (-1, 1)]
+        bar = [self.kerb_at + a * self.kerb.width / 2 * self.normal for a in (-1, 1)]
         yield on_table("the zone or the kerb", [*square, *bar])
         away = min(shortfall(corner + self.ball.radius * UP) for corner in square)
         yield require(away > 0, "the hand may come to the zone", beyond_reach=away)
-        room = self.before - self.stop - self.ball.radius
-        yield require(room >= ROOM, "the hand has no room to push", room=room, needed=ROOM)
-        yield require(self.needed <= FASTEST, "the hand is too slow", needed=self.needed, fastest=FASTEST)
-        low = self.arriving < self.jumping
-        yield require(low, "the ball jumps over the kerb", speed=self.arriving, jumping=self.jumping)
-        hand = [self.start, self.gap_at - self.before * self.n, self.gap_at - self.stop * self.n]
+        room, needed = self.before - self.stop_distance - self.ball.radius, 0.10  # [m] in which the hand accelerates
+        yield require(room >= needed, "the hand has no room to push", room=room, needed=needed)
+        needed, fastest = self.needed_speed, MAX_PUSH_SPEED
+        yield require(needed <= fastest, "the hand is too slow", needed=needed, fastest=fastest)
+        low = self.arrival_speed < self.jump_speed
+        yield require(low, "the ball jumps over the kerb", speed=self.arrival_speed, jumping=self.jump_speed)
+        hand = [self.start, self.gap_at - self.before * self.normal, self.gap_at - self.stop_distance * self.normal]
         yield within_reach("the ball, or the gap", *hand)
 
     def features(self) -> Mapping[str, float]:
-        """The speed that is needed [m/s], the air in the gap over the radius, and where the ball is to go [m, deg]."""
+        """Speed that the ball needs [m/s], clearance over radius, offset of the ball [m], angle of the gap [deg]."""
         return {
-            "speed": self.needed,
+            "speed": self.needed_speed,
             "air_over_radius": self.wall.gap / 2 / self.ball.radius - 1,
             "aside": self.offset,
             "heading": self.yaw,
@@ -268,66 +263,67 @@ class GapFunnel(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def n(self) -> Vec3:
-        """Where the gap leads."""
+    def normal(self) -> Vec3:
+        """Unit vector in which the gap leads."""
         return heading(self.yaw)
 
     @property
-    def t(self) -> Vec3:
-        """Along the wall, to the left."""
+    def tangent(self) -> Vec3:
+        """Unit vector along the wall, to the left."""
         return heading(self.yaw + 90.0)
 
     @property
     def gap_at(self) -> Vec3:
-        """The middle of the gap, on the table [m]."""
+        """Middle of the gap, on the table [m]."""
         return np.array([self.wall_x, self.gap_y, TABLE_TOP])
 
     @property
     def start(self) -> Vec3:
-        """Of the ball [m]."""
-        return self.gap_at - self.before * self.n + self.offset * self.t + self.ball.radius * UP
+        """Centre of the ball at the start [m]."""
+        return self.gap_at - self.before * self.normal + self.offset * self.tangent + self.ball.radius * UP
 
     @property
     def zone_at(self) -> Vec3:
-        """The middle of the zone [m]."""
-        return self.gap_at + self.run * self.n
+        """Middle of the zone [m]."""
+        return self.gap_at + self.run * self.normal
 
     @property
     def kerb_at(self) -> Vec3:
-        """The middle of the kerb [m]: it stands where the zone ends."""
-        return self.zone_at + (self.zone.size / 2 + self.kerb.width / 2) * self.n
+        """Middle of the kerb, at the end of the zone [m]."""
+        return self.zone_at + (self.zone.size / 2 + self.kerb.width / 2) * self.normal
 
     @property
-    def stop(self) -> float:
-        """How far before the middle of the wall the hand stops [m]."""
-        return self.wall.thickness / 2 + PALM_ACROSS + AIR
+    def stop_distance(self) -> float:
+        """Distance from the middle of the wall at which the hand stops [m], 8 mm before the palm touches it."""
+        return self.wall.thickness / 2 + PALM_ACROSS + 0.008
 
     def speed_for(self, way: float) -> float:
-        """From which the ball rolls so far [m/s]."""
+        """Speed from which the ball rolls a distance [m/s]."""
         return math.sqrt(10 / 7 * self.rolling * GRAVITY * max(0.0, way))
 
     @property
-    def needed(self) -> float:
-        """Speed with which a ball that the hand lets go comes to rest in the middle of the zone [m/s]."""
-        return self.speed_for(self.run + self.stop - self.ball.radius - FINGER_ACROSS)
+    def needed_speed(self) -> float:
+        """Speed at which a ball must leave the hand to come to rest in the middle of the zone [m/s]."""
+        return self.speed_for(self.run + self.stop_distance - self.ball.radius - FINGER_ACROSS)
 
     @property
-    def arriving(self) -> float:
-        """Of the fastest ball at the kerb [m/s]."""
+    def arrival_speed(self) -> float:
+        """Speed of the fastest ball at the kerb [m/s]."""
         on = self.zone.size / 2 - self.ball.radius
-        return math.sqrt(max(0.0, FASTEST**2 - self.needed**2 - self.speed_for(on) ** 2))
+        return math.sqrt(max(0.0, MAX_PUSH_SPEED**2 - self.needed_speed**2 - self.speed_for(on) ** 2))
 
     @property
-    def jumping(self) -> float:
+    def jump_speed(self) -> float:
         """Speed at which a rolling ball gets over the kerb [m/s].
 
-        It turns about the kerb's edge with what is left of its spin about it, and has to rise by the kerb's height.
+        The ball turns about the kerb's edge with the remaining part of its spin, and must rise by the kerb's height.
         """
         share = self.kerb.height / self.ball.radius
         return math.sqrt(10 / 7 * GRAVITY * self.kerb.height) / (1 - 5 / 7 * share) if share < 1 else math.inf
 
-    def _to_edge(self, side: float) -> float:
-        """From the gap to where the table ends, along the wall [m]."""
-        d = side * self.t[:2]
-        far = [(math.copysign(TABLE_HALF, u) - p) / u for p, u in zip(self.gap_at, d, strict=False) if abs(u) > 1e-6]
-        return min(far) - self.wall.gap / 2
+    def _edge_distance(self, side: float) -> float:
+        """Distance from the gap to the edge of the table, along the wall to one side [m]."""
+        along = side * self.tangent[:2]
+        axes = zip(self.gap_at, along, strict=False)
+        ways = [(math.copysign(TABLE_HALF, u) - p) / u for p, u in axes if abs(u) > 1e-6]
+        return min(ways) - self.wall.gap / 2

@@ -5,24 +5,26 @@
     --------------|--------------
                  / \\
 
-Bottleneck: the place of the counterweight follows from three masses that nobody can see. The tilt tells.
+Bottleneck: the place of the counterweight follows from three masses that are not visible. The tilt reveals them.
 
 The seesaw is a balance, not a plank on an edge (assets/seesaw.py): between stops at 10 deg its tilt is proportional to
 the excess moment. The counterweight may stand within tan(5 deg) * stiffness / (its mass), in training some 5 to 8 mm,
-of the balancing place, which lies anywhere on an arm of 0.36 m. Chance: a guess levels the deck in 7 % of training,
-one of three in 19 %, at best, for who sees the geometry and knows how masses are distributed; so does who weighs.
+of the balancing place, which can be anywhere on an arm of 0.36 m. Chance, for a policy that sees the geometry and knows
+how masses are distributed: the best single guess levels the deck in 7 % of training, one of three guesses in 19 %.
+Weighing the counterweight does not help.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 
-* All masses are hidden; blocks and beam look the same whatever they weigh. What can be seen, may be used: geometry,
-  and which side is down. The oracle starts in the middle of the raised arm and learns only from tilts.
-* A place that anybody would try first must not balance: the mirror image of the target's, and the one that follows
-  if blocks that look alike weigh alike.
-* The beam weighs in: its middle lies off the axle. It can even outweigh the target, and then both blocks belong on
-  the same arm.
-* Level counts only hands off, with both blocks standing on the deck and nowhere else: else the hand could hold the
-  beam, or the counterweight could prop it up from the table. It must last: the beam also sweeps through level on its
-  way from stop to stop. Who touches the target has lost: moved by a few mm it would level what a guess has missed.
+* All masses are hidden; blocks and beam look the same whatever they weigh. Visible facts may be used: geometry, and
+  which side is down. The oracle starts in the middle of the raised arm and learns only from tilts.
+* An obvious first place must not balance: the mirror image of the target's, and the one that follows if blocks that
+  look alike weigh alike.
+* The beam counts: its middle is off the axle. It can even outweigh the target, and then both blocks belong on the same
+  arm.
+* The deck must be level without the hand, with both blocks standing on the deck and nowhere else: otherwise the hand
+  could hold the beam, or the counterweight could prop it up from the table. It must stay level: the beam also sweeps
+  through level on its way from stop to stop. Touching the target ends the episode: moved by a few mm it would level
+  what a guess has missed.
 """
 
 import math
@@ -46,27 +48,25 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat
 
-LEVEL = math.radians(5.0)
-"""Tilt that counts as level [rad] (paper, App. B, T19)."""
-SURELY = math.radians(4.5)
-"""Tilt with which the oracle is content [rad]: a beam that creeps by 0.01 rad/s may go on for another 0.4 deg."""
-CLEARLY = math.radians(7.0)
-"""Tilt that a tempting place must at least cause [rad]: level, and what a misplacement by 2 mm can change."""
-STAYS = 0.006
-"""How far the target may be from where it stood on the deck [m]. A counterweight that is let go far out throws the deck
+MAX_TILT = math.radians(5.0)
+"""Largest tilt that counts as level [rad] (paper, App. B, T19)."""
+SAFE_TILT = math.radians(4.5)
+"""Tilt at which the oracle stops [rad]: a beam that creeps by 0.01 rad/s may move on by another 0.4 deg."""
+MIN_SHORTCUT_TILT = math.radians(7.0)
+"""Least tilt that a tempting place must cause [rad]: level, and the change that a misplacement by 2 mm can cause."""
+TARGET_TOLERANCE = 0.006
+"""Distance that the target may move along the deck [m]. A counterweight that is released far out throws the deck
 against its stop, and the target hops by up to 3 mm; a hand that strikes the deck three times moves it by up to 7."""
-ROOM = 0.008
-"""Least deck on which the counterweight balances [m]: 4 mm to either side, three times the error of a placement."""
-AMISS = 0.006
-"""How far from balance, at least, a counterweight is that puts the deck on its stop [m]: 1.5 of the least margin."""
-INNER, BESIDE = 0.055, 0.056
-"""Least distance of the middle of a block from the axle, where the palm passes the posts; of two blocks [m]."""
-RIM, AIR = 0.004, 0.006
-"""Least deck beyond a block; least air between a deck and the palm of a hand that takes a block beside it [m]."""
-EXPECTED = {"seesaw.mass": 0.25, "target.mass": 0.30, "weight.mass": 0.30}
-"""What one would expect without having tried [kg]: a common beam, and blocks that look alike weighing alike."""
-TRANSIT = TABLE_TOP + 0.25
-"""Height of the hand when it carries a block across [m]: 20 mm over a block that stands 0.35 m out on a raised arm."""
+MIN_STOP_ERROR = 0.006
+"""Least distance from balance of a counterweight that puts the deck on its stop [m]: 1.5 times the least margin."""
+MIN_LEVER = 0.055
+"""Least distance of the middle of a block from the axle, at which the palm passes the posts [m]."""
+DECK_MARGIN = 0.004
+"""Least length of deck beyond a block [m]."""
+EXPECTED_MASSES = {"seesaw.mass": 0.25, "target.mass": 0.30, "weight.mass": 0.30}
+"""Masses that a guess assumes [kg]: a common beam, and blocks that look alike weighing alike."""
+CARRY_HEIGHT = 0.25
+"""Height over the table of a hand that carries a block [m]: 20 mm over a block 0.35 m out on a raised arm."""
 BEAM = "seesaw/beam"
 
 
@@ -75,7 +75,7 @@ class SeesawBalance(Scenario):
     """A seesaw with the target on its deck, and a counterweight on the table in front of it."""
 
     HOLD = 3.0
-    """How long the deck must stay level [s]. On its way to 6 deg on the other side it creeps through +-5 deg in
+    """Time for which the deck must stay level [s]. On its way to 6 deg on the other side it creeps through +-5 deg in
     (damping / stiffness) ln(11 / 1) = 0.12 / 0.15 x 2.4 = 1.9 s, for the softest seesaw of training."""
 
     x: float = param(0.0, "m", -0.4, 0.4)
@@ -83,11 +83,11 @@ class SeesawBalance(Scenario):
     heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
     """Direction of +s."""
     offset: float = param(0.14, "m", -0.35, 0.35)
-    """Of the target from the axle, along the deck."""
+    """Offset of the target from the axle, along the deck."""
     weight_x: float = param(-0.17, "m", -0.4, 0.4)
     weight_y: float = param(0.0, "m", -0.4, 0.4)
     weight_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Against the heading."""
+    """Angle of the counterweight to the heading."""
     seesaw: Seesaw = Seesaw()
     target: Block = Block(rgba=(0.78, 0.10, 0.10, 1.0))
     weight: Block = Block()
@@ -96,7 +96,7 @@ class SeesawBalance(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene, yaw, tilt = table(), math.radians(self.heading), self.tilt_at(None)
-        # Under Newton's method blocks chatter on a deck that turns freely, and creep by 1 mm/s when it leans by 5 deg.
+        # With Newton's method blocks chatter on a deck that turns freely, and creep by 1 mm/s when it leans by 5 deg.
         scene.option.solver = mujoco.mjtSolver.mjSOL_CG
         place(scene, replace(self.seesaw, tilt=tilt), "seesaw", self.foot, yaw, free=False)
         place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
@@ -109,8 +109,8 @@ class SeesawBalance(Scenario):
     def success(self, world: World) -> bool:
         blocks = world.free_bodies
         return (
-            world.tilt(BEAM) <= LEVEL
-            and abs(self.along(world, "target") - self.offset) <= STAYS
+            world.tilt(BEAM) <= MAX_TILT
+            and abs(self.along(world, "target") - self.offset) <= TARGET_TOLERANCE
             and all(world.touching_bodies(block).difference(blocks) == {BEAM} for block in blocks)
             and not world.touching(ROBOT, BEAM)
         )
@@ -122,7 +122,7 @@ class SeesawBalance(Scenario):
         return "a block fell" if world.touched("target", "table") or fallen(world, *world.free_bodies) else None
 
     def along(self, world: World, block: str) -> float:
-        """Where a block is, measured along the deck from the axle [m]."""
+        """Place of a block along the deck, from the axle [m]."""
         return float(world.rot(BEAM)[:, 0] @ (world.pos(block) - world.pos(BEAM)))
 
     def tilt(self, world: World) -> float:
@@ -132,41 +132,41 @@ class SeesawBalance(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Put, let go, look; then narrow the stretch of the arm that is left, until the deck is level. Reads no mass.
+        """Put the counterweight down, look, and narrow the remaining stretch of the arm until the deck is level.
 
-        A deck on its stop says which way to go, and `AMISS` how far at least. Between the stops the tilt is
-        proportional to the error, by a factor that is half to twice the one that one would expect.
+        Reads no mass. A deck on its stop shows the direction of the error, which is at least `MIN_STOP_ERROR`. Between
+        the stops the tilt is proportional to the error, by a factor that is half to twice the expected one.
         """
         low, high = (self.nearest(self.raised, end) for end in (-1.0, 1.0))
         along = (low + high) / 2
         while True:
             yield from self.put_at(world, self.nearest(self.raised, along))
             tilt, stood = self.tilt(world), self.along(world, "weight")
-            if abs(tilt) <= SURELY:
+            if abs(tilt) <= SAFE_TILT:
                 return
             stopped = abs(tilt) > self.seesaw.steepest - math.radians(1.0)
-            past = stood - math.copysign(AMISS if stopped else 0.0, tilt)
+            past = stood - math.copysign(MIN_STOP_ERROR if stopped else 0.0, tilt)
             low, high = (low, min(high, past)) if tilt > 0 else (max(low, past), high)
             if high - low < 0.004:
                 raise GaveUp("the balancing place was not found")
-            there = stood - math.tan(tilt) / math.tan(LEVEL) * with_values(self, EXPECTED).margin
+            there = stood - math.tan(tilt) / math.tan(MAX_TILT) * with_values(self, EXPECTED_MASSES).margin
             along = (low + high) / 2 if stopped or not low < there < high else there
 
     def put_at(self, world: World, along: float, block: str = "weight") -> Plan:
-        """Put a block on the deck from wherever it stands, let go, and see whether the deck stays level."""
+        """Put a block on the deck, release it, and wait until the deck is at rest; if it is level, wait for `HOLD`."""
         arm, at = world.arm, world.com(block)
-        high = TRANSIT - at[2]
-        yield from go_to(arm, at + high * UP, self.down, COARSE, OPEN)
-        yield from pick(arm, at, closing=world.rot(block)[:, 1], above=high, lift=high, pace=STEADY)
+        lift = TABLE_TOP + CARRY_HEIGHT - at[2]
+        yield from go_to(arm, at + lift * UP, self.down, COARSE, OPEN)
+        yield from pick(arm, at, closing=world.rot(block)[:, 1], above=lift, lift=lift, pace=STEADY)
         spot = self.on_deck(along, self.tilt(world))
-        yield from go_to(arm, [*spot[:2], TRANSIT], self.down, COARSE)
+        yield from go_to(arm, [*spot[:2], TABLE_TOP + CARRY_HEIGHT], self.down, COARSE)
         yield from put(arm, block, spot + world.com(block) - world.pos(block), on=BEAM, hover=0.02)
         yield from retreat(arm, 0.08)
         before = math.inf
         while abs(self.tilt(world) - before) > 0.002:  # a deck that bounces is at rest for a moment
             before = self.tilt(world)
             yield from hold(arm, 0.2)
-        if world.tilt(BEAM) <= SURELY:
+        if world.tilt(BEAM) <= SAFE_TILT:
             yield from hold(arm, self.HOLD)
 
     # --- shortcuts and ablations ------------------------------------------------------------
@@ -180,11 +180,11 @@ class SeesawBalance(Scenario):
         }
 
     def _hold_level(self, world: World) -> Plan:
-        """Put the counterweight in the mirror image and hold the deck level by hand: level it is, but not balanced."""
+        """Put the counterweight at the mirror image and hold the deck level by hand: it is level, but not balanced."""
         yield from self.put_at(world, self.mirror)
         arm, side = world.arm, -1 if self.tilt(world) > 0 else 1
         spot = self.on_deck(side * (self.seesaw.arm(side) - 0.02), self.tilt(world))
-        yield from go_to(arm, [*spot[:2], TRANSIT], pace=COARSE, grip=CLOSED)
+        yield from go_to(arm, [*spot[:2], TABLE_TOP + CARRY_HEIGHT], pace=COARSE, grip=CLOSED)
         yield from push(arm, -0.08 * UP, until=lambda: side * self.tilt(world) > 0)
         yield from hold(arm, 1.2 * self.HOLD)
         yield from retreat(arm, 0.08)
@@ -192,19 +192,19 @@ class SeesawBalance(Scenario):
     def _shift(self, world: World) -> Plan:
         """Miss the balancing place by a little, and level the deck by moving the target instead."""
         miss = 1.4 * self.margin
-        moved = min(STAYS - 0.002, miss * self.weight.mass / self.target.mass)
+        moved = min(TARGET_TOLERANCE - 0.002, miss * self.weight.mass / self.target.mass)
         yield from self.put_at(world, self.balance - math.copysign(miss, self.balance))
         yield from self.put_at(world, self.offset + math.copysign(moved, self.balance), "target")
 
     def answer(self) -> Answer:
-        """A place on the raised arm: by how much farther out than the target [m]. No share of the target's offset or
-        of the arm, no distance from the axle and no lever law with fixed ratios of masses balances more of training."""
+        """Place on the raised arm, by its distance beyond the target's [m]. No share of the target's offset or of the
+        arm, no distance from the axle and no lever law with fixed ratios of masses balances more of training."""
 
         def at(beyond: float) -> float:
             return self.nearest(self.raised, self.raised * (abs(self.offset) + beyond))
 
         beyond = tuple(round(0.01 * k, 2) for k in range(-12, 21))
-        return Answer(beyond, lambda w, b: self.put_at(w, at(b)), lambda b: abs(self.tilt_at(at(b))) <= LEVEL)
+        return Answer(beyond, lambda w, b: self.put_at(w, at(b)), lambda b: abs(self.tilt_at(at(b))) <= MAX_TILT)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         scene = self.build()
@@ -214,31 +214,32 @@ class SeesawBalance(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        """The arrangement, whatever weighs what; the lever law against the places that there are; no easy guess."""
+        """Checks of the arrangement whatever the masses, of the lever law against the free places, and of guesses."""
         deck, lever = self.seesaw, abs(self.offset)
-        far = deck.arm(1 if self.offset > 0 else -1) - self.target.width / 2 - RIM
-        yield require(INNER <= lever <= far, "the target has no room on its arm", offset=lever, farthest=far)
+        far = deck.arm(1 if self.offset > 0 else -1) - self.target.width / 2 - DECK_MARGIN
+        yield require(MIN_LEVER <= lever <= far, "the target has no room on its arm", offset=lever, farthest=far)
         yield on_table("the stand or the counterweight", [self.foot, self.start], margin=0.05)
         yield require((air := deck.height - deck.thickness - deck.dip) >= 0.0, "the deck strikes the table", air=air)
         beside = abs(float(heading(self.heading + 90.0) @ (self.start - self.foot))) - deck.width / 2 - PALM_ALONG
-        yield require(beside >= AIR, "the hand cannot take the counterweight beside the seesaw", beside=beside)
+        yield require(beside >= 0.006, "the hand cannot take the counterweight beside the seesaw", beside=beside)
         grip, need = max(deck.friction, min(self.target.friction, self.weight.friction)), 1.5 * math.tan(deck.steepest)
         yield require(grip >= need, "blocks slide on the tilted deck", friction=grip, needed=need)
         at, margin, spans = self.balance, self.margin, self.spans(self.raised)
         yield require(bool(spans), "the raised arm has no room", arm=deck.arm(self.raised))
         room = max(min(high, at + margin) - max(low, at - margin) for low, high in spans)
-        yield require(room >= ROOM, "no place on the deck balances with room to spare", balance=at, room=room)
+        # 4 mm to either side, three times the error of a placement.
+        yield require(room >= 0.008, "no place on the deck balances with room to spare", balance=at, room=room)
         yield within_reach("a place of the counterweight", self.on_deck(at, 0.0) + self.weight.height * UP, self.start)
         alone = abs(self.tilt_at(None))
         yield require(alone >= deck.steepest, "the seesaw is not on its stop at the start", tilt=alone)
         for what, along in ("mirror image of the target's place", self.mirror), ("first guess", self.guess):
             tilt = abs(self.tilt_at(along))
-            yield require(tilt >= CLEARLY, f"the {what} balances", tilt=tilt, needed=CLEARLY)
+            yield require(tilt >= MIN_SHORTCUT_TILT, f"the {what} balances", tilt=tilt, needed=MIN_SHORTCUT_TILT)
 
     def features(self) -> Mapping[str, float]:
-        """The torque to be balanced by that of the counterweight in the mirror image, and where it balances [m].
+        """Torque to be balanced over that of a counterweight at the mirror image, and balancing place [m].
 
-        And, in half lengths of the beam, how far the axle is off its middle, and the target off the axle.
+        And, in half lengths of the beam, the distances of the axle from its middle and of the target from the axle.
         """
         half = self.seesaw.length / 2
         return {
@@ -257,28 +258,28 @@ class SeesawBalance(Scenario):
 
     @property
     def raised(self) -> int:
-        """The arm that is up at the start and has to carry the counterweight, -1 or 1."""
+        """Arm that is up at the start and must carry the counterweight, -1 or 1."""
         return -1 if self.balance < 0 else 1
 
     @property
     def balance(self) -> float:
-        """Where the counterweight makes the deck exactly level, along s [m]: m_w s_w = -(m_t s_t + m_b s_b)."""
+        """Place at which the counterweight levels the deck exactly, along s [m]: m_w s_w = -(m_t s_t + m_b s_b)."""
         return -self.seesaw.moment([standing(self.target, self.offset)]) / self.weight.mass
 
     @property
     def margin(self) -> float:
-        """How far from `balance` the counterweight may stand for the tilt to stay within `LEVEL` [m]."""
+        """Distance from `balance` up to which the tilt stays within `MAX_TILT` [m]."""
         stiffness = self.seesaw.stiffness([standing(block, 0.0) for block in (self.target, self.weight)])
-        return math.tan(LEVEL) * stiffness / self.weight.mass
+        return math.tan(MAX_TILT) * stiffness / self.weight.mass
 
     @property
     def guess(self) -> float:
-        """The place on the raised arm that would balance, were all masses as one expects; as far as it reaches [m]."""
-        return self.nearest(self.raised, with_values(self, EXPECTED).balance)
+        """Place on the raised arm that would balance with `EXPECTED_MASSES`, as far as the arm reaches [m]."""
+        return self.nearest(self.raised, with_values(self, EXPECTED_MASSES).balance)
 
     @property
     def down(self) -> Mat3:
-        """A hand that closes along the axle, on faces that no tilt turns; the last joint has room to either side."""
+        """Orientation of a hand that closes along the axle, on faces that no tilt turns, far from joint 7's limits."""
         return facing_down(WRIST_MIDDLE + math.remainder(math.radians(self.heading) - WRIST_MIDDLE, math.pi))
 
     @property
@@ -293,15 +294,16 @@ class SeesawBalance(Scenario):
 
     @property
     def mirror(self) -> float:
-        """The place opposite to the target, as far as the deck reaches [m]."""
+        """Place opposite to the target, as far as the deck reaches [m]."""
         return self.nearest(-1 if self.offset > 0 else 1, -self.offset)
 
     def spans(self, side: int) -> list[tuple[float, float]]:
-        """Stretches of one arm, -1 or 1, where the middle of the counterweight can be [m]; see `Seesaw.stretches`."""
-        return self.seesaw.stretches(side, INNER, self.weight.width / 2 + RIM, taken=self.offset, apart=BESIDE)
+        """Stretches of one arm, -1 or 1, on which the counterweight's middle can be [m]; see `Seesaw.stretches`."""
+        half = self.weight.width / 2 + DECK_MARGIN
+        return self.seesaw.stretches(side, MIN_LEVER, half, taken=self.offset, apart=0.056)
 
     def nearest(self, side: int, along: float) -> float:
-        """The place on one arm, if it has any, that is nearest to `along` [m]."""
+        """Place on one arm that is nearest to `along` [m]."""
         near = [min(max(along, low), high) for low, high in self.spans(side)]
         return min(near, key=lambda at: abs(at - along))
 

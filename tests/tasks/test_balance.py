@@ -25,7 +25,7 @@ from scengen.attack.priors import fit
 from scengen.params import parameters
 from scengen.sim import scene_text
 from scengen.sim.world import IDLE, World
-from scengen.tasks.balance import LEVEL, Balance
+from scengen.tasks.balance import MAX_TILT, Balance
 
 MEDIUM, HARD = load_task("balance_medium"), load_task("balance_hard")
 BOTH = pytest.mark.parametrize("task", [MEDIUM, HARD], ids=lambda task: task.name)
@@ -157,7 +157,7 @@ class Lenient(Balance):
     """Asks for a level rod on the ridge and nothing else: it may be held, and lie along the ridge."""
 
     def success(self, world):
-        return world.tilt("rod") <= LEVEL and world.touching("rod", "stand/ridge")
+        return world.tilt("rod") <= MAX_TILT and world.touching("rod", "stand/ridge")
 
 
 @pytest.mark.parametrize("name", ["hold_it_there", "along_the_ridge"])
@@ -216,7 +216,7 @@ def test_a_rod_that_is_too_heavy_for_the_grip_hangs_and_is_refuted():
             world.step(action)
         tilts.append(world.tilt("rod"))
         assert (scenario.infeasible() is None) == (mass < 0.2)
-    assert tilts[0] < math.radians(3.0) < LEVEL < tilts[1]
+    assert tilts[0] < math.radians(3.0) < MAX_TILT < tilts[1]
 
 
 def test_the_rod_starts_on_the_table():

@@ -25,7 +25,7 @@ from scengen.assets.cage import SIDE, TOP, HoledCage
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.stool import Stool
 from scengen.episode import Episode
-from scengen.tasks.ball_cage_escape import SPARE, STEEPEST, STILL, BallCageEscape
+from scengen.tasks.ball_cage_escape import MAX_HAND_TILT, REST_SPEED, TILT_MARGIN, BallCageEscape
 
 TASK = load_task("ball_cage_escape")
 NOMINAL = BallCageEscape()
@@ -60,7 +60,7 @@ def test_whoever_does_not_look_fills_the_trap(name):
 def test_no_tilt_of_the_hand_brings_the_ball_out_of_the_trap(first):
     """Without the rule that ends the episode there: physics alone keeps it, for all that is done afterwards."""
     scenario = unguarded(BallCageEscape)()
-    world, steep = load(TASK, scenario), STEEPEST - 0.02
+    world, steep = load(TASK, scenario), MAX_HAND_TILT - 0.02
     wrong = NOMINAL.least_tilt
     rollout = play(
         TASK, scenario, lambda world: scenario.tip_only(world, -wrong, steep, first * steep, -first * steep), world
@@ -90,7 +90,7 @@ def test_a_ball_that_is_shaken_over_the_sill_is_lost_and_only_the_rule_forbids_i
 @pytest.mark.parametrize("rate", [0.5, 1.0, 2.0])
 def test_whoever_tilts_is_not_taken_for_somebody_who_shakes(rate):
     def lean_over(world):
-        down = np.array([math.sin(NOMINAL.least_tilt + SPARE), 0.0, -math.cos(NOMINAL.least_tilt + SPARE)])
+        down = np.array([math.sin(NOMINAL.least_tilt + TILT_MARGIN), 0.0, -math.cos(NOMINAL.least_tilt + TILT_MARGIN)])
         yield from NOMINAL.pick_up(world)
         yield from NOMINAL.present(world, down)
         yield from NOMINAL.tip(world, down, rate)
@@ -151,7 +151,7 @@ def put(world, body, pos, velocity=0.0):
     ("x", "height", "velocity", "counts"),
     [
         (0.2, TABLE_TOP, 0.0, True),
-        (0.2, TABLE_TOP, 3 * STILL, False),
+        (0.2, TABLE_TOP, 3 * REST_SPEED, False),
         (0.2, TABLE_TOP + 0.05, 0.0, False),
         (-0.08 + NOMINAL.stool_x, TABLE_TOP + 0.08 + 0.05, 0.0, False),
     ],

@@ -19,14 +19,14 @@ from controls import (
 from helpers import anywhere
 from hypothesis import given, settings
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.box import Cube
 from scengen.episode import Episode
 from scengen.physics import GRAVITY, flight
 from scengen.sim.world import IDLE
-from scengen.tasks.cube_toss import AXIS, RAIL, CubeToss
+from scengen.tasks.cube_toss import RAIL, ROBOT_AXIS, CubeToss
 
-TASK = config.task("cube_toss")
+TASK = load_task("cube_toss")
 TOSS = TASK.draw("id", 0, 0).scenario
 RIDE = TASK.draw("riding", 0, 0).scenario
 
@@ -94,9 +94,9 @@ def test_the_moment_of_letting_go_is_not_critical(late):
         yield from TOSS.swing(world, lambda *miss: opens(world.time - begin, miss))
 
     def own(now, miss):
-        if TOSS.bound(*miss):
+        if TOSS.on_target(*miss):
             times.append(now)
-        return TOSS.bound(*miss)
+        return TOSS.on_target(*miss)
 
     play(TASK, TOSS, lambda world: act(world, own))
     assert play(TASK, TOSS, lambda world: act(world, lambda now, miss: now >= times[0] + late)).solved
@@ -125,7 +125,7 @@ def test_the_tray_rides_evenly_and_keeps_its_angular_momentum_when_it_takes_the_
 
     def momentum():
         mujoco.mj_forward(world.model, world.data)
-        arm, velocity = world.com("cube") - AXIS, world.velocity("cube")[3:]
+        arm, velocity = world.com("cube") - ROBOT_AXIS, world.velocity("cube")[3:]
         return inertia * world.hinge(RAIL)[1] + mass * float(np.cross(arm, velocity)[2])
 
     assert world.hinge(RAIL) == pytest.approx((rate * (world.time - RIDE.launch), rate), rel=0.01)
@@ -200,4 +200,4 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
 @settings(max_examples=30, deadline=None)
 def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(scenario):
     builds_or_is_refuted(scenario)
-    assert math.isclose(math.dist(scenario.spot[:2], AXIS[:2]), scenario.distance)
+    assert math.isclose(math.dist(scenario.spot[:2], ROBOT_AXIS[:2]), scenario.distance)

@@ -41,7 +41,7 @@ def released_at(scenario, height):
 @pytest.mark.parametrize("friction", [0.0, 0.05])
 def test_one_patch_higher_goes_past_it_and_one_patch_lower_falls_short(friction):
     scenario = GalileoRampDrop(ramp=Ramp(friction=friction))
-    right, band = scenario.ramp.height(scenario.start), scenario.ramp.band
+    right, band = scenario.ramp.height(scenario.release_place), scenario.ramp.band
     assert released_at(scenario, right).outcome == "success"
     assert released_at(scenario, right + 1.3 * band).reason == "the ball went past the patch"
     assert released_at(scenario, right - 1.3 * band).outcome == "timeout"
@@ -50,7 +50,7 @@ def test_one_patch_higher_goes_past_it_and_one_patch_lower_falls_short(friction)
 @pytest.mark.parametrize("angle", [14.0, 24.0, 38.0])
 def test_without_friction_the_height_of_release_is_that_of_the_patch(angle):
     scenario = GalileoRampDrop(ramp=Ramp(angle=angle))
-    assert scenario.ramp.height(scenario.start) == pytest.approx(scenario.ramp.goal, rel=0.02)
+    assert scenario.ramp.height(scenario.release_place) == pytest.approx(scenario.ramp.goal, rel=0.02)
 
 
 def test_where_the_ball_slips_and_rolls_equal_heights_fall_short():
@@ -122,7 +122,7 @@ def test_a_ball_may_not_fall_on_the_ramp():
 @pytest.mark.parametrize("off", [-0.06, 0.06])
 def test_a_wrong_answer_leaves_no_second_try(off):
     answer = NOMINAL.answer()
-    right = NOMINAL.ramp.height(NOMINAL.start) / NOMINAL.ramp.height(NOMINAL.brim)
+    right = NOMINAL.ramp.height(NOMINAL.release_place) / NOMINAL.ramp.height(NOMINAL.brim)
 
     def twice(world):
         yield from answer.act(world, right + off)
@@ -159,7 +159,7 @@ def test_no_fixed_place_of_release_serves_more_than_a_tenth_of_training(measure)
     """The best one in 200 draws, tried on 200 others; the patch is as wide as it is."""
 
     def rights(scenario):
-        ramp, height = scenario.ramp, scenario.ramp.height(-scenario.start)
+        ramp, height = scenario.ramp, scenario.ramp.height(-scenario.release_place)
         return sorted(measure(scenario, ramp.at_height(height + side * ramp.band / 2)) for side in (-1, 1))
 
     known, fresh = (np.array([rights(scenario) for scenario in training(seed)]) for seed in (99, 4242))
@@ -174,7 +174,7 @@ def test_no_fixed_place_of_release_serves_more_than_a_tenth_of_training(measure)
 @pytest.mark.parametrize(("split", "solved"), [("light_ball", True), ("high_patch", False), ("rubbing", False)])
 def test_the_height_of_the_training_twin_serves_a_ball_of_another_weight_and_nothing_else(split, solved):
     trained, shifted = (TASK.draw(name, 0, 2).scenario for name in ("id", split))
-    assert released_at(shifted, trained.ramp.height(trained.start)).solved == solved
+    assert released_at(shifted, trained.ramp.height(trained.release_place)).solved == solved
 
 
 def test_without_the_near_incline_the_witness_drops_the_ball_and_without_the_far_one_it_runs_across_the_patch():
@@ -196,7 +196,7 @@ class ReleasedBefore(GalileoRampDrop):
 
     def build(self):
         scene = super().build()
-        scene.body("ball").pos = self.resting(self.start) - self.tray
+        scene.body("ball").pos = self.resting(self.release_place) - self.tray
         return scene
 
 

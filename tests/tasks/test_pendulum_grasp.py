@@ -20,7 +20,7 @@ from controls import (
 from scengen import load_task
 from scengen.assets.pendulum import Pendulum
 from scengen.sim.world import IDLE
-from scengen.tasks.pendulum_grasp import APEX, BOB, HINGE, PendulumGrasp
+from scengen.tasks.pendulum_grasp import APEX_SHARE, BOB, HINGE, PendulumGrasp
 
 TASK = load_task("pendulum_grasp")
 GRASP = TASK.draw("id", 0, 0).scenario
@@ -28,7 +28,7 @@ GRASP = TASK.draw("id", 0, 0).scenario
 
 def closing(scenario, late):
     """What comes of fingers that touch `late` [s] after the turning point."""
-    return play(TASK, scenario, lambda world: scenario.close_before(world, scenario.closing - late))
+    return play(TASK, scenario, lambda world: scenario.close_before(world, scenario.closing_time - late))
 
 
 # --- the law of the task ----------------------------------------------------------------
@@ -44,12 +44,11 @@ def test_it_swings_from_any_moment_on_to_its_amplitude(phase):
             scenario.events(world)
         world.step(IDLE)
         angles.append(world.hinge(HINGE)[0])
-    expected = [
-        scenario.pendulum.swing(scenario.reach, phase / 360.0 + (k + 1) / 100 / scenario.period)[0] for k in range(150)
-    ]
+    turns = [phase / 360.0 + (k + 1) / 100 / scenario.period for k in range(150)]
+    expected = [scenario.pendulum.swing(scenario.peak_angle, turn)[0] for turn in turns]
     assert np.abs(np.array(angles) - expected).max() < math.radians(0.4)
-    assert max(angles) == pytest.approx(scenario.reach, rel=0.006) == -min(angles)  # half a step of Euler: 0.005
-    assert world.com(BOB) == pytest.approx(scenario.place(angles[-1]), abs=1e-4)
+    assert max(angles) == pytest.approx(scenario.peak_angle, rel=0.006) == -min(angles)  # half a step of Euler: 0.005
+    assert world.com(BOB) == pytest.approx(scenario.bob_at(angles[-1]), abs=1e-4)
 
 
 @pytest.mark.parametrize(("length", "period"), [(0.30, 1.119), (0.40, 1.292), (0.55, 1.515)])
@@ -57,7 +56,7 @@ def test_the_bob_waits_for_a_sixteenth_of_the_period(length, period):
     """Near the turning point it moves as a cosine: arccos 0.98 / pi of the period."""
     scenario = PendulumGrasp(pendulum=Pendulum(length=length))
     assert scenario.period == pytest.approx(period, abs=0.001)
-    assert scenario.window / scenario.period == pytest.approx(math.acos(APEX) / math.pi, rel=0.01)
+    assert scenario.window / scenario.period == pytest.approx(math.acos(APEX_SHARE) / math.pi, rel=0.01)
 
 
 @pytest.mark.parametrize(("share", "taken"), [(-1.6, False), (-0.5, True), (0.0, True), (0.5, True), (1.6, False)])

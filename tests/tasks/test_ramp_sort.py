@@ -80,7 +80,7 @@ def test_balls_are_let_go_on_their_side_of_the_ridge_outside_the_uncertain_band(
         for index in range(5):
             s = TASK.draw(split, 0, index).scenario
             for side in (1, -1):
-                _, across, _ = (s.release(side) - s.middle) @ s.axes
+                _, across, _ = (s.release_spot(side) - s.middle) @ s.axes
                 assert side * (across - s.ramp.ridge) > s.band
 
 
@@ -97,7 +97,7 @@ def test_every_ball_must_be_in_its_bin(red_at, blue_at, success):
     w = load(TASK, NOMINAL)
     for i, side in enumerate((red_at, blue_at)):
         if side:
-            put(w, i, NOMINAL._bins, side * 0.05, NOMINAL)
+            put(w, i, NOMINAL._bins_along, side * 0.05, NOMINAL)
     assert NOMINAL.success(w) == success
 
 
@@ -105,10 +105,10 @@ def test_failures_name_what_went_wrong():
     w = load(TASK, NOMINAL)
     assert NOMINAL.failure(w) is None
     state = w.state()
-    put(w, 0, NOMINAL._bins, 0.05, NOMINAL)
+    put(w, 0, NOMINAL._bins_along, 0.05, NOMINAL)
     assert NOMINAL.failure(w) == "a ball is in the bin of the other colour"
     w.restore(state)
-    put(w, 0, NOMINAL._bins, -0.05, NOMINAL)
+    put(w, 0, NOMINAL._bins_along, -0.05, NOMINAL)
     assert NOMINAL.failure(w) == "a ball came into its bin without the ramp"
     w.loop.touched[w.body("ball_0"), w.body("ramp")] = w.loop.touched[w.body("ramp"), w.body("ball_0")] = True
     assert NOMINAL.failure(w) is None

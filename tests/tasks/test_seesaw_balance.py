@@ -16,7 +16,7 @@ from scengen.assets.seesaw import Seesaw
 from scengen.attack.priors import fit
 from scengen.params import parameters, with_values
 from scengen.sim.world import IDLE, World
-from scengen.tasks.seesaw_balance import BEAM, LEVEL, STAYS, SeesawBalance
+from scengen.tasks.seesaw_balance import BEAM, MAX_TILT, TARGET_TOLERANCE, SeesawBalance
 from scengen.validate.rebuilt import rebuild
 
 TASK = load_task("seesaw_balance")
@@ -60,9 +60,9 @@ def test_within_the_margin_of_the_balancing_place_the_goal_holds_and_beyond_it_d
 
 
 def test_level_with_the_target_elsewhere_is_not_the_goal():
-    moved = HEAVY.offset - STAYS - 0.005
+    moved = HEAVY.offset - TARGET_TOLERANCE - 0.005
     world = settled(HEAVY, replace(HEAVY, offset=moved).balance, moved)
-    assert world.tilt(BEAM) < LEVEL and not HEAVY.success(world)
+    assert world.tilt(BEAM) < MAX_TILT and not HEAVY.success(world)
 
 
 @pytest.mark.parametrize(("mass", "place"), [(0.06, 0), (0.9, -1)])
@@ -71,7 +71,7 @@ def test_where_it_is_refuted_that_any_place_balances_none_does(mass, place):
     scenario = SeesawBalance(weight=Block(mass=mass), seesaw=Seesaw(stop=25.0, height=0.19))
     assert refuted(scenario) == "no place on the deck balances with room to spare"
     (span,) = scenario.spans(-1)
-    assert settled(scenario, span[place]).tilt(BEAM) > LEVEL
+    assert settled(scenario, span[place]).tilt(BEAM) > MAX_TILT
 
 
 @given(
@@ -88,7 +88,7 @@ def test_whatever_is_within_bounds_is_refuted_with_numbers_or_has_room_to_balanc
         assert refuted(scenario)
         return
     assert math.isclose(scenario.tilt_at(scenario.balance), 0.0, abs_tol=1e-9)
-    assert abs(scenario.tilt_at(scenario.balance + scenario.margin)) == pytest.approx(LEVEL, rel=1e-6)
+    assert abs(scenario.tilt_at(scenario.balance + scenario.margin)) == pytest.approx(MAX_TILT, rel=1e-6)
 
 
 def test_no_fixed_place_balances_a_tenth_of_training_and_no_three_a_fifth():
@@ -187,7 +187,7 @@ class Lenient(SeesawBalance):
     """Asks for a level deck and nothing else: it may be held."""
 
     def success(self, world):
-        return world.tilt(BEAM) <= LEVEL
+        return world.tilt(BEAM) <= MAX_TILT
 
 
 LENIENT = Lenient(weight=HEAVY.weight)
@@ -213,7 +213,7 @@ def test_held_level_by_hand_is_level_and_does_not_count():
 
 def test_without_the_counterweight_the_witness_levels_nothing():
     ((_, world),) = ablated(TASK, HEAVY).values()
-    assert world.tilt(BEAM) > LEVEL
+    assert world.tilt(BEAM) > MAX_TILT
     assert not replayed(TASK, HEAVY, LENIENT, load(TASK, HEAVY, *HEAVY.ablations().values())).solved
 
 

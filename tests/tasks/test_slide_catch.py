@@ -19,14 +19,14 @@ from controls import (
     unguarded,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.catch_bin import CatchBin
 from scengen.assets.incline import Incline
 from scengen.episode import Episode
 from scengen.physics import slid
-from scengen.tasks.slide_catch import FALL, ORDERS, Load, SlideCatch
+from scengen.tasks.slide_catch import FALL_TIME, ORDERS, Load, SlideCatch
 
-TASK = config.task("slide_catch")
+TASK = load_task("slide_catch")
 NOMINAL = SlideCatch(start=0.3)
 """Nobody needs the time to take the bin where nobody takes it."""
 LIFTED = math.radians(4.3) * 0.04 * 0.01
@@ -55,8 +55,8 @@ def idle():
 def test_a_block_is_over_the_lip_when_its_friction_and_its_place_say(idle, lane):
     times, places, velocities = idle
     row = int(np.argmax(places[:, lane, 0] < 0.0))
-    assert times[row] == pytest.approx(NOMINAL.over_lip(lane), abs=0.05)
-    since = times[row] - NOMINAL.lets_go(lane)
+    assert times[row] == pytest.approx(NOMINAL.lip_time(lane), abs=0.05)
+    since = times[row] - NOMINAL.slide_start(lane)
     _, speed = slid(NOMINAL.loads[lane].friction, math.radians(NOMINAL.rate), since)
     assert np.linalg.norm(velocities[row, lane]) == pytest.approx(speed, rel=0.25)
 
@@ -79,7 +79,7 @@ def test_it_falls_from_lip_to_rim_in_the_time_that_is_counted_on(idle):
     for lane in range(3):
         row = int(np.argmax(places[:, lane, 0] < 0.0))
         below = int(np.argmax(places[:, lane, 2] < CatchBin().rim - Incline().lip))
-        assert FALL - 0.05 < times[below] - times[row] < FALL + 0.02
+        assert FALL_TIME - 0.05 < times[below] - times[row] < FALL_TIME + 0.02
 
 
 def test_the_darker_the_rougher():
