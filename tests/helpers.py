@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from scengen.params import parameters, with_values
 from scengen.pictures import render
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 
 REFERENCE = Path(__file__).parents[1] / "generated" / "reference"
 

@@ -18,11 +18,11 @@ from typing import Any
 
 import yaml
 
-from scengen import config
+from scengen import compose, list_tasks, load_task
 from scengen.envs.agreement import compare_all
 from scengen.errors import Infeasible
 from scengen.ood.behaviour import solves
-from scengen.runs.generate import Settings, generate
+from scengen.runs.generate import GenerateSettings, generate
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
@@ -43,8 +43,8 @@ OTHER_SEED = 1
 def measured(task: Task, split: str, n: int, draws: int, replays: int) -> dict[str, Any]:
     """Results of the draws of a split."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(split=split, n=n, limit=3 * n, pool=f"{folder}/pool")
-        made = generate(task, config.levels(task)["quick"], settings, lambda *_: None)
+        settings = GenerateSettings(split=split, n=n, limit=3 * n, pool=f"{folder}/pool")
+        made = generate(task, compose.certify_levels(task)["quick"], settings, lambda *_: None)
         each = round(made.cpu / made.certified, 1) if made.certified else 0.0
         found = {"indices": made.indices, "certified": made.certified, "cpu": each, "lost": dict(made.reasons)}
         if replays and made.certified:
@@ -69,8 +69,8 @@ def main(n: str, *others: str) -> None:
     wanted, draws, replays = (options.pop(name, None) for name in ("split", "draws", "replays"))
     if options:
         sys.exit(f"certified: {', '.join(options)} is no option; there are split=, draws= and replays=")
-    for name in [other for other in others if "=" not in other] or config.tasks():
-        task = config.task(name)
+    for name in [other for other in others if "=" not in other] or list_tasks():
+        task = load_task(name)
         for split in wanted.split(",") if wanted else (ID, *task.axes):
             found = measured(task, split, int(n), int(draws or 100), int(replays or 3))
             print(f"{name}/{split}", found, flush=True)

@@ -1,4 +1,4 @@
-"""Write a pool of any size without certifying: scenarios are drawn as a run draws them, certificates are borrowed.
+"""Write a pool of any size without certifying: scenarios are drawn as in a run, certificates are copies.
 
     python tools/synthetic_pool.py generated/reference 100000 /tmp/large [scenes]
 
@@ -22,12 +22,14 @@ from scengen.analysis.redraw import task_of
 from scengen.certificate import STAGES, Check
 from scengen.errors import Infeasible
 from scengen.params import values
-from scengen.pool.pool import Pool, PoolRow, sha256, write
+from scengen.pool import Pool, PoolRow
+from scengen.pool.files import sha256
+from scengen.pool.writing import write_shards
 from scengen.samplers.task import Draw
 from scengen.validate.rebuilt import rebuild
 
 LESS = 2.0**-22
-"""By which share the actions of a row are smaller than those of the row before; single precision has steps of 2^-24."""
+"""Relative difference of the actions of successive rows; single precision resolves 2^-24."""
 
 
 def synthetic(source: Pool, n: int, to: Path, scenes: bool = False) -> Pool:
@@ -36,19 +38,21 @@ def synthetic(source: Pool, n: int, to: Path, scenes: bool = False) -> Pool:
     Args:
         scenes: whether each row has the scene of its own parameters.
     """
-    about = dict(source.about)
-    return write(to, about, _rows(source, n, scenes, about))
+    about: dict[str, Any] = {}
+    entries = write_shards(to, _rows(source, n, scenes, about))
+    replace(source.manifest.without_files(), shards=entries, **about).write(to)
+    return Pool.open(to)
 
 
 def _rows(source: Pool, n: int, scenes: bool, about: dict[str, Any]) -> Iterator[PoolRow]:
     """The rows one after the other; when all are made, `about` is told what its manifest counts."""
     models, infeasible, first, proposed = list(source.rows()), Counter[str](), 0, 0
-    task = task_of(source)
-    design, index, made = task.design(source.sampler), -1, 0
+    task, config = task_of(source), source.manifest.config
+    design, index, made = task.design(config.sampler), -1, 0
     while made < n:
         index += 1
         try:
-            draw = task.draw(source.split, source.seed, index, design)
+            draw = task.draw(config.split, config.seed, index, design)
         except Infeasible as error:
             infeasible.update(error.reasons)
             proposed += error.tries
@@ -63,8 +67,8 @@ def _rows(source: Pool, n: int, scenes: bool, about: dict[str, Any]) -> Iterator
         "indices": index + 1,
         "first_draws": first,
         "funnel": {"proposed": proposed} | dict.fromkeys(STAGES, n),
+        "reasons": {f"feasible: {why}": times for why, times in infeasible.items()},
     }
-    about["reasons"] = {f"feasible: {why}": times for why, times in infeasible.items()}
 
 
 def _row(model: PoolRow, draw: Draw, share: float, scenes: bool) -> PoolRow:
@@ -96,8 +100,8 @@ def _with(numbers: Mapping[str, Any], check: Check) -> Check:
 def main(source: str, n: str, to: str, *others: str) -> None:
     """Write a pool and say how large it is."""
     pool = synthetic(Pool.open(source), int(n), Path(to), "scenes" in others)
-    size = sum(shard["bytes"] for shard in pool.manifest["shards"])
-    print(f"{to}: {len(pool)} scenarios in {len(pool.manifest['shards'])} shards, {size / 1e6:.0f} MB")
+    size = sum(entry.bytes for entry in pool.manifest.shards)
+    print(f"{to}: {len(pool)} scenarios in {len(pool.manifest.shards)} shards, {size / 1e6:.0f} MB")
 
 
 if __name__ == "__main__":

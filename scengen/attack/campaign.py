@@ -9,9 +9,9 @@ from typing import Any
 
 from ..episode import Actions
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
+from ..pool import Pool, PoolRow
+from ..pool.files import sha256, why_not_plain
 from ..pool.names import Name
-from ..pool.pool import Pool, PoolRow, sha256
-from ..pool.schema import why_no_plain_file
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..sim.world import World
@@ -224,18 +224,17 @@ def stored(report: AttackReport, folder: Path) -> dict[str, Any]:
 
 def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
     """Where the hits that a manifest tells of are not what it says: the name of each, and why."""
-    told = pool.manifest.get("attack", {})
-    counts = Counter((hit["tier"], hit["raw"]) for hit in told.get("hits", []))
-    for rate in told.get("rates", []):
+    counts = Counter((hit["tier"], hit["raw"]) for hit in pool.manifest.hits)
+    for rate in pool.manifest.rates:
         if rate["hits"] != counts.pop((rate["tier"], rate["raw"]), 0):
             yield rate["tier"], "the attack counts other hits than it lists"
     if counts:
         yield next(iter(counts))[0], "the attack lists hits of a tier that it does not count"
     ids = {id_ for (id_,) in pool.columns("id")}
-    for entry in told.get("hits", []):
+    for entry in pool.manifest.hits:
         try:
             path = pool.folder / entry["file"]
-            if why := why_no_plain_file(path):
+            if why := why_not_plain(path):
                 yield entry["file"], f"the hit {why}"
                 continue
             found = Hit.load(path)

@@ -1,4 +1,4 @@
-"""Evidence of an attack: hits that replay bit for bit, what they lack, and rates with bounds."""
+"""Evidence of an attack: hits that replay bit for bit, the contacts that they lack, and rates with bounds."""
 
 import json
 import zlib
@@ -13,8 +13,8 @@ import numpy as np
 from ..episode import Actions
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
-from ..pool.columns import witness_of
-from ..pool.schema import memory_bounded, read_json
+from ..pool.columns import witness
+from ..pool.untrusted import memory_bounded, read_json
 from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.certify import lower_bound
@@ -22,35 +22,37 @@ from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
 from ..work.targets import refused
-from .player import SETTLE, Attempt, Node, Played, Player
+from .player import SETTLE_TIME, Attempt, Node, Played, Player
 from .signature import ContactPair, pairs
 
-VARIED = 40
-"""Varied runs of the oracle that a causal contact is there in; one that is missing in 5 % of runs passes in 13 %."""
+VARIED_RUNS = 40
+"""Number of varied runs of the oracle in which a causal contact has to occur. A contact that is missing in 5 % of runs
+passes with a probability of 13 %."""
 
 
 def spelled(raw: bool) -> str:
-    """How actions come to the controller, in a word."""
+    """How actions reach the controller, in a word."""
     return "raw" if raw else "filtered"
 
 
 @dataclass(frozen=True)
 class Hit:
-    """A rollout of the adversary that reached the goal, and does so again in a fresh world, bit for bit."""
+    """A rollout of the adversary that reached the goal, and reaches it again in a fresh world, bit for bit."""
 
     scenario: str
-    """Its id."""
+    """Id of the scenario."""
     tier: str
+    """Tier of the attempt."""
     raw: bool
-    """Whether its actions came to the controller without the teleoperation filter."""
+    """Whether its actions reached the controller without the teleoperation filter."""
     plan: str
-    """In words."""
+    """Description of the attempt, in words."""
     seconds: float
-    """When the goal was reached [s]."""
+    """Time at which the goal was reached [s]."""
     digest: str
     """Hash of the final physics state."""
     lacks: tuple[ContactPair, ...]
-    """Causal contacts of the witness that it does without."""
+    """CausalContacts contacts of the witness that it does without."""
     unmoved: tuple[str, ...]
     """Bodies that the witness moves, and it does not."""
     params: Mapping[str, Value] = field(repr=False, compare=False)
@@ -74,15 +76,15 @@ class Hit:
         return f"by {self.tier}, {spelled(self.raw)},{contacts}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
-        """Everything but actions and parameters."""
+        """All fields but actions and parameters, as plain data."""
         kept = {key: value for key, value in vars(self).items() if key not in ("actions", "params")}
         return {**kept, "lacks": [list(pair) for pair in self.lacks], "unmoved": list(self.unmoved)}
 
     def store(self, folder: Path) -> None:
-        """Write the actions and everything else as `<name>.npz`.
+        """Write the hit as `<name>.npz`.
 
         Raises:
-            BadConfig: it cannot be written.
+            BadConfig: the file cannot be written.
         """
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -94,30 +96,32 @@ class Hit:
 
     @classmethod
     def load(cls, path: Path) -> "Hit":
-        """Read what `store` has written.
+        """Read a hit that `store` has written. Nothing in the file is executed.
 
         Raises:
-            BadConfig: it is something else. Nothing in it is executed.
+            BadConfig: the file does not exist, or holds something else.
         """
         try:
             with memory_bounded(), np.load(path, allow_pickle=False) as stored:
-                about, actions = read_json(str(stored["about"])), witness_of(stored["actions"])
+                about, actions = read_json(str(stored["about"])), witness("witness", stored["actions"])
             about["lacks"] = tuple((str(one), str(other)) for one, other in about["lacks"])
             about["unmoved"] = tuple(map(str, about["unmoved"]))
             return cls(**about, actions=actions)
         except FileNotFoundError:
-            raise BadConfig(f"{path} does not exist; name a hit that scengen attack has stored") from None
+            raise BadConfig(f"{path} does not exist; give a hit that scengen attack has stored") from None
         except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
             why = cut(" ".join(str(error).split()))
-            raise BadConfig(f"{path} is no hit of scengen attack, or is damaged: {why}") from None
+            raise BadConfig(f"{path} is not a hit of scengen attack, or is damaged: {why}") from None
 
 
 OTHER_SCENARIO = "the scenario's id does not belong to its parameters; one of a pool with scans needs pool=FOLDER too"
-"""Why nothing can be said of a hit."""
+"""Reason why a hit cannot be examined."""
 
 
 def unsound(hit: Hit, task: Task) -> str:
-    """Why a stored hit is none: its scene is built from its parameters, and its actions are played; empty if it holds.
+    """Reason why a stored hit does not hold; empty if it does.
+
+    The scene is built from its parameters, and its actions are replayed.
 
     Raises:
         ScengenError: the parameters are not those of the task.
@@ -126,23 +130,27 @@ def unsound(hit: Hit, task: Task) -> str:
     if scenario.id != hit.scenario:
         return OTHER_SCENARIO
     world = world_of(scenario, task.embodiment)
-    again = replay(scenario, world, hit.actions, task.horizon, SETTLE)
+    again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME)
     return "" if again.solved else f"its actions do not reach the goal: {again.reason}"
 
 
-class Causal:
-    """Contacts without which the oracle never reaches the goal: latched in the witness and in every varied run.
+class CausalContacts:
+    """Contacts that the oracle always makes before it reaches the goal: in the witness and in every varied run.
 
-    Contacts of the robot with what cannot move are left out: a hand may come at a thing from another side.
+    Contacts of the robot with fixed bodies are left out: a hand may approach an object from another side.
     """
 
-    def __init__(self, player: Player, varied: int = VARIED):
-        """Runs are made when they are needed, `varied` at most: blocks that fall into a bin touch by chance."""
+    def __init__(self, player: Player, varied: int = VARIED_RUNS):
+        """
+        Args:
+            varied: maximum number of varied runs. They are made when they are needed: blocks that fall into a bin touch
+                by chance, for example, and not in every run.
+        """
         self._player, self._left = player, iter(range(varied))
         self._pairs = player.trace.signature.pairs
 
     def lacking(self, touched: frozenset[ContactPair]) -> frozenset[ContactPair]:
-        """Which of them are not among the contacts of a hit; every varied run made so far has all of these."""
+        """The causal contacts that a hit lacks. All of them occur in every varied run that was made so far."""
         for k in self._left if self._pairs - touched else ():
             self._pairs &= self._varied(k)
             if self._pairs <= touched:
@@ -150,60 +158,67 @@ class Causal:
         return self._pairs - touched
 
     def _varied(self, k: int) -> frozenset[ContactPair]:
-        """The contacts of a jittered run; all that are known where it fails, or where there is no oracle."""
+        """The contacts of a jittered run; all contacts known so far if it fails, or if there is no oracle."""
         player = self._player
         jitter = Jitter.within(Robust(), f"{player.scenario.id}/attack", k)
         world = jitter.disturbed(player.world, player.scenario.DISTURBED)
         try:
-            rollout = run(player.scenario, world, player.scenario.oracle, player.horizon, SETTLE, jitter)
+            rollout = run(player.scenario, world, player.scenario.oracle, player.horizon, SETTLE_TIME, jitter)
         except NoOracle:
             return self._pairs
         return pairs(world) if rollout.solved else self._pairs
 
 
-def hit(player: Player, attempt: Attempt, raw: bool, played: Played, node: Node | None, causal: Causal) -> Hit | None:
-    """The evidence for a success, or None if it does not come out the same in a fresh world.
+def hit(
+    player: Player, attempt: Attempt, raw: bool, played: Played, node: Node | None, causal: CausalContacts
+) -> Hit | None:
+    """The evidence of a success; None if the success is not the same, bit for bit, in a fresh world.
 
     Args:
-        node: where the attempt began.
+        node: state from which the attempt began; None for the start of the episode.
         causal: contacts of the witness that a hit should have.
     """
     fresh = World.load(player.scene_xml, player.embodiment)
-    again = replay(player.scenario, fresh, played.actions, player.horizon, SETTLE)
+    again = replay(player.scenario, fresh, played.actions, player.horizon, SETTLE_TIME)
     if not again.solved or again.digest != played.digest:
         return None
     left = played.signature
     return Hit(
-        player.scenario.id,
-        attempt.tier,
-        raw,
-        (node or player.start).after(attempt),
-        played.seconds,
-        played.digest,
-        tuple(sorted(causal.lacking(left.pairs))),
-        tuple(sorted(player.trace.signature.moved - left.moved)),
-        values(player.scenario),
-        played.actions,
+        scenario=player.scenario.id,
+        tier=attempt.tier,
+        raw=raw,
+        plan=(node or player.start).after(attempt),
+        seconds=played.seconds,
+        digest=played.digest,
+        lacks=tuple(sorted(causal.lacking(left.pairs))),
+        unmoved=tuple(sorted(player.trace.signature.moved - left.moved)),
+        params=values(player.scenario),
+        actions=played.actions,
     )
 
 
 @dataclass(frozen=True)
 class TierRate:
-    """How often one tier reached the goal, filtered or raw."""
+    """Hit rate of one tier, with filtered or raw actions."""
 
     tier: str
     raw: bool
+    """Whether actions reached the controller without the teleoperation filter."""
     rollouts: int = 0
+    """Number of rollouts."""
     hits: int = 0
+    """Number of rollouts that reached the goal."""
     refuting: int = 0
+    """Number of hits that bypass the point of the task."""
 
     @property
     def value(self) -> float:
+        """Share of the rollouts that reached the goal."""
         return self.hits / self.rollouts if self.rollouts else 0.0
 
     @property
     def bound(self) -> float:
-        """One-sided upper Clopper-Pearson bound at 95 % confidence."""
+        """One-sided upper Clopper-Pearson bound of the rate at 95 % confidence."""
         return 1.0 - lower_bound(self.rollouts - self.hits, self.rollouts) if self.rollouts else 1.0
 
     def plain(self) -> dict[str, Any]:
@@ -211,7 +226,7 @@ class TierRate:
 
 
 def rates(counts: Sequence[TierRate]) -> list[TierRate]:
-    """Counts of the same tier and kind added up, in the order in which they first occur."""
+    """Counts of the same tier and kind of actions added up, in the order in which they first occur."""
     total: dict[tuple[str, bool], TierRate] = {}
     for one in counts:
         sofar = total.get((one.tier, one.raw), TierRate(one.tier, one.raw))

@@ -14,13 +14,13 @@ from typing import Any
 
 import mujoco
 
-from .. import config
+from .. import compose
 from ..attack.check import attacked
 from ..certificate import Check
 from ..control import native
 from ..errors import NoOracle, ScengenError
 from ..fingerprint import fingerprint
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate.certify import Trial
@@ -29,7 +29,7 @@ from ..validate.rebuilt import difference
 from ..validate.recheck import FIRST, REPLAYED
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
-from ..validate.stored import settings_of, task_of_manifest
+from ..validate.stored import settings_of_manifest, task_of_manifest
 from ..work.parallel import Limits, each
 
 ORACLES = ("shortcuts", "solved", "robust")
@@ -122,9 +122,9 @@ def judge(folder: str, search: Sequence[str], level: str, first: int | None, wor
         ScengenError: the pool is damaged, or its task is unknown here.
     """
     pool = Pool.open(folder).check()
-    task = task_of_manifest(pool, config.task(pool.task, search))
+    task = task_of_manifest(pool, compose.load_task(pool.task, search))
     rows = islice(pool.rows(), first)
-    return each(Judge(task, settings_of(pool.manifest["config"]["certify"]), level), rows, workers, limits, lost)
+    return each(Judge(task, settings_of_manifest(pool.manifest), level), rows, workers, limits, lost)
 
 
 def lost(row: PoolRow, reason: str) -> Judgement:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from ..pool.pool import Pool
+from ..pool import Pool
 from ..samplers.task import leaves
 
 SAME_BITS, SAME_VERDICT, FLIPPED, UNKNOWN = "same bits", "same verdict", "flipped", "unknown"
@@ -62,8 +62,8 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
                 "sha256": pool.sha256,
                 "task": pool.task,
                 "split": pool.split,
-                "versions": dict(pool.versions),
-                "fingerprint": pool.manifest["fingerprint"],
+                "versions": dict(pool.manifest.versions),
+                "fingerprint": pool.manifest.fingerprint,
             }
             for pool in pools
         },

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..episode import Actions, Outcome
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..sim.world import Vec3, World
 from ..validate.rollout import replay
 from ..work.parallel import Limits, Workers, each

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import PoolError
+from ..pool import Pool
 from ..pool.collection import members
 from ..pool.library import Library
-from ..pool.pool import Pool
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
@@ -53,7 +53,7 @@ def chosen(rows: Library, scenario: str | None, split: str | None = None) -> Lib
 def _opened(folder: str | Path, task: str) -> Pool:
     """A sound pool of a task."""
     pool = Pool.open(folder).check()
-    check_versions(pool.versions, str(folder))
+    check_versions(pool.manifest.versions, str(folder))
     tasks, _ = pool.kinds("task")
     if not tasks:
         raise PoolError(f"{folder} holds no scenario; see scengen generate")

@@ -15,9 +15,8 @@ import numpy as np
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..errors import BadConfig, PoolError, ScengenError, at_least
-from ..pool import collection
+from ..pool import Pool, collection
 from ..pool.library import Library
-from ..pool.pool import Pool
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate

@@ -13,16 +13,16 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
 
-from .. import config
+from .. import compose, task_files
 from ..certificate import CHECKS
 from ..control import native
 from ..control.loop import ACTION, Loop
 from ..envs.gym import PoolEnv
 from ..episode import Actions
 from ..pictures.render import NoPictures
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
 from ..robots import panda
-from ..runs.generate import Settings, generate
+from ..runs.generate import GenerateSettings, generate
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..sim.world import JAW, World
@@ -42,7 +42,7 @@ LIMITS = {
 }
 """What is promised."""
 
-TICKS = 200
+PERIODS = 200
 """Control periods of the comparison with robosuite: two seconds."""
 NOTHING = 0.05
 """What costs less than this is no part of the cost of a certificate [s]."""
@@ -86,7 +86,7 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
 
 def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
     """Processor time of a quick certificate of every task, by check [s]: of its first training scenario."""
-    costs = {name: _certificate(config.task(name)) for name in config.tasks()}
+    costs = {name: _certificate(compose.load_task(name)) for name in task_files.tasks()}
     named = [check for check in CHECKS if any(check in cost for cost in costs.values())]
     table = Table("task", *named, "all", title="processor time of a certificate (s)", title_justify="left")
     for name, cost in costs.items():
@@ -113,7 +113,7 @@ def _certificate(task: Task) -> dict[str, float]:
 
 def rollout_to_raw(repeats: int) -> float:
     """Time of an oracle rollout over that of the bare mj_step calls through the same states."""
-    task = config.task("domino_single")
+    task = compose.load_task("domino_single")
     scenario = task.draw("id", 0, 0).scenario
     world = world_of(scenario)
 
@@ -126,7 +126,7 @@ def rollout_to_raw(repeats: int) -> float:
 
 def two_arms(repeats: int) -> dict[str, float]:
     """A control period of two arms over the bare mj_step calls, and over a control period of one arm."""
-    text = rebuild(config.task("domino_single").draw("id", 0, 0).scenario)
+    text = rebuild(compose.load_task("domino_single").draw("id", 0, 0).scenario)
     one, two = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2))
     single = _waving()
     double = np.hstack([single, single])
@@ -188,7 +188,7 @@ def costs(repeats: int) -> dict[str, float]:
 def _pool() -> Iterator[Pool]:
     """A pool of one scenario, for as long as it is needed."""
     with tempfile.TemporaryDirectory() as folder:
-        task, settings = config.task("domino_single"), Settings(n=1, pool=f"{folder}/pool")
+        task, settings = compose.load_task("domino_single"), GenerateSettings(n=1, pool=f"{folder}/pool")
         yield generate(task, QUICK, settings, lambda *_: None).pool
 
 
@@ -277,7 +277,7 @@ def _lift() -> Any:
 
 def scenario_to_first_step(repeats: int) -> float:
     """Median time from a draw's values to the end of the first physics step [ms]."""
-    task = config.task("domino_single")
+    task = compose.load_task("domino_single")
     scenarios = [task.draw("id", 0, index).scenario for index in range(4 * repeats + 2)]
     times = []
     for scenario in scenarios:
@@ -289,8 +289,8 @@ def scenario_to_first_step(repeats: int) -> float:
 
 
 def _waving() -> Actions:
-    """Actions of one arm that moves about in the air, shape (TICKS, 7)."""
-    return 0.3 * np.sin(0.05 * np.arange(TICKS)[:, None] + np.arange(ACTION)).astype(np.float32)
+    """Actions of one arm that moves about in the air, shape (PERIODS, 7)."""
+    return 0.3 * np.sin(0.05 * np.arange(PERIODS)[:, None] + np.arange(ACTION)).astype(np.float32)
 
 
 def _seconds(work: Callable[[], object]) -> float:

@@ -88,7 +88,7 @@ def _certified(
     n = settings.count("certify_n")
     if not n:
         return None
-    wanted = generate.Settings(
+    wanted = generate.GenerateSettings(
         split=settings.axis, n=n, seed=settings.seed, workers=settings.workers, pool=str(folder / "pool")
     )
     return generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))

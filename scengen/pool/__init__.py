@@ -1,5 +1,6 @@
 """Pools of certified scenarios on disk: how they are written, read and searched."""
 
-from .pool import Pool, PoolRow
+from .pool import Pool
+from .row import PoolRow
 
 __all__ = ["Pool", "PoolRow"]

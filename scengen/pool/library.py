@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 from ..errors import UnknownName
 from .directory import Directory, joined
 from .names import Name
-from .pool import Pool, PoolRow
+from .pool import Pool
+from .row import PoolRow
 
-KEPT = 100
-"""Rows that are kept after they were read; each has the text of a scene."""
+KEPT_ROWS = 100
+"""Number of rows that are kept in memory after they were read; each has the text of a scene."""
 
 
 class Library(Sequence[PoolRow]):
-    """Scenarios of some pools without witnesses, each once, in the order of the pools; read when they are asked for."""
+    """Scenarios of some pools without witnesses, each once, in the order of the pools. Rows are read when used."""
 
     def __init__(self, pools: Sequence[Pool], places: NDArray[np.int64] | None = None):
         """
         Args:
-            places: which of all rows, the pools one after the other; all of them if None.
+            places: places of rows, counted through the pools one after the other; None for all rows.
         """
         self.pools, self._starts = pools, np.cumsum([0, *map(len, pools)])
         every = np.arange(self._starts[-1]) if places is None else places
@@ -50,30 +51,30 @@ class Library(Sequence[PoolRow]):
             yield from pool.some(places, witness=False)
 
     def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """A few columns of all of them, see `Pool.columns`."""
+        """A few columns of all scenarios, see `Pool.columns`."""
         for pool, places in self._by_pool():
             yield from pool.columns(*names, places=places)
 
     def pool(self, number: int) -> Pool:
-        """The pool that holds one of them."""
-        return self._where(number)[0]
+        """The pool that holds a scenario."""
+        return self._located(number)[0]
 
     def name(self, number: int) -> Name:
-        """What one of them is called."""
-        pool, place = self._where(number)
+        """Name of a scenario."""
+        pool, place = self._located(number)
         return pool.name_at(place)
 
     def find(self, text: str) -> int:
-        """Number of the scenario of that name: what `Pool.row` takes, a name, an id, or how one begins.
+        """Number of the scenario of a name, an id, or a unique prefix of an id, see `Pool.row`.
 
         Raises:
             UnknownName: there is none.
-            BadConfig: several ids begin so.
+            BadConfig: several ids begin with the text.
         """
         return self.directory.find(text, self.name, "these pools")
 
     def of_split(self, split: str) -> "Library":
-        """Those of one split.
+        """The scenarios of one split.
 
         Raises:
             UnknownName: there are none.
@@ -92,37 +93,37 @@ class Library(Sequence[PoolRow]):
         return {text: np.concatenate(places) for text, places in found.items()}
 
     def only(self, number: int) -> "Library":
-        """One of them alone."""
+        """One scenario alone."""
         return Library(self.pools, self.places[[number]])
 
     @cached_property
     def _read(self) -> Callable[[int], PoolRow]:
-        @lru_cache(KEPT)
+        @lru_cache(KEPT_ROWS)
         def read(number: int) -> PoolRow:
-            pool, place = self._where(number)
+            pool, place = self._located(number)
             return pool.at(place, witness=False)
 
         return read
 
     def witness(self, number: int) -> NDArray[np.float32]:
-        """The witness of one of them, shape (n, 7 * arms)."""
-        pool, place = self._where(number)
+        """Witness of a scenario, shape (n, 7 * arms)."""
+        pool, place = self._located(number)
         return pool.at(place).witness
 
-    def _where(self, number: int) -> tuple[Pool, int]:
+    def _located(self, number: int) -> tuple[Pool, int]:
         place = int(self.places[number])
         which = int(np.searchsorted(self._starts, place, side="right")) - 1
         return self.pools[which], place - int(self._starts[which])
 
     def _by_pool(self) -> Iterator[tuple[Pool, list[int]]]:
-        """Every pool with the places in it, increasing."""
+        """Every pool with places of its own rows, increasing."""
         which = np.searchsorted(self._starts, self.places, side="right") - 1
         for k in dict.fromkeys(which.tolist()):
             yield self.pools[k], (self.places[which == k] - self._starts[k]).tolist()
 
 
 def names(pools: Iterable[Pool], ids: Iterable[str]) -> Mapping[str, str]:
-    """What people call some scenarios of some pools, by id."""
+    """Names for people of some scenarios of some pools, by id."""
     missing, found = set(ids), dict[str, str]()
     for pool in pools:
         for id_ in sorted(missing - found.keys()):

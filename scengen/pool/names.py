@@ -1,7 +1,7 @@
 """Names of scenarios for people: `domino_single/wide_gaps@3/8ed4a4577fe0` is task/split@index/id.
 
-The id, a hash of all parameter values, decides which scenario is meant. What stands before it tells where the scenario
-was drawn. Files and columns hold ids alone.
+The id, a hash of all parameter values, decides which scenario is meant. The text before it says where the scenario was
+drawn. Files and columns hold ids alone.
 """
 
 import warnings
@@ -11,16 +11,16 @@ from typing import Protocol
 
 from ..errors import BadConfig, ScengenError, UnknownName, cut, nearest
 
-SHOWN = 20
-"""How many names an error lists."""
+LISTED = 20
+"""Number of names that an error lists."""
 
 
 class Misnamed(UserWarning):
-    """A name with the id of one scenario and the task, split or index of another."""
+    """A name has the id of one scenario and the task, split or index of another."""
 
 
 class NoScenario(UnknownName):
-    """No id begins as asked for."""
+    """No id begins with the given text."""
 
     def __init__(self, text: str, close: str, known: str, where: str):
         ScengenError.__init__(self, f"no scenario in {where} named {cut(repr(text))}{close}; known: {known}")
@@ -28,11 +28,11 @@ class NoScenario(UnknownName):
 
 @dataclass(frozen=True)
 class Name:
-    """Which scenario, and where it was drawn."""
+    """Identity of a scenario, and where it was drawn."""
 
     task: str
     split: str
-    """With its severities: in `wide_gaps@2@7` the index is 7."""
+    """Split with its severities: in `wide_gaps@2@7` the index is 7."""
     index: int
     id: str
 
@@ -41,27 +41,27 @@ class Name:
 
 
 class Known(Protocol):
-    """Scenarios among which one is looked for; each has a place."""
+    """Scenarios that can be searched; each has a place."""
 
     def __len__(self) -> int: ...
 
     def beginning(self, start: str) -> Sequence[int]:
-        """Places of those whose ids begin so, one for each id."""
+        """Places of the scenarios whose ids begin with `start`, one for each id."""
         ...
 
     def alike(self, start: str) -> Sequence[str]:
-        """Ids among which the one that was meant may be."""
+        """Ids to compare with an unknown one."""
         ...
 
 
 def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> int:
-    """Place of the scenario of that name, or whose id begins so.
+    """Place of the scenario of a name, an id, or a unique prefix of an id.
 
-    Warns (`Misnamed`) of a name that is wrong about its id.
+    Warns (`Misnamed`) of a name that contradicts its id.
 
     Args:
-        name: of the scenario at a place.
-        where: the scenarios are, for errors.
+        name: gives the name of the scenario at a place.
+        where: description of `known`, for errors.
 
     Raises:
         NoScenario: there is none.
@@ -72,14 +72,14 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
     if not found:
         raise NoScenario(text, nearest(start, known.alike(start)), _listed(range(len(known)), name), where)
     if len(found) > 1:
-        told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more of one: {_listed(found, name)}"
+        told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
         raise BadConfig(told)
     if before and not str(called := name(found[0])).startswith(f"{before}/"):
-        told = f"{cut(text)} is {called}: the id counts, what stands before it is wrong"
+        told = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
         warnings.warn(told, Misnamed, stacklevel=3)
     return found[0]
 
 
 def _listed(places: Sequence[int], name: Callable[[int], Name]) -> str:
-    more = ["..."] if len(places) > SHOWN else []
-    return ", ".join([*(str(name(place)) for place in places[:SHOWN]), *more]) or "(none)"
+    more = ["..."] if len(places) > LISTED else []
+    return ", ".join([*(str(name(place)) for place in places[:LISTED]), *more]) or "(none)"

@@ -8,30 +8,28 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible, PoolError, at_least
-from ..fingerprint import fingerprint
-from ..params import values
-from ..pool import pool, shards
+from ..pool import Pool, PoolRow, writing
+from ..pool.files import replace_file, sha256
+from ..pool.manifest import PROCESS, Manifest, RunConfig, without_numbers
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..validate import lock
 from ..validate.certify import Certified, certify
-from ..validate.identity import source_sha256
+from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
-from ..versions import versions
 from ..work.parallel import Limits, Workers, each
 from ..work.targets import refused
-from .filling import Filling, placed
+from .filling import Filling, moved_shards
 from .journal import Journal, Record
 
 
 @dataclass(frozen=True)
-class Settings:
+class GenerateSettings:
     """Settings of `scengen generate`; meanings stand in conf/command/generate.yaml."""
 
     split: str = ID
@@ -61,7 +59,7 @@ class Settings:
 class Summary:
     """What a run came to."""
 
-    pool: pool.Pool
+    pool: Pool
     certified: int
     indices: int
     funnel: Mapping[str, int]
@@ -114,12 +112,12 @@ class Job:
             time.process_time() - start,
         )
 
-    def lost(self, index: int, reason: str) -> Record:
+    def lost_record(self, index: int, reason: str) -> Record:
         """The record of an index whose scenario has crashed its process, or has reached a limit."""
         draw = self._draw(index)
         if isinstance(draw, Record):
             return draw
-        return Record(index, "unknown", pool.PROCESS, reason, draw.attempt + 1, dict(draw.rejected), None, 0.0)
+        return Record(index, "unknown", PROCESS, reason, draw.attempt + 1, dict(draw.rejected), None, 0.0)
 
     def _draw(self, index: int) -> Draw | Record:
         """The scenario of an index, or the record of one that has none."""
@@ -130,7 +128,7 @@ class Job:
             return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, 0.0)
 
 
-def generate(task: Task, certify_settings: CertifySettings, settings: Settings, progress: Progress) -> Summary:
+def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSettings, progress: Progress) -> Summary:
     """Make the pool that the settings describe, continuing an earlier run of the same settings.
 
     Args:
@@ -145,18 +143,18 @@ def generate(task: Task, certify_settings: CertifySettings, settings: Settings, 
     split = Split.parse(settings.split)
     folder = Path(settings.pool or Path("generated", f"{task.name}-{split}"))
     job = Job(task, split, settings.sampler, settings.seed, certify_settings, tuple(settings.keep))
-    identity = {"config": _config(job), **_made_with(task)}
-    journal = Journal(folder, identity)
+    config = _config(job)
+    journal = Journal(folder, {"config": asdict(config), **made_with(task)})
     try:
-        locked = lock.of_run(journal.folder, task.family, _made_with(task))
+        locked = lock.lock_of_run(journal.folder, task.family, made_with(task))
         records = journal.records()
         _extend(job, settings, records, journal, progress)
-        asked = settings.attack and _chosen(records, settings.n)
+        asked = settings.attack and _first_certified(records, settings.n)
         report = _attack(job, settings, records, journal, progress) if asked else None
         with _writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            shards.replace(folder / lock.FILE, locked.encode())
-            return _finish(folder, identity, settings, records, journal, report)
+            replace_file(folder / lock.LOCK_FILE, locked.encode())
+            return _finish(folder, task, config, settings, records, journal, report)
     finally:
         journal.close()
 
@@ -175,40 +173,24 @@ def _writing(folder: Path) -> Iterator[None]:
         raise PoolError(why) from None
 
 
-def row_of(task: Task, draw: Draw, certified: Certified) -> pool.PoolRow:
+def row_of(task: Task, draw: Draw, certified: Certified) -> PoolRow:
     """One scenario as a row of a pool."""
-    certificate = certified.certificate
-    scene, witness = pool.sha256(certified.scene_xml), pool.sha256(certified.witness.tobytes())
-    return pool.PoolRow(
-        id=draw.scenario.id,
-        task=task.name,
-        code=task.code,
-        category=task.category,
-        split=str(draw.split),
-        axes=draw.split.axes,
-        shifted=draw.shifted,
-        seed=draw.seed,
-        index=draw.index,
-        attempt=draw.attempt,
-        id_twin=draw.id_twin,
-        instruction=task.instruction,
-        horizon=task.horizon,
-        params=values(draw.scenario),
-        embodiment=task.embodiment,
+    scene, witness = sha256(certified.scene_xml), sha256(certified.witness.tobytes())
+    certificate = StoredCertificate(
+        **{name: getattr(certified.certificate, name) for name in ("verdict", "reason", "settings", "checks")},
+        scene_sha256=scene,
+        witness_sha256=witness,
+        final_state=certified.digest,
+        **made_with(task),
+    )
+    return PoolRow(
+        **labels_of_task(task, draw.split, draw.seed),
+        **labels_of_draw(draw),
         scene_xml=certified.scene_xml,
         scene_sha256=scene,
         witness=certified.witness,
         witness_sha256=witness,
-        certificate=StoredCertificate(
-            verdict=certificate.verdict,
-            reason=certificate.reason,
-            settings=certificate.settings,
-            checks=certificate.checks,
-            scene_sha256=scene,
-            witness_sha256=witness,
-            final_state=certified.digest,
-            **_made_with(task),
-        ),
+        certificate=certificate,
     )
 
 
@@ -222,29 +204,26 @@ def funnel(records: list[Record]) -> dict[str, int]:
     return counts
 
 
-_WITHOUT_ROW = ("feasible", pool.PROCESS, "attack")
+_WITHOUT_ROW = ("feasible", PROCESS, "attack")
 """Rejections that leave no certificate that tells of them."""
-_CHECK = {pool.PROCESS: "compiles"}
+_CHECK = {PROCESS: "compiles"}
 """What the funnel counts a scenario as that has ended its process: feasible, and through nothing else."""
 
 
-def _made_with(task: Task) -> dict[str, Any]:
-    return {"versions": versions(), "fingerprint": fingerprint(), "source_sha256": source_sha256(task.family)}
+def _config(job: Job) -> RunConfig:
+    return RunConfig(
+        task={"name": job.task.name, **job.task.node},
+        certify=asdict(job.certify_settings),
+        split=str(job.split),
+        sampler=job.sampler,
+        seed=job.seed,
+        keep=job.keep,
+    )
 
 
-def _config(job: Job) -> dict[str, Any]:
-    """Everything that decides which scenarios a run makes and keeps, as plain data."""
-    return {
-        "task": {"name": job.task.name, **job.task.node},
-        "certify": asdict(job.certify_settings),
-        "split": str(job.split),
-        "sampler": job.sampler,
-        "seed": job.seed,
-        "keep": list(job.keep),
-    }
-
-
-def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: Journal, progress: Progress) -> None:
+def _extend(
+    job: Job, settings: GenerateSettings, records: dict[int, Record], journal: Journal, progress: Progress
+) -> None:
     """Add records in the order of indices until n are certified or the limit is reached."""
     limit = settings.limit or max(100, 20 * settings.n)
     if size := job.task.design(job.sampler).size:
@@ -263,13 +242,13 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
 
     with _writing(journal.folder):
         filling.follow(records)
-    for record in each(job, itertools.takewhile(needed, missing), settings.workers, limits, job.lost):
+    for record in each(job, itertools.takewhile(needed, missing), settings.workers, limits, job.lost_record):
         journal.add(record)
         records[record.index] = record.light()
         with _writing(journal.folder):
             filling.follow(records)
         verdicts[record.verdict] += 1
-        lost_in_a_row = lost_in_a_row + 1 if record.check == pool.PROCESS else 0
+        lost_in_a_row = lost_in_a_row + 1 if record.check == PROCESS else 0
         if lost_in_a_row == MOST_LOST:
             why = f"{MOST_LOST} scenarios one after the other have no verdict, the last because it {record.reason}"
             raise PoolError(f"{why}; give them more with limit_seconds= and limit_mb=, or look at one with workers=1")
@@ -277,10 +256,10 @@ def _extend(job: Job, settings: Settings, records: dict[int, Record], journal: J
 
 
 def _attack(
-    job: Job, settings: Settings, records: dict[int, Record], journal: Journal, progress: Progress
+    job: Job, settings: GenerateSettings, records: dict[int, Record], journal: Journal, progress: Progress
 ) -> attacks.AttackReport:
     """Attack the scenarios that go into the pool; those that turn out to have a way around do not go into it."""
-    chosen = _chosen(records, settings.n)
+    chosen = _first_certified(records, settings.n)
     subjects = attacks.certified(job.task, journal.rows(chosen))
     wanted = attacks.AttackSettings(
         split=settings.split,
@@ -290,7 +269,7 @@ def _attack(
         limit_seconds=settings.limit_seconds,
         limit_mb=settings.limit_mb,
     )
-    about = pool.sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
+    about = sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
 
     def told(done: int, hits: int) -> None:
         progress(len(chosen), len(records), {f"attacked, {hits} hits": done})
@@ -304,41 +283,43 @@ def _attack(
     return report
 
 
-def _chosen(records: Mapping[int, Record], n: int) -> list[int]:
+def _first_certified(records: Mapping[int, Record], n: int) -> list[int]:
     """The first n certified indices."""
     return [i for i in sorted(records) if records[i].verdict == "certified"][:n]
 
 
 def _finish(
     folder: Path,
-    identity: Mapping[str, Any],
-    settings: Settings,
+    task: Task,
+    config: RunConfig,
+    settings: GenerateSettings,
     records: Mapping[int, Record],
     journal: Journal,
     report: attacks.AttackReport | None,
 ) -> Summary:
     """Write the first n certified indices, and count up to the last of them."""
-    certified = _chosen(records, settings.n)
+    certified = _first_certified(records, settings.n)
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
     kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in _WITHOUT_ROW]
-    reasons = Counter(pool.uncounted(f"{r.check}: {r.reason}") for r in counted if r.check not in ("", "feasible"))
+    reasons = Counter(without_numbers(f"{r.check}: {r.reason}") for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
     counts = funnel(counted)
     first = sum(r.verdict == "certified" and r.proposals == 1 for r in counted)
-    manifest = {
-        **identity,
-        "n": settings.n,
-        "funnel": counts,
-        "reasons": dict(reasons),
-        "indices": len(counted),
-        "first_draws": first,
-    }
-    if report is not None:
-        manifest["attack"] = attacks.stored(report, folder)
-    ready = placed(journal, certified, folder)
-    rest = journal.rows(certified[len(ready) * pool.SHARD_ROWS :])
-    written = pool.write(folder, manifest, rest, journal.rows(kept), ready)
+    manifest = Manifest(
+        config=config,
+        n=settings.n,
+        indices=len(counted),
+        first_draws=first,
+        funnel=counts,
+        reasons=dict(reasons),
+        **made_with(task),
+        shards=(),
+        attack=None if report is None else attacks.stored(report, folder),
+    )
+    ready = moved_shards(journal, certified, folder)
+    rest = journal.rows(certified[len(ready) * writing.SHARD_ROWS :])
+    written = writing.write_pool(folder, manifest, rest, journal.rows(kept), ready)
     cpu = math.fsum(r.cpu for r in counted)
     return Summary(written, len(certified), len(counted), counts, dict(reasons), first, report, cpu)

@@ -6,7 +6,7 @@ import sqlite3
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..errors import PoolError
-from ..pool.pool import MANIFEST, PoolRow
+from ..pool import PoolRow
+from ..pool.manifest import MANIFEST, FileEntry
 from ..sim.world import action_size
 from ..work.log import different
 from ..work.targets import refused, try_folder
@@ -101,7 +102,7 @@ class Journal:
                 with self._db:
                     self._db.execute("INSERT INTO run VALUES (?)", (text,))
         if before is not None and begun[0] != text:
-            differs = ", ".join(different(before, dict(identity)))
+            differs = ", ".join(different(before, json.loads(text)))
             raise PoolError(
                 f"{pool} was begun with other settings ({differs}); choose another pool=, or move it and "
                 f"{self.folder} aside"
@@ -137,21 +138,21 @@ class Journal:
                 (record.index, json.dumps(body), scene, actions, record.cpu),
             )
 
-    def add_shard(self, number: int, key: str, entry: Mapping[str, Any]) -> None:
+    def add_shard(self, number: int, key: str, entry: FileEntry) -> None:
         """Remember that a shard was written.
 
         Args:
-            key: of what is in it.
-            entry: what a manifest says of it.
+            key: hash of its scenarios.
+            entry: entry of the shard in a manifest.
         """
         with self._told(), self._db:
-            self._db.execute("INSERT OR REPLACE INTO shard VALUES (?, ?, ?)", (number, key, json.dumps(entry)))
+            self._db.execute("INSERT OR REPLACE INTO shard VALUES (?, ?, ?)", (number, key, json.dumps(asdict(entry))))
 
-    def shard(self, number: int, key: str) -> dict[str, Any] | None:
-        """What a manifest says of a shard that was written; None if there is none with that in it."""
+    def shard(self, number: int, key: str) -> FileEntry | None:
+        """Entry of a shard that was written; None if there is none with these scenarios."""
         with self._told():
             found = self._db.execute("SELECT entry FROM shard WHERE number = ? AND key = ?", (number, key)).fetchone()
-            return json.loads(found[0]) if found else None
+            return FileEntry(**json.loads(found[0])) if found else None
 
     @contextmanager
     def _told(self) -> Iterator[None]:

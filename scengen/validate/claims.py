@@ -1,8 +1,9 @@
-"""What a row and a manifest claim, compared with what follows from the manifest's configuration, without simulation."""
+"""Claims of a row and its certificate, compared with what follows from the manifest, without simulation."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,128 +13,122 @@ from ..control.loop import Loop
 from ..control.teleop import ALPHA, LARGEST_CHANGE, MOTION
 from ..errors import Infeasible, ScengenError
 from ..params import canonical
-from ..pool.pool import Pool, PoolRow, sha256
+from ..pool import Pool, PoolRow
+from ..pool.files import sha256
+from ..pool.manifest import Manifest
+from ..samplers.designs import Design
 from ..samplers.split import Split
-from ..samplers.task import Task
+from ..samplers.task import Draw, Task
 from ..scenario import Scenario
 from .certify import ACTIONS, NO_ATTACK, NOT_TRIED, lower_bound, no_ablations
-from .rebuilt import SAME, ZERO, rebuild
+from .labels import labels_of_draw, labels_of_task
+from .rebuilt import MAX_ABSOLUTE_DIFFERENCE, MAX_RELATIVE_DIFFERENCE, rebuild
 from .rollout import AT_REST
 from .settings import CertifySettings
 
 NUMERICS = ("half_time_step", "twice_the_iterations")
-"""What the check of the numerics changes."""
+"""Variations of the check `numerics`."""
 ROUNDING = 1e-6
-"""By how much an action may leave the filter's range: single precision."""
+"""Largest excess of an action over the filter's range, from single precision."""
 
 
 @dataclass(frozen=True)
 class Claims:
-    """What a manifest says of all its rows."""
+    """What a pool says of all its rows."""
 
     task: Task
-    """As the manifest describes it, with the installed family."""
+    """The task as the manifest describes it, with the installed family."""
     split: Split
-    sampler: str
-    seed: int
     settings: CertifySettings
-    indices: int
-    keep: tuple[str, ...]
-    fingerprint: str
-    source_sha256: str
-    versions: Mapping[str, str]
+    """Settings of the certificates."""
+    manifest: Manifest
+    """The manifest without its files."""
 
     @classmethod
     def of(cls, pool: Pool, task: Task, settings: CertifySettings) -> "Claims":
-        """Those of a pool.
+        """The claims of a pool.
 
         Raises:
             ScengenError: there is no such split, or no such sampler.
         """
-        split, made = Split.parse(pool.split), pool.manifest
-        task.shifts(split)
-        task.design(pool.sampler)
-        return cls(
-            task,
-            split,
-            pool.sampler,
-            pool.seed,
-            settings,
-            pool.indices,
-            tuple(made["config"]["keep"]),
-            made["fingerprint"],
-            made["source_sha256"],
-            pool.versions,
-        )
+        claims = cls(task, Split.parse(pool.split), settings, pool.manifest.without_files())
+        task.shifts(claims.split)
+        _ = claims.design
+        return claims
+
+    @cached_property
+    def design(self) -> Design:
+        """Design that the numbers came from."""
+        return self.task.design(self.manifest.config.sampler)
+
+    def draw(self, index: int) -> Draw:
+        """The draw of an index.
+
+        Raises:
+            Infeasible: no try gives a feasible scenario.
+        """
+        return self.task.draw(self.split, self.manifest.config.seed, index, self.design)
 
 
 def wrong_labels(row: PoolRow, claims: Claims) -> Iterator[str]:
-    """Where a row does not say what its manifest says."""
-    task, certificate = claims.task, row.certificate
-    told = {
-        "task": (row.task, task.name),
-        "code": (row.code, task.code),
-        "category": (row.category, task.category),
-        "instruction": (row.instruction, task.instruction),
-        "horizon": (row.horizon, task.horizon),
-        "embodiment": (row.embodiment, task.embodiment),
-        "split": (row.split, str(claims.split)),
-        "axes": (row.axes, claims.split.axes),
-        "seed": (row.seed, claims.seed),
-        "settings": (certificate.settings, claims.settings.name),
-        "versions": (dict(certificate.versions), dict(claims.versions)),
-        "source_sha256": (certificate.source_sha256, claims.source_sha256),
-        "fingerprint": (certificate.fingerprint, claims.fingerprint),
-    }
+    """Columns of a row that differ from what its manifest says."""
+    certificate, manifest = row.certificate, claims.manifest
+    told = {name: (getattr(row, name), value) for name, value in _labels(claims).items()}
+    told["settings"] = (certificate.settings, claims.settings.name)
+    for name in ("versions", "source_sha256", "fingerprint"):
+        told[name] = (getattr(certificate, name), getattr(manifest, name))
     for name, (here, there) in told.items():
         if here != there:
             yield f"the {name} is {_short(here)}, the manifest says {_short(there)}"
-    if row.index >= claims.indices:
-        yield f"the index {row.index} is none of the {claims.indices} that the manifest counts"
+    if row.index >= manifest.indices:
+        yield f"the index {row.index} is none of the {manifest.indices} that the manifest counts"
+
+
+def _labels(claims: Claims) -> dict[str, Any]:
+    return labels_of_task(claims.task, claims.split, claims.manifest.config.seed)
 
 
 def wrong_names(row: PoolRow, scenario: Scenario) -> Iterator[str]:
-    """Where identity and hashes do not belong to the parameters, the scene and the witness."""
+    """Id and hashes of a row that do not belong to its parameters, scene and witness."""
     certificate = row.certificate
     scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
     if row.id != scenario.id:
         yield "the id does not belong to the parameters"
     if as_json(row.params) != canonical(scenario):
-        yield "the parameters are not all there, or not as the family writes them"
+        yield "the parameters are incomplete, or not as the family writes them"
     if {scene} != {row.scene_sha256, certificate.scene_sha256}:
-        yield "the scene has another sha256 than its row or certificate"
+        yield "the scene has another sha256 than its row or certificate says"
     if {witness} != {row.witness_sha256, certificate.witness_sha256}:
-        yield "the witness has another sha256 than its row or certificate"
+        yield "the witness has another sha256 than its row or certificate says"
 
 
 def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
-    """Where a row is not what comes out when its index is drawn again."""
-    task = claims.task
-    if row.index >= claims.indices:
+    """Columns of a row that differ from those of the draw that its index gives."""
+    if row.index >= claims.manifest.indices:
         return
     try:
-        draw = task.draw(claims.split, claims.seed, row.index, task.design(claims.sampler))
+        draw = claims.draw(row.index)
     except Infeasible:
         yield f"drawn again, index {row.index} gives no feasible scenario"
         return
     if row.id != draw.scenario.id:
         yield f"the parameters are not those that are drawn for index {row.index}, which gives {draw.scenario.id}"
         return
-    told = {
-        "attempt": (row.attempt, draw.attempt),
-        "id_twin": (row.id_twin, draw.id_twin),
-        "shifted": (as_json(row.shifted), as_json(draw.shifted)),
-    }
-    for name, (here, there) in told.items():
-        if here != there:
-            yield f"the {name} is {_short(here)}; drawn again it is {_short(there)}"
+    for name, there in labels_of_draw(draw).items():
+        here = getattr(row, name)
+        if name != "params" and _comparable(here) != _comparable(there):  # the id has told of these
+            yield f"the {name} is {_short(_comparable(here))}; drawn again it is {_short(_comparable(there))}"
+
+
+def _comparable(value: Any) -> Any:
+    return as_json(value) if isinstance(value, Mapping) else value
 
 
 # --- the certificate ----------------------------------------------------------------------------------
 
 
 def wrong_certificate(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
-    """Where a certificate of a certified row is incomplete, or contradicts its settings or itself."""
+    """Gaps in the certificate of a certified row, and contradictions with its settings or itself."""
     certificate, checks = row.certificate, row.certificate.checks
     if certificate.verdict != "certified" or certificate.reason:
         yield f"the certificate is not complete: its verdict is {_short(certificate.verdict)} {certificate.reason[:80]}"
@@ -143,23 +138,23 @@ def wrong_certificate(row: PoolRow, scenario: Scenario, claims: Claims) -> Itera
     nothing = _nothing_to_check(scenario, claims.settings)
     for check in checks:
         if check.name in nothing and (check.passed is not None or check.reason != nothing[check.name]):
-            yield f"check {check.name} has nothing to check here, and does not say so"
+            yield f"check {check.name} has nothing to check here, but does not say so"
         elif check.name not in nothing and not check.passed:
             yield f"the certificate is not complete: {check.name} has not passed"
         elif check.name not in nothing and check.reason:
-            yield f"check {check.name} has passed, with a reason against it: {check.reason[:80]}"
+            yield f"check {check.name} has passed, but gives a reason against it: {check.reason[:80]}"
     yield from _other_settings(checks, claims)
     yield from _contradictions({check.name: check for check in checks}, row, scenario, claims)
 
 
 def _nothing_to_check(scenario: Scenario, settings: CertifySettings) -> dict[str, str]:
-    """Checks that are not made, by name, and the reason that a certificate gives."""
+    """Reasons of the checks that are not made, by name, as a certificate gives them."""
     found = {} if settings.attack else {"attack": NO_ATTACK}
     return found if scenario.ablations() else {**found, "ablations": no_ablations(scenario)}
 
 
 def wrong_rejection(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
-    """Where the certificate of a kept scenario that was not certified contradicts itself."""
+    """Contradictions in the certificate of a scenario that was kept although it was not certified."""
     certificate, checks = row.certificate, row.certificate.checks
     if [check.name for check in checks] != list(CHECKS):
         yield f"the checks of this reject are not {', '.join(CHECKS)}, once each in this order"
@@ -167,25 +162,25 @@ def wrong_rejection(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterato
     nothing = _nothing_to_check(scenario, claims.settings)
     failed = next((check for check in checks if not check.passed and check.reason != nothing.get(check.name)), None)
     if failed is None or failed.passed is None:
-        yield "this reject has failed no check"
+        yield "this reject has not failed a check"
         return
     place = list(CHECKS).index(failed.name)
     if any(check.passed is not None for check in checks[place + 1 :]):
         yield f"this reject has checks after {failed.name}, which failed"
     if certificate.verdict != CHECKS[failed.name] or certificate.reason != f"{failed.name}: {failed.reason}":
         yield f"the verdict of this reject does not follow from {failed.name}, which failed"
-    if certificate.verdict not in claims.keep:
-        yield f"this reject is {certificate.verdict}, and keep= does not ask for those"
+    if certificate.verdict not in claims.manifest.config.keep:
+        yield f"this reject is {certificate.verdict}, but keep= does not ask for such scenarios"
     yield from _other_settings(checks[: place + 1], claims)
 
 
-def compiled(row: PoolRow) -> bool:
-    """Whether a certificate does not say that its scene does not compile."""
+def compiles(row: PoolRow) -> bool:
+    """Whether the scene of a row compiles, by its certificate."""
     return not any(check.name == "compiles" and check.passed is False for check in row.certificate.checks)
 
 
-def scene_of_a_failure(scenario: Scenario) -> str:
-    """The text of a scene that does not compile, or cannot be loaded; empty if there is none."""
+def scene_or_nothing(scenario: Scenario) -> str:
+    """The text of a scenario's scene; empty if it cannot be built."""
     try:
         return rebuild(scenario)
     except (ScengenError, ValueError):
@@ -209,32 +204,32 @@ def _other_settings(checks: Sequence[Check], claims: Claims) -> Iterator[str]:
 
 
 def alike(made: Mapping[str, Any], stored: Any) -> bool:
-    """Whether the numbers of a check that was made again are the stored ones but for the last digits.
+    """Whether the numbers of a check that was made again equal the stored ones except for the last digits.
 
-    These may differ where the simulation has the same bits: numpy's linear algebra rounds as the processor's
-    instruction set has it, and no fingerprint tells.
+    The last digits may differ although the simulation has the same bits: rounding of numpy's linear algebra depends on
+    the processor's instruction set, which no fingerprint covers.
     """
-    return _same(from_json(as_json(made)), stored)
+    return _equal(from_json(as_json(made)), stored)
 
 
-def _same(one: Any, other: Any) -> bool:
+def _equal(one: Any, other: Any) -> bool:
     if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_same(one[name], other[name]) for name in one)
+        return one.keys() == other.keys() and all(_equal(one[name], other[name]) for name in one)
     if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
+        return len(one) == len(other) and all(map(_equal, one, other))
     if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=SAME, abs_tol=ZERO)
+        return math.isclose(one, other, rel_tol=MAX_RELATIVE_DIFFERENCE, abs_tol=MAX_ABSOLUTE_DIFFERENCE)
     return type(one) is type(other) and one == other
 
 
 def _played(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: float) -> bool:
-    """Whether the witness ends where the goal has lasted: rows behind that would be played by nobody."""
+    """Whether the witness ends when the goal has lasted: actions after that would not be played."""
     periods = round((seconds + settle) / Loop.PERIOD)
     return numbers == {"periods": len(row.witness), "seconds": seconds} and abs(len(row.witness) - periods) <= 1
 
 
 def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
-    """Numbers with which a check cannot have passed."""
+    """Checks that cannot have passed with their numbers."""
     rules = {
         "feasible": lambda n: alike(scenario.features(), n),
         "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
@@ -257,7 +252,7 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
         if not fine:
             yield (
                 f"check {name} cannot have passed with its numbers, or they are not those of this family; "
-                "where it has changed since, certify the pool again"
+                "if the family has changed since, certify the pool again"
             )
     if not _filtered(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
@@ -270,7 +265,7 @@ def _rested(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
 
 
 def _unsolved(numbers: Mapping[str, Any], unstable: bool) -> bool:
-    """Whether these are the numbers of an episode that was seen to its end and has not reached the goal."""
+    """Whether these are the numbers of a complete episode that has not reached the goal."""
     known = ("failure", "timeout", "unstable") if unstable else ("failure", "timeout")
     return set(numbers) == {"outcome", "reason", "seconds"} and numbers["outcome"] in known and numbers["seconds"] >= 0
 
@@ -316,7 +311,7 @@ def _numerics(numbers: Mapping[str, Any]) -> bool:
 
 
 def _filtered(witness: np.ndarray) -> bool:
-    """Whether the actions can be what the filter makes of some input, from rest on."""
+    """Whether the teleoperation filter can give these actions, starting from rest."""
     if np.abs(witness).max(initial=0.0) > 1.0:
         return False
     motion = witness[:, :MOTION].astype(float)

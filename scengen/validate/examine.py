@@ -1,11 +1,12 @@
-"""One scenario of a pool, or a piece of its run, examined in a process that can be ended: static facts first."""
+"""Examination of a scenario of a pool, or of a piece of its run, in a process that can be ended: static facts first."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 from ..errors import ScengenError
 from ..fingerprint import fingerprint
-from ..pool.pool import PoolRow
+from ..pool import PoolRow
+from ..pool.manifest import MANIFEST
 from . import claims as claim
 from . import survey
 from .certify import Adversary
@@ -14,52 +15,51 @@ from .rebuilt import difference, rebuild
 from .recheck import fails_again, simulate, why_not_certified
 
 Verdict = Literal["sound", "refuted", "declined"]
-"""`declined` is no statement: the check died, was too large or too slow, or belongs to another version."""
-MANIFEST = "manifest.json"
-"""What stands for the pool as a whole where an id is told."""
+"""`declined` says nothing about the claim: the check died, was too large or too slow, or belongs to another version."""
 
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """What was found about one scenario."""
+    """Result for one scenario."""
 
     id: str
     verdict: Verdict
     reasons: tuple[str, ...] = ()
-    """What does not hold, or why nothing can be said; empty for a sound one."""
+    """Faults, or reasons why nothing can be said; empty for a sound scenario."""
     rebuilt: bool = False
-    """Its scene and its draw were made again."""
+    """Whether its scene and its draw were made again."""
     simulated: bool = False
     expired: bool = False
-    """The family's code has changed since the certificate was made."""
+    """Whether the family's code has changed since the certificate was made."""
     drifted: bool = False
-    """The replay reaches the goal, but ends in other bits than on the machine of the certificate."""
+    """Whether the replay reaches the goal, but ends in other bits than on the machine of the certificate."""
 
 
 @dataclass(frozen=True)
-class Left:
-    """An index that has a feasible scenario, and none that was certified."""
+class LeftOut:
+    """An index with a feasible scenario that the run did not certify."""
 
     index: int
 
 
 @dataclass(frozen=True)
 class Failed:
-    """What came of such an index when it was certified again."""
+    """Result of certifying such an index again."""
 
     index: int
     reason: str
-    """As the reasons of a manifest count it; empty if its scenario is certified now."""
+    """Reason as the manifest counts it; empty if the scenario is certified now."""
 
 
-Job = tuple[PoolRow, bool, bool] | range | Left
-"""A row, whether it is simulated, and whether it was certified; or indices to draw again; or one to certify again."""
+Job = tuple[PoolRow, bool, bool] | range | LeftOut
+"""A row, whether it is simulated, and whether it was certified; or indices to draw again; or an index to certify
+again."""
 Answer = Examination | dict[int, survey.Drawn] | Failed
 
 
 @dataclass(frozen=True)
 class Examiner:
-    """Looks at one scenario, or makes a piece of the run again."""
+    """Examines one scenario, or makes a piece of the run again."""
 
     claims: Claims
     level: str
@@ -70,7 +70,7 @@ class Examiner:
         try:
             if isinstance(job, range):
                 return survey.draw_again(job, self.claims)
-            if isinstance(job, Left):
+            if isinstance(job, LeftOut):
                 return Failed(job.index, why_not_certified(job.index, self.claims, self.adversary))
             return self._examined(*job)
         except (ScengenError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:
@@ -87,7 +87,7 @@ class Examiner:
         scenario = claims.task.scenario(row.params)
         reasons += [*claim.wrong_names(row, scenario), *claim.wrongly_drawn(row, claims)]
         reasons += (claim.wrong_certificate if certified else claim.wrong_rejection)(row, scenario, claims)
-        text = rebuild(scenario) if claim.compiled(row) else claim.scene_of_a_failure(scenario)
+        text = rebuild(scenario) if claim.compiles(row) else claim.scene_or_nothing(scenario)
         reasons += filter(None, [difference(row.scene_xml, text, row.certificate.fingerprint == fingerprint())])
         if reasons or not simulated:
             verdict: Verdict = "refuted" if reasons else "sound"
@@ -101,12 +101,12 @@ class Examiner:
         return Examination(row.id, verdict, tuple(reasons), True, True, self.expired, drifted)
 
 
-def lost(job: Job, reason: str) -> Examination:
-    """What is said of a job that has crashed its process, or has reached a limit."""
+def lost_examination(job: Job, reason: str) -> Examination:
+    """The examination of a job that has crashed its process, or has reached a limit."""
     if isinstance(job, tuple):
         return Examination(job[0].id, "declined", (f"verification {reason}",))
     return Examination(MANIFEST, "declined", (f"making {_spelled(job)} again {reason}",))
 
 
-def _spelled(job: range | Left) -> str:
-    return f"index {job.index}" if isinstance(job, Left) else f"indices {job.start} to {job.stop - 1}"
+def _spelled(job: range | LeftOut) -> str:
+    return f"index {job.index}" if isinstance(job, LeftOut) else f"indices {job.start} to {job.stop - 1}"

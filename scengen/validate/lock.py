@@ -1,7 +1,7 @@
-"""scengen.lock beside a pool: the versions of everything that its verdicts were made with, as pip reads them.
+"""scengen.lock beside a pool: versions of the packages that its verdicts were made with, in the format of pip.
 
 It repeats what the manifest says, which counts, and adds the packages that the manifest does not name. Like a pool it
-is data from anybody: of its lines only those of packages that the code of a verdict imports are ever looked at.
+may come from anybody: only its lines about packages that the code of a verdict imports are ever used.
 """
 
 import platform
@@ -13,35 +13,35 @@ from typing import Any
 from llvmlite import binding
 
 from ..errors import PoolError
-from ..pool import schema
+from ..pool.files import why_not_plain
 from ..scenario import Scenario
 from ..work.targets import write
 from .identity import packages
 
-FILE = "scengen.lock"
-LARGEST = 100_000
-"""Bytes of such a file, far more than it needs."""
-ROUNDING = ("sse4.2", "avx", "avx2", "avx512f", "fma", "fma4", "neon", "sve", "sve2")
-"""What a processor can do, if it can, that changes how compiled code rounds: fused and wider arithmetic."""
+LOCK_FILE = "scengen.lock"
+MAX_BYTES = 100_000
+"""Size of the largest file that is read [bytes], far more than it needs."""
+ROUNDING_FEATURES = ("sse4.2", "avx", "avx2", "avx512f", "fma", "fma4", "neon", "sve", "sve2")
+"""Features of a processor that change how compiled code rounds: fused and wider arithmetic."""
 _LINE = re.compile(r"([A-Za-z0-9][\w.-]*)==([\w.!+-]+)", re.ASCII)
 
 
 def needed(family: type[Scenario], made: Mapping[str, str]) -> dict[str, str]:
-    """The packages that a verdict about a family touches, with their versions, sorted by name.
+    """The packages that a verdict about a family depends on, with their versions, sorted by name.
 
     Args:
-        made: the versions of a manifest; those that it names count.
+        made: the versions of a manifest, which take precedence.
     """
     named = {name: told for name, told in made.items() if name not in ("scengen", "platform")}
     return dict(sorted({**packages(family), **named}.items(), key=lambda item: item[0].lower()))
 
 
-def text(family: type[Scenario], versions: Mapping[str, str], fingerprint: str, source_sha256: str) -> str:
-    """What the file says. The arguments are those of the manifest."""
+def lock_text(family: type[Scenario], versions: Mapping[str, str], fingerprint: str, source_sha256: str) -> str:
+    """Content of the file, given the entries of the manifest."""
     cpu = binding.get_host_cpu_features()
-    able = " ".join(name for name in ROUNDING if cpu.get(name))
+    able = " ".join(name for name in ROUNDING_FEATURES if cpu.get(name))
     about = [
-        f"What the verdicts of this pool rest on; beside scengen, pip install --no-deps -r {FILE} gives it again.",
+        f"What the verdicts of this pool rest on; beside scengen, pip install --no-deps -r {LOCK_FILE} gives it again.",
         f"scengen {versions['scengen']}, code {source_sha256}",
         f"python {platform.python_version()}",
         f"platform {versions['platform']}, {' '.join(platform.libc_ver())}",
@@ -52,8 +52,8 @@ def text(family: type[Scenario], versions: Mapping[str, str], fingerprint: str, 
     return "\n".join([*(f"# {line}" for line in about), *lines]) + "\n"
 
 
-def of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -> str:
-    """The text for the pool of a run, which is kept in the run's folder from its beginning on.
+def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -> str:
+    """Content of the file for the pool of a run, which is kept in the run's folder from its beginning on.
 
     Args:
         made: `versions`, `fingerprint` and `source_sha256` of the run.
@@ -62,27 +62,27 @@ def of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -> str
         PoolError: the run is continued with other packages than it was begun with.
         BadConfig: the file cannot be written.
     """
-    begun, here = read(folder), needed(family, made["versions"])
+    begun, here = read_lock(folder), needed(family, made["versions"])
     if begun is None:
-        write(folder / FILE, text(family, **made))
+        write(folder / LOCK_FILE, lock_text(family, **made))
     elif other := [f"{name} {told}" for name, told in begun.items() if here.get(name) != told]:
-        install = f"pip install --no-deps -r {folder / FILE}"
+        install = f"pip install --no-deps -r {folder / LOCK_FILE}"
         raise PoolError(f"{folder} was begun with {', '.join(other)}; {install}, or choose another pool=")
-    return (folder / FILE).read_text()
+    return (folder / LOCK_FILE).read_text()
 
 
-def read(folder: Path) -> dict[str, str] | None:
-    """The packages and versions of a pool's file; None if it has none, as pools that were made otherwise.
+def read_lock(folder: Path) -> dict[str, str] | None:
+    """Versions in the file of a pool, by package; None if there is no file, as in pools that were made otherwise.
 
     Raises:
-        PoolError: it is no such file.
+        PoolError: it is not such a file.
     """
-    path = folder / FILE
+    path = folder / LOCK_FILE
     if not path.exists() and not path.is_symlink():
         return None
-    why = schema.why_no_plain_file(path)
-    if not why and path.stat().st_size > LARGEST:
-        why = f"has more than {LARGEST} bytes"
+    why = why_not_plain(path)
+    if not why and path.stat().st_size > MAX_BYTES:
+        why = f"has more than {MAX_BYTES} bytes"
     if why:
         raise PoolError(f"{path} {why}; remove it")
     found = {}
@@ -90,16 +90,16 @@ def read(folder: Path) -> dict[str, str] | None:
         if line.strip() and not line.startswith("#"):
             match = _LINE.fullmatch(line)
             if match is None or match[1] in found:
-                raise PoolError(f"{path}: line {number} is no `package==version` of its own; remove the file")
+                raise PoolError(f"{path}: line {number} is not `package==version` of another package; remove the file")
             found[match[1]] = match[2]
     return found
 
 
 def differing(locked: Mapping[str, str], here: Mapping[str, str]) -> dict[str, str]:
-    """Packages that a file names in another version than `here` has, and which that is."""
+    """Packages that a file names in another version than `here` has, with the version that the file names."""
     return {name: told for name, told in locked.items() if here.get(name, told) != told}
 
 
-def strange(locked: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
-    """Packages that a file names, and that no verdict touches: nobody should install them because of it."""
+def unneeded(locked: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
+    """Packages that a file names and that no verdict depends on: they should not be installed because of the file."""
     return [name for name in locked if name not in here]

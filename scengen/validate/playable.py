@@ -5,7 +5,8 @@ from contextlib import suppress
 
 from ..episode import Actions
 from ..errors import Unstable
-from ..pool.pool import NO_WITNESS, PoolRow
+from ..pool import PoolRow
+from ..pool.row import NO_WITNESS
 from ..sim.world import World
 from ..work.parallel import SHOWN, Workers, apart, each
 

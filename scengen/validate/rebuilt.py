@@ -9,8 +9,10 @@ from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import JAW, World
 
-SAME, ZERO = 1e-9, 1e-12
-"""Largest difference of two numbers, relative and absolute, on machines that round otherwise: an inertia has 1e-6."""
+MAX_RELATIVE_DIFFERENCE = 1e-9
+"""Largest relative difference of equal numbers on machines with different rounding."""
+MAX_ABSOLUTE_DIFFERENCE = 1e-12
+"""Largest absolute difference of equal numbers on machines with different rounding; the inertia of a body has 1e-6."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?([eE][-+]?[0-9]+)?")
 """A number as MuJoCo reads and writes it; Python takes `0.0_6` and Arabic digits for numbers too."""
 OTHER = "the scene is not the one that the family builds from the parameters"
@@ -64,6 +66,6 @@ def _close(a: str, b: str) -> bool:
         if x != y:
             if not (_NUMBER.fullmatch(x) and _NUMBER.fullmatch(y)):
                 return False
-            if not math.isclose(float(x), float(y), rel_tol=SAME, abs_tol=ZERO):
+            if not math.isclose(float(x), float(y), rel_tol=MAX_RELATIVE_DIFFERENCE, abs_tol=MAX_ABSOLUTE_DIFFERENCE):
                 return False
     return True

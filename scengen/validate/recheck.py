@@ -8,7 +8,8 @@ import numpy as np
 from ..certificate import Check, as_json
 from ..errors import NoOracle
 from ..fingerprint import fingerprint
-from ..pool.pool import PoolRow, uncounted
+from ..pool import PoolRow
+from ..pool.manifest import without_numbers
 from ..scenario import Scenario
 from .certify import Adversary, Trial, certify
 from .claims import Claims, alike
@@ -102,9 +103,8 @@ def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -
         adversary: see `certify`.
     """
     task = claims.task
-    draw = task.draw(claims.split, claims.seed, index, task.design(claims.sampler))
-    again = certify(draw.scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary)
-    return uncounted(again.certificate.reason)
+    again = certify(claims.draw(index).scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary)
+    return without_numbers(again.certificate.reason)
 
 
 def _replayed(row: PoolRow, rollout: Rollout, here: bool) -> Iterator[str]:

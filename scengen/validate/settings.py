@@ -43,7 +43,7 @@ class CertifySettings:
 
     def check(self) -> None:
         """Raise `BadConfig` for a number with which a check would mean nothing or never end."""
-        for name, value in _leaves(asdict(self)):
+        for name, value in leaves(asdict(self)):
             low, high, unit = BOUNDS[name]
             if not low <= value <= high:
                 raise BadConfig(f"certify.{name} = {cut(str(value))}; it must lie in [{low:g}, {high:g}]{unit}")
@@ -68,12 +68,12 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
 """Least and largest value of every setting, and its unit."""
 
 
-def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
+def leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
     """The numbers of nested settings by dotted name."""
     found = []
     for key, value in node.items():
         if isinstance(value, Mapping):
-            found += _leaves(value, f"{prefix}{key}.")
+            found += leaves(value, f"{prefix}{key}.")
         elif f"{prefix}{key}" != "name":
             found.append((f"{prefix}{key}", value))
     return found

@@ -1,13 +1,16 @@
-"""What a manifest says about its task and settings, as objects; of the code, only what is installed here is used."""
+"""Task and settings of a manifest as objects. Only installed code is used."""
 
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
-from typing import Any
+from dataclasses import asdict
 
 from ..errors import PoolError, ScengenError
-from ..pool.pool import Pool
+from ..pool import Pool
+from ..pool.manifest import Manifest
 from ..samplers.task import Task, load
-from .settings import CertifySettings
+from ..typed import typed
+from .settings import CertifySettings, leaves
+
+MAX_SETTING = 3600
+"""Largest number that is read as a setting of certificates: of the seconds, an hour."""
 
 
 def task_of_manifest(pool: Pool, installed: Task) -> Task:
@@ -20,7 +23,7 @@ def task_of_manifest(pool: Pool, installed: Task) -> Task:
     Raises:
         PoolError: the family is another one, or the task does not fit it.
     """
-    node, family = pool.task_node, installed.node["family"]
+    node, family = pool.manifest.task_node, installed.node["family"]
     if node.get("family") != family:
         told = str(node.get("family"))[:80]
         raise PoolError(f"{pool.folder} names the family {told!r} for task {pool.task}; the installed one is {family}")
@@ -30,32 +33,17 @@ def task_of_manifest(pool: Pool, installed: Task) -> Task:
         raise PoolError(f"{pool.folder}: its task cannot be drawn from: {error}") from None
     except (TypeError, ValueError, KeyError, AttributeError, ArithmeticError, RecursionError) as error:
         why = " ".join(str(error).split())[:120]
-        raise PoolError(f"{pool.folder}: its task is no task file ({why})") from None
+        raise PoolError(f"{pool.folder}: its task is not a task file ({why})") from None
 
 
-def settings_of(node: Mapping[str, Any]) -> CertifySettings:
+def settings_of_manifest(manifest: Manifest) -> CertifySettings:
     """The settings of a manifest's certificates.
 
     Raises:
-        PoolError: a setting is missing, unknown or no number.
+        ScengenError: a setting is missing, unknown, of another type, or out of bounds.
     """
-    return _filled("config.certify", CertifySettings(), node)
-
-
-def _filled(where: str, example: Any, node: Any) -> Any:
-    """An object like `example` with the values of `node`, which must have the same names and types."""
-    names = [f.name for f in fields(example)]
-    if not isinstance(node, Mapping) or set(node) != set(names):
-        raise PoolError(f"{where} has other settings than {', '.join(names)}")
-    found = {}
-    for name in names:
-        now, value = getattr(example, name), node[name]
-        if is_dataclass(now):
-            found[name] = _filled(f"{where}.{name}", now, value)
-        elif type(value) is not type(now) and not (isinstance(now, float) and type(value) is int):
-            raise PoolError(f"{where}.{name} is no {type(now).__name__}")
-        elif not isinstance(value, str) and not 0 <= value <= 3600:
-            raise PoolError(f"{where}.{name} = {value}; it must lie in [0, 3600]")
-        else:
-            found[name] = type(now)(value)
-    return type(example)(**found)
+    settings = typed("config.certify", CertifySettings, manifest.config.certify, exact=True)
+    for name, value in leaves(asdict(settings)):
+        if not 0 <= value <= MAX_SETTING:
+            raise PoolError(f"config.certify.{name} = {value}; it must lie in [0, {MAX_SETTING}]")
+    return settings

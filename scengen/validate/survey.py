@@ -1,4 +1,4 @@
-"""A run's indices drawn again: what a manifest counts follows from them, from its rows, and from its reasons."""
+"""The indices of a run drawn again, and the counts of a manifest compared with them, its rows and its reasons."""
 
 import itertools
 from collections import Counter
@@ -7,46 +7,51 @@ from dataclasses import dataclass, field
 
 from ..certificate import CHECKS, STAGES
 from ..errors import Infeasible
-from ..pool.pool import PROCESS, Pool, PoolRow, uncounted
+from ..pool import PoolRow
+from ..pool.manifest import PROCESS, Manifest, without_numbers
 from .claims import Claims
 
 CHUNK = 50
-"""Indices that one worker draws at a time."""
-MOST, MOST_PER_ROW = 10_000, 2000
-"""Draws beyond which a manifest is too large to be drawn again, and how many more for every certified scenario: a run
-gives up far earlier, and a draw takes 0.5 to 14 ms."""
+"""Number of indices that one worker draws at a time."""
+MAX_DRAWS = 10_000
+"""Number of draws beyond which a manifest without scenarios is not drawn again; a draw takes 0.5 to 14 ms."""
+MAX_DRAWS_PER_ROW = 2000
+"""Number of further draws allowed for every certified scenario; a run gives up far earlier."""
 ROWS_IN_TIME = 1000
-"""For how many scenarios their indices may together be drawn in the time that verification gives to one."""
+"""Number of scenarios whose indices may together be drawn in the time that verification gives to one scenario."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What came of one index."""
+    """Result of drawing one index again."""
 
     proposals: int
+    """Number of draws."""
     infeasible: Mapping[str, int]
-    """Infeasible draws by reason."""
+    """Number of infeasible draws by reason."""
     feasible: bool
+    """Whether the last draw was feasible."""
 
 
 @dataclass
 class Survey:
-    """What came of the indices that have been drawn again so far."""
+    """Counts over the indices that have been drawn again so far."""
 
     indices: int = 0
     proposals: int = 0
+    """Number of draws."""
     feasible: int = 0
-    """Indices that gave a feasible scenario."""
+    """Number of indices that gave a feasible scenario."""
     infeasible: Counter[str] = field(default_factory=Counter)
-    """Infeasible draws by reason."""
-    left: list[int] = field(default_factory=list)
+    """Number of infeasible draws by reason."""
+    left_out: list[int] = field(default_factory=list)
     """Indices with a feasible scenario that was not certified."""
 
     def add(self, found: Mapping[int, Drawn], certified: Collection[int]) -> None:
-        """Count some more.
+        """Count some more indices.
 
         Args:
-            certified: all indices that were.
+            certified: all indices that were certified.
         """
         for index, drawn in found.items():
             self.indices += 1
@@ -54,15 +59,15 @@ class Survey:
             self.feasible += drawn.feasible
             self.infeasible.update({f"feasible: {why}": times for why, times in drawn.infeasible.items()})
             if drawn.feasible and index not in certified:
-                self.left.append(index)
+                self.left_out.append(index)
 
 
 def draw_again(indices: Sequence[int], claims: Claims) -> dict[int, Drawn]:
     """Draw some indices of a run again, up to the first feasible scenario of each."""
-    found, design = {}, claims.task.design(claims.sampler)
+    found = {}
     for index in indices:
         try:
-            draw = claims.task.draw(claims.split, claims.seed, index, design)
+            draw = claims.draw(index)
             found[index] = Drawn(draw.attempt + 1, dict(draw.rejected), True)
         except Infeasible as error:
             found[index] = Drawn(error.tries, dict(error.reasons), False)
@@ -74,84 +79,92 @@ def chunks(count: int) -> Iterator[range]:
     return (range(start, min(start + CHUNK, count)) for start in range(0, count, CHUNK))
 
 
-def too_large(pool: Pool) -> str:
+def too_large(manifest: Manifest) -> str:
     """Why the indices of a pool are not drawn again; empty if they are."""
-    most = MOST + MOST_PER_ROW * len(pool)
-    for count, what in ((pool.indices, "indices"), (pool.funnel.get("proposed", 0), "draws")):
+    most = MAX_DRAWS + MAX_DRAWS_PER_ROW * manifest.scenarios
+    for count, what in ((manifest.indices, "indices"), (manifest.funnel.get("proposed", 0), "draws")):
         if count > most:
-            return f"{count} {what} for {len(pool)} scenarios are too many to draw again"
+            return f"{count} {what} for {manifest.scenarios} scenarios are too many to draw again; at most {most} are"
     return ""
 
 
-def patience(pool: Pool, seconds: float) -> float:
-    """How long drawing all indices of a pool again may take [s].
+def patience(scenarios: int, seconds: float) -> float:
+    """Time limit for drawing all indices of a pool again [s].
 
     Args:
-        seconds: what one scenario may take.
+        scenarios: number of scenarios of the pool.
+        seconds: time limit of one scenario [s].
     """
-    return seconds * (1 + len(pool) // ROWS_IN_TIME)
+    return seconds * (1 + scenarios // ROWS_IN_TIME)
 
 
-def too_many(pool: Pool, indices: int, proposals: int) -> str:
-    """Why what has been drawn so far, `proposals` at `indices`, cannot be what a manifest counts; empty if it can."""
-    told = pool.funnel.get("proposed", 0)
+def too_many(manifest: Manifest, indices: int, proposals: int) -> str:
+    """Why the draws so far contradict the count of a manifest; empty if they do not.
+
+    Args:
+        indices: number of indices drawn so far.
+        proposals: number of draws at these indices.
+    """
+    told = manifest.funnel.get("proposed", 0)
     if proposals <= told:
         return ""
-    return f"the funnel tells of {told} draws; {indices} of its {pool.indices} indices alone give {proposals}"
+    return f"the funnel counts {told} draws; {indices} of its {manifest.indices} indices alone give {proposals}"
 
 
-def wrong_order(indices: Sequence[int], pool: Pool) -> Iterator[str]:
-    """Where the indices of the rows cannot be those of a run, or their number.
+def wrong_order(indices: Sequence[int], manifest: Manifest) -> Iterator[str]:
+    """Faults of the number of rows and of their indices.
 
     Args:
-        indices: in the order of the rows, each larger than the one before.
+        indices: indices in the order of the rows, each larger than the one before.
     """
-    if len(indices) != len(pool):
-        yield f"the manifest promises {len(pool)} scenarios, the shards hold {len(indices)}"
-    if len(indices) > pool.manifest["n"]:
-        yield f"the manifest says n = {pool.manifest['n']}, the shards hold {len(indices)} scenarios"
-    if not pool.chosen and len(indices) == pool.manifest["n"] > 0 and indices[-1] != pool.indices - 1:
-        yield f"the manifest counts {pool.indices} indices, but a run ends with the last scenario, index {indices[-1]}"
+    count, n = len(indices), manifest.n
+    if count != manifest.scenarios:
+        yield f"the manifest promises {manifest.scenarios} scenarios, the shards hold {count}"
+    if count > n:
+        yield f"the manifest says n = {n}, the shards hold {count} scenarios"
+    if not manifest.is_subset and count == n > 0 and indices[-1] != manifest.indices - 1:
+        yield f"the manifest counts {manifest.indices} indices, but a run ends with its last scenario, {indices[-1]}"
 
 
-def wrong_funnel(pool: Pool, certified: int, first: int, drawn: Survey) -> Iterator[str]:
-    """Where funnel, reasons and counts of a manifest do not follow from its rows and from what was drawn again.
+def wrong_funnel(manifest: Manifest, certified: int, first: int, drawn: Survey) -> Iterator[str]:
+    """Faults of funnel, reasons and counts of a manifest, given its rows and what was drawn again.
 
     Args:
-        certified: how many rows there are.
-        first: how many of them are first draws.
+        certified: number of rows.
+        first: number of rows that are first draws.
         drawn: every index of the run.
     """
     infeasible, failed = drawn.infeasible, Counter[str]()
-    told = {key: times for key, times in pool.reasons.items() if key.startswith("feasible: ")}
+    told = {key: times for key, times in manifest.reasons.items() if key.startswith("feasible: ")}
     if told != dict(infeasible):
-        yield f"the reasons of infeasible draws are not those that come out again, {_told(infeasible)}"
-    for key, times in pool.reasons.items():
+        yield f"the reasons of infeasible draws differ from those of the draws made again, {_shown(infeasible)}"
+    for key, times in manifest.reasons.items():
         name = key.partition(": ")[0]
         if name not in (*CHECKS, PROCESS):
-            yield f"the reasons name a check {name[:40]!r} that nobody makes"
+            yield f"the reasons name {name[:40]!r}, which is not a check"
         elif name != "feasible":
             failed[name] += times
-    left = drawn.feasible - certified
-    if failed.total() != left:
-        yield f"the reasons tell of {failed.total()} rejected scenarios, and {left} were drawn and not certified"
+    left_out = drawn.feasible - certified
+    if failed.total() != left_out:
+        yield f"the reasons count {failed.total()} rejected scenarios, but {left_out} were drawn and not certified"
     order = [*reversed(CHECKS)]
-    failed["compiles"] += failed.pop(PROCESS, 0)  # such a scenario is feasible, and got through nothing else
+    failed["compiles"] += failed.pop(PROCESS, 0)  # such a scenario is feasible, and got through no other step
     expected = {"proposed": drawn.proposals}
     for stage, checks in STAGES.items():
         expected[stage] = certified + sum(n for k, n in failed.items() if order.index(k) < order.index(checks[-1]))
-    if dict(pool.funnel) != expected:
-        yield f"the funnel is not what comes out again, {expected}"
-    if pool.manifest["first_draws"] != first:
-        yield f"first_draws = {pool.manifest['first_draws']}, and {first} first draws were certified"
+    if dict(manifest.funnel) != expected:
+        yield f"the funnel differs from the one that follows from rows, reasons and draws, {expected}"
+    if manifest.first_draws != first:
+        yield f"first_draws = {manifest.first_draws}, but {first} first draws were certified"
 
 
-def wrong_subset(pool: Pool) -> Iterator[str]:
-    """Where the counts of a subset contradict each other; those of the pool it was chosen from cannot be made again."""
-    if pool.manifest["n"] != len(pool) or len(pool) > pool.funnel.get("certified", 0):
+def wrong_subset(manifest: Manifest) -> Iterator[str]:
+    """Contradictions in the counts of a subset; the counts of the pool that it was chosen from cannot be repeated."""
+    scenarios, funnel = manifest.scenarios, manifest.funnel
+    if manifest.n != scenarios or scenarios > funnel.get("certified", 0):
         yield "the subset has another number of scenarios than it says, or more than were certified"
-    if list(pool.funnel) and set(pool.funnel) != {"proposed", *STAGES}:
-        yield "the funnel has other steps than those of a run"
+    if list(funnel) and set(funnel) != {"proposed", *STAGES}:
+        yield "the funnel has other steps than that of a run"
 
 
 @dataclass(frozen=True)
@@ -160,61 +173,60 @@ class Reject:
 
     index: int
     reason: str
-    """Why it was not, as the reasons of a manifest count it."""
+    """Reason why it was not certified, as the reasons of a manifest count it."""
 
     @classmethod
     def of(cls, row: PoolRow) -> "Reject":
-        """That of a row."""
-        return cls(row.index, uncounted(row.certificate.reason))
+        """The reject of a row."""
+        return cls(row.index, without_numbers(row.certificate.reason))
 
 
-def wrong_rejects(pool: Pool, kept: Sequence[Reject], certified: Collection[int]) -> Iterator[str]:
-    """Where the kept rejects are not those of the reasons.
+def wrong_rejects(manifest: Manifest, kept: Sequence[Reject], certified: Collection[int]) -> Iterator[str]:
+    """Differences between the kept rejects and the reasons of a manifest.
 
     Args:
         certified: the indices of the rows.
     """
     indices = [reject.index for reject in kept]
     if any(a >= b for a, b in itertools.pairwise(indices)):
-        yield "the rejects do not stand in the order of their indices, each once"
+        yield "the rejects are not in the order of their indices, each once"
     if both := {index for index in indices if index in certified}:
         yield f"index {min(both)} is a reject, and certified too"
     expected = {
         key: times
-        for key, times in pool.reasons.items()
+        for key, times in manifest.reasons.items()
         if (name := key.partition(": ")[0]) not in ("feasible", "attack")  # of which nothing is kept
-        and CHECKS.get(name) in pool.manifest["config"]["keep"]
+        and CHECKS.get(name) in manifest.config.keep
     }
     if Counter(reject.reason for reject in kept) != expected:
-        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {_told(expected)}"
+        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {_shown(expected)}"
 
 
-def wrong_losses(pool: Pool, again: Mapping[int, str]) -> Iterator[str]:
-    """Where the reasons of a manifest are not those for which its other feasible scenarios fail here.
+def wrong_losses(manifest: Manifest, again: Mapping[int, str]) -> Iterator[str]:
+    """Differences between the reasons of a manifest and those for which the scenarios that it left out fail here.
 
-    A scenario that had ended its process, or reached a limit of its author's machine, may come to any end; so may one
-    that an attack on the finished pool has refuted, of which no certificate knows.
+    A scenario that had ended its process, or reached a limit of its author's machine, may have any result. The same
+    holds for one that an attack on the finished pool has refuted, because no certificate knows of the attack.
 
     Args:
-        again: why each of them is not certified, by index; empty for one that is.
+        again: reason why each of these scenarios is not certified here, by index; empty for one that is.
     """
-    told = Counter({key: times for key, times in pool.reasons.items() if not key.startswith("feasible: ")})
-    free = (PROCESS, "attack") if "attack" in pool.manifest else (PROCESS,)
+    told = Counter({key: times for key, times in manifest.reasons.items() if not key.startswith("feasible: ")})
+    free = (PROCESS,) if manifest.attack is None else (PROCESS, "attack")
     lost = sum(told.pop(key) for key in list(told) if key.partition(": ")[0] in free)
     found = Counter(again.values())
     if (missing := told - found) or (found - told).total() > lost:
         certified = f"; {found['']} of them are certified here" if found[""] else ""
-        yield f"certified again, scenarios that it left out fail otherwise than it tells, {_told(missing)}{certified}"
+        yield f"certified again, scenarios that it left out fail for other reasons than {_shown(missing)}{certified}"
 
 
-def wrong_attack(pool: Pool) -> Iterator[str]:
-    """Where an attack on the finished pool has left out more scenarios than it has hits that show a way around."""
-    hits = pool.manifest.get("attack", {}).get("hits", [])
-    shown = {str(hit.get("scenario")) for hit in hits if hit.get("lacks")}
-    told = sum(times for key, times in pool.reasons.items() if key.startswith("attack: "))
-    if "attack" in pool.manifest and not pool.manifest["config"]["certify"].get("attack") and told > len(shown):
-        yield f"the attack has refuted {told} scenarios, and shows a way around {len(shown)} of them"
+def wrong_attack(manifest: Manifest) -> Iterator[str]:
+    """Whether an attack on the finished pool has left out more scenarios than it has hits that show a way around."""
+    shown = {str(hit.get("scenario")) for hit in manifest.hits if hit.get("lacks")}
+    told = sum(times for key, times in manifest.reasons.items() if key.startswith("attack: "))
+    if manifest.attack is not None and not manifest.config.certify.get("attack") and told > len(shown):
+        yield f"the attack has refuted {told} scenarios, but shows a way around {len(shown)} of them"
 
 
-def _told(counts: Mapping[str, int]) -> str:
+def _shown(counts: Mapping[str, int]) -> str:
     return str(dict(itertools.islice(counts.items(), 5)))[:500]

@@ -1,4 +1,4 @@
-"""Verification of a pool whose author nobody knows: what it claims is made again and compared, static facts first."""
+"""Verification of a pool of unknown origin: its claims are made again and compared, static facts first."""
 
 import random
 import time
@@ -10,23 +10,24 @@ import numpy as np
 
 from ..errors import PoolError, ScengenError, cut
 from ..fingerprint import fingerprint
-from ..pool.pool import Pool, PoolRow
+from ..pool import Pool, PoolRow
+from ..pool.manifest import MANIFEST, Manifest
 from ..samplers.task import Task
 from ..work.parallel import Limits, Workers, each
 from . import survey
 from .certify import Adversary
 from .claims import Claims
-from .examine import MANIFEST, Answer, Examination, Examiner, Failed, Job, Left, lost
+from .examine import Answer, Examination, Examiner, Failed, Job, LeftOut, lost_examination
 from .findings import Findings, Report
 from .settings import CertifySettings
 from .spot import excluded_share
-from .stored import settings_of, task_of_manifest
+from .stored import settings_of_manifest, task_of_manifest
 
 LIMITS = Limits(300.0, 4000)
-"""Of one scenario: the slowest takes 40 s at level full, and 300 MB."""
+"""Time [s] and memory [MB] of one scenario: the slowest takes 40 s at level full, and 300 MB."""
 
-MOST_FAULTS = 100
-"""Refuted scenarios after which the others are not looked at: the pool is refuted, however many it has."""
+MAX_FAULTS = 100
+"""Number of refuted scenarios after which the others are not looked at: the pool is refuted anyway."""
 
 
 @dataclass(frozen=True)
@@ -34,21 +35,21 @@ class Options:
     """How a pool is verified."""
 
     level: str = "recheck"
-    """See `recheck.LEVELS`."""
+    """One of `recheck.LEVELS`."""
     sample: int | None = None
-    """How many scenarios are simulated, chosen at random; None for all."""
+    """Number of scenarios that are simulated, chosen at random; None for all."""
     others: bool = True
-    """Whether the scenarios that are not simulated are looked at, too. Else they, and the run as a whole, are taken at
-    their author's word."""
+    """Whether the scenarios that are not simulated are looked at, too. Otherwise they, and the run as a whole, are the
+    author's word."""
     seed: int = 0
-    """Decides which. An author who knows it forges the others."""
+    """Seed of the sample. An author who knows it can forge the other scenarios."""
     workers: Workers = 1
     limits: Limits | None = LIMITS
-    """Of one scenario; None to work in this process."""
+    """Limits of one scenario; None to work in this process."""
     strict: bool = True
     """Whether a certificate that is older than the family's code is declined."""
     adversary: Adversary | None = None
-    """Who attacks at level full where the certificates ask for it; see `certify.certify`."""
+    """The adversary at level full, if the certificates ask for an attack; see `certify.certify`."""
 
 
 def verify(
@@ -62,33 +63,29 @@ def verify(
 
     Args:
         installed: the task of that name on this machine; a pool names its task, and never code.
-        levels: the settings that stand behind a name such as `quick`, for this task.
-        progress: told how many scenarios have been checked.
+        levels: the settings that belong to a name such as `quick`, for this task.
+        progress: called with the number of scenarios that have been checked.
     """
     found = Findings(options.level, options.strict)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
     try:
-        task, settings = task_of_manifest(pool, installed), settings_of(pool.manifest["config"]["certify"])
+        task, settings = task_of_manifest(pool, installed), settings_of_manifest(pool.manifest)
         claims = Claims.of(pool, task, settings)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:
         found.of_pool(MANIFEST, "refuted", str(error))
         return found.report()
-    found.compare(installed.node, {key: told for key, told in task.node.items() if key != "scans"})
-    for name in ("code", "category"):
-        if getattr(task, name) != getattr(installed, name):
-            told = f"the {name} is {getattr(task, name)[:60]!r}, that of the task is {getattr(installed, name)!r}"
-            found.of_pool(MANIFEST, "refuted", told)
-    found.weigh(settings, levels)
-    found.age(claims)
-    found.look_up(pool.folder, claims)
+    found.compare_tasks(installed, task)
+    found.name_settings(settings, levels)
+    found.compare_versions(claims)
+    found.compare_lock(pool.folder, claims)
     if found.pool_verdict != "declined":
         run = _Run(pool, options, found, _sample(pool, options, found))
         examiner = Examiner(claims, options.level, found.expired, options.adversary)
         run.examine(examiner, progress)
         run.count()
         if options.level == "full" and found.pool_verdict == "sound":
-            run.certify_left(examiner)
+            run.certify_left_out(examiner)
     return found.report()
 
 
@@ -99,32 +96,36 @@ class _Run:
     pool: Pool
     options: Options
     found: Findings
-    chosen: set[int] | None
+    sample: set[int] | None
     """Places of the rows that are simulated; None for all."""
     indices: "array[int]" = field(default_factory=lambda: array("q"))
-    """Of the rows, as they stand."""
+    """Indices of the rows, in the order of the rows."""
     places: dict[str, int] = field(default_factory=dict)
-    """By id where the row stands, or its last one."""
-    twice: set[str] = field(default_factory=set)
-    """Ids that stand in several rows."""
+    """Place of the last row of each id."""
+    repeated: set[str] = field(default_factory=set)
+    """Ids of more than one row."""
     certified: set[int] = field(default_factory=set)
     """Indices of the rows."""
     first: int = 0
-    """Rows that are first draws of their index."""
+    """Number of rows that are first draws of their index."""
     rejected: list[survey.Reject] = field(default_factory=list)
     drawn: survey.Survey = field(default_factory=survey.Survey)
-    """What came of the indices that were drawn again."""
+    """Counts over the indices that were drawn again."""
     faults: int = 0
-    """Refuted scenarios."""
-    whole: bool = False
+    """Number of refuted scenarios."""
+    complete: bool = False
     """Whether all rows and rejects have been read."""
+
+    @property
+    def manifest(self) -> Manifest:
+        return self.pool.manifest
 
     def examine(self, examiner: Examiner, progress: Callable[[int], None]) -> None:
         """Let workers look at everything, and collect what they find."""
         seen: list[Examination] = []
         options, names = self.options, self.found.names
-        jobs = self._jobs() if options.others or self.chosen is None else self._sampled(sorted(self.chosen))
-        for one in each(examiner, jobs, options.workers, options.limits, lost):
+        jobs = self._jobs() if options.others or self.sample is None else self._sampled(sorted(self.sample))
+        for one in each(examiner, jobs, options.workers, options.limits, lost_examination):
             if isinstance(one, dict):
                 self.drawn.add(one, self.certified)
             elif isinstance(one, Failed) or one.id == MANIFEST:
@@ -132,24 +133,24 @@ class _Run:
             else:
                 seen.append(one)
                 self.faults += one.verdict == "refuted"
-                if one.verdict == "sound" and one.id not in self.twice:
-                    names.pop(one.id, None)  # of a million nobody wants to be told
+                if one.verdict == "sound" and one.id not in self.repeated:
+                    names.pop(one.id, None)  # the report lists no names of sound scenarios, which may be a million
                 progress(min(len(seen), len(self.pool)))
         seen.sort(key=lambda e: self.places.get(e.id, len(self.places)))
         for one in seen:
-            if one.id in self.twice:
+            if one.id in self.repeated:
                 one = replace(one, verdict="refuted", reasons=(*one.reasons, "the id occurs twice"))
             self.found.examinations.append(one)
 
     def _jobs(self) -> Iterator[Job]:
-        """Rows first: how many there are is known then, and a manifest that promises others is not drawn again."""
+        """Rows first: their number is known then, and a manifest that promises another number is not drawn again."""
         try:
             for place, row in enumerate(self.pool.rows()):
                 self._count(row)
                 self.first += row.attempt == 0
                 if self._hopeless():
                     return
-                yield row, self.chosen is None or place in self.chosen, True
+                yield row, self.sample is None or place in self.sample, True
             for row in self.pool.rejects():
                 self.rejected.append(survey.Reject.of(row))
                 self.found.names[row.id] = cut(str(row.name))
@@ -159,31 +160,31 @@ class _Run:
         except PoolError as error:
             self.found.of_pool("shards", "refuted", str(error))
             return
-        self.whole = True
-        if not self.pool.chosen and len(self.indices) == len(self.pool):
+        self.complete = True
+        if not self.manifest.is_subset and len(self.indices) == len(self.pool):
             yield from self._pieces()
 
     def _count(self, row: PoolRow) -> None:
-        """Note which row is looked at."""
+        """Note a row that is looked at."""
         if row.id in self.places:
-            self.twice.add(row.id)
+            self.repeated.add(row.id)
         self.places[row.id] = len(self.indices)
         self.indices.append(row.index)
         self.found.names[row.id] = cut(str(row.name))
         self.certified.add(row.index)
 
     def _sampled(self, places: Sequence[int]) -> Iterator[Job]:
-        """The sample alone, and of the others that their ids and indices can be those of a run."""
-        told = "the scenarios that are not in the sample were not looked at"
+        """The rows of the sample. Of the other rows only ids and indices are compared with those of a run."""
+        told = "the scenarios outside the sample were not looked at"
         self.found.remarks.append(f"{told}: they, the funnel and the reasons are the author's word")
         try:
             directory = self.pool.directory
-            if id_ := directory.twice:
+            if id_ := directory.repeated:
                 self.found.of_pool(MANIFEST, "refuted", f"the id {id_} occurs twice")
             if later := np.flatnonzero(np.diff(directory.indices) <= 0).tolist():
                 index = int(directory.indices[later[0] + 1])
-                self.found.of_pool(MANIFEST, "refuted", f"index {index} stands twice, or after a later one")
-            for what in survey.wrong_order(directory.indices.tolist(), self.pool):
+                self.found.of_pool(MANIFEST, "refuted", f"index {index} occurs twice, or after a later one")
+            for what in survey.wrong_order(directory.indices.tolist(), self.manifest):
                 self.found.of_pool(MANIFEST, "refuted", what)
             for row in self.pool.some(places):
                 self._count(row)
@@ -192,27 +193,28 @@ class _Run:
             self.found.of_pool("shards", "refuted", str(error))
 
     def _hopeless(self) -> bool:
-        """Whether so much is false already that nobody needs to know about the rest; the report says so."""
-        if self.faults >= MOST_FAULTS:
+        """Whether so much is false that the other rows are not looked at; the report says so."""
+        rejected = self.manifest.rejected.rows if self.manifest.rejected else 0
+        if self.faults >= MAX_FAULTS:
             why = f"{self.faults} scenarios are refuted; those after them were not looked at"
-        elif len(self.indices) > len(self.pool) or len(self.rejected) > self.pool.promised_rejects:
+        elif len(self.indices) > len(self.pool) or len(self.rejected) > rejected:
             why = "the shards hold more scenarios than the manifest promises"
         elif len(self.indices) > 1 and self.indices[-1] <= self.indices[-2]:
-            why = f"index {self.indices[-1]} stands twice, or after a later one; the rows behind it were not looked at"
+            why = f"index {self.indices[-1]} occurs twice, or after a later one; the rows after it were not looked at"
         else:
             return False
         self.found.of_pool(MANIFEST, "refuted", why)
         return True
 
     def _pieces(self) -> Iterator[range]:
-        """The indices of the run, as long as what has been drawn can be what the manifest counts, and in time."""
-        if why := survey.too_large(self.pool):
+        """The indices of the run, as long as the draws do not exceed those of the manifest, and in time."""
+        if why := survey.too_large(self.manifest):
             self.found.of_pool(MANIFEST, "declined", why)
             return
         limits, begun = self.options.limits, time.monotonic()
-        patience = survey.patience(self.pool, limits.seconds) if limits else float("inf")
-        for piece in survey.chunks(self.pool.indices):
-            if why := survey.too_many(self.pool, self.drawn.indices, self.drawn.proposals):
+        patience = survey.patience(len(self.pool), limits.seconds) if limits else float("inf")
+        for piece in survey.chunks(self.manifest.indices):
+            if why := survey.too_many(self.manifest, self.drawn.indices, self.drawn.proposals):
                 self.found.of_pool(MANIFEST, "refuted", why)
                 return
             if time.monotonic() - begun > patience:
@@ -221,21 +223,23 @@ class _Run:
                 return
             yield piece
 
-    def certify_left(self, examiner: Examiner) -> None:
-        """Certify what the run has drawn and left out: else an author might leave out what a policy is bad at."""
-        if self.pool.chosen or self.options.sample is not None:
+    def certify_left_out(self, examiner: Examiner) -> None:
+        """Certify the scenarios that the run has drawn and left out: an author might leave out difficult ones."""
+        if self.manifest.is_subset or self.options.sample is not None:
             return
-        left = [Left(index) for index in sorted(self.drawn.left)]
-        for one in each(examiner, left, self.options.workers, self.options.limits, lost):
+        left_out = [LeftOut(index) for index in sorted(self.drawn.left_out)]
+        for one in each(examiner, left_out, self.options.workers, self.options.limits, lost_examination):
             self._note(one)
-        if certified := sum(not why for why in self.found.left_out.values()):
-            self.found.remarks.append(f"{certified} of {len(left)} scenarios that the run left out are certified here")
-        if len(self.found.left_out) == len(left) and examiner.claims.fingerprint == fingerprint():
-            for what in survey.wrong_losses(self.pool, self.found.left_out):
+        reasons = self.found.left_out
+        if certified := sum(not why for why in reasons.values()):
+            told = f"{certified} of {len(left_out)} scenarios that the run left out are certified here"
+            self.found.remarks.append(told)
+        if len(reasons) == len(left_out) and self.manifest.fingerprint == fingerprint():
+            for what in survey.wrong_losses(self.manifest, reasons):
                 self.found.of_pool(MANIFEST, "refuted", what)
 
     def _note(self, one: Answer) -> None:
-        """Keep what was found about the pool as a whole, or about an index without a scenario."""
+        """Keep a finding about the pool as a whole, or about an index without a scenario."""
         if isinstance(one, Failed):
             self.found.left_out[one.index] = one.reason
         elif isinstance(one, Examination):
@@ -243,23 +247,23 @@ class _Run:
 
     def count(self) -> None:
         """Compare the counts of the manifest with what has been seen."""
-        if not self.pool.chosen and len(self.pool) < (asked := self.pool.manifest["n"]):
-            told = f"{asked} scenarios were asked for, and the run ended with {len(self.pool)}"
-            self.found.remarks.append(f"{told}: how many is the author's word")
+        if not self.manifest.is_subset and len(self.pool) < self.manifest.n:
+            told = f"{self.manifest.n} scenarios were asked for, and the run ended with {len(self.pool)}"
+            self.found.remarks.append(f"{told}: this number is the author's word")
         for what in self._miscounted():
             self.found.of_pool(MANIFEST, "refuted", what)
 
     def _miscounted(self) -> Iterator[str]:
-        if not self.whole:
+        if not self.complete:
             return
-        yield from survey.wrong_order(self.indices, self.pool)
-        if self.pool.chosen:
-            yield from survey.wrong_subset(self.pool)
+        yield from survey.wrong_order(self.indices, self.manifest)
+        if self.manifest.is_subset:
+            yield from survey.wrong_subset(self.manifest)
             return
-        yield from survey.wrong_attack(self.pool)
-        yield from survey.wrong_rejects(self.pool, self.rejected, self.certified)
-        if self.drawn.indices == self.pool.indices:
-            yield from survey.wrong_funnel(self.pool, len(self.indices), self.first, self.drawn)
+        yield from survey.wrong_attack(self.manifest)
+        yield from survey.wrong_rejects(self.manifest, self.rejected, self.certified)
+        if self.drawn.indices == self.manifest.indices:
+            yield from survey.wrong_funnel(self.manifest, len(self.indices), self.first, self.drawn)
 
 
 def _sample(pool: Pool, options: Options, found: Findings) -> set[int] | None:
@@ -267,7 +271,7 @@ def _sample(pool: Pool, options: Options, found: Findings) -> set[int] | None:
     total = len(pool)
     if options.sample is None or options.sample >= total:
         return None
-    chosen = set(random.Random(options.seed).sample(range(total), options.sample))
+    places = set(random.Random(options.seed).sample(range(total), options.sample))
     share = excluded_share(total, options.sample)
     found.sample = {"size": options.sample, "of": total, "seed": options.seed, "excluded_share": share}
-    return chosen
+    return places

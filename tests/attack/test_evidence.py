@@ -56,7 +56,7 @@ def attacked_pool(tmp_path_factory):
 
 
 def test_a_pool_tells_of_an_attack_and_its_hits_replay(attacked_pool, capsys):
-    told = Pool.open(attacked_pool).manifest["attack"]
+    told = Pool.open(attacked_pool).manifest.attack
     assert (
         told["rollouts"] == 20 and told["hits"] and len(list((attacked_pool / "hits").iterdir())) == len(told["hits"])
     )

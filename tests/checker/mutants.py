@@ -25,7 +25,7 @@ from judging import Outcome, attempt
 from make_base import BASE, KEPT
 from make_corpus import sealed
 
-from scengen.validate.rebuilt import SAME, ZERO
+from scengen.validate.rebuilt import MAX_ABSOLUTE_DIFFERENCE, MAX_RELATIVE_DIFFERENCE
 
 Path_ = tuple[str | int, ...]
 
@@ -45,7 +45,7 @@ TEXTS = [
     "7",
 ]
 NUMBERS = [0, 1, -1, 2, 7, 0.5, -0.0, 1e-9, 1e9, 1e308, 2**62, 2**64, float("nan"), float("inf"), True]
-JUST_BEYOND, LEAST = 10 * SAME, 10 * ZERO
+JUST_BEYOND, LEAST = 10 * MAX_RELATIVE_DIFFERENCE, 10 * MAX_ABSOLUTE_DIFFERENCE
 """Relative and absolute; ten times what numbers may differ by where machines round otherwise."""
 OTHER_TYPES = [None, [], {}, "", 0, [[]], {"a": {}}, [1, 2], True]
 

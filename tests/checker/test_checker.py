@@ -42,7 +42,7 @@ def test_the_corpus_is_large_and_covers_every_task():
 @pytest.mark.parametrize("name", KEPT)
 def test_the_pools_in_the_repository_are_those_of_the_families_as_they_are(name):
     pool = Pool.open(BASE / name)
-    task = load_task(pool.manifest["config"]["task"]["name"])
+    task = load_task(pool.task)
     remedy = "make checker-base"
     assert not expired(BASE / name), remedy
     for row in pool.rows():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pools import make
 
-from scengen import cli, config
+from scengen import cli, list_tasks, load_task
 from scengen.certificate import CHECKS
 from scengen.commands import drift
 from scengen.drift import environment as environments
@@ -20,9 +20,9 @@ from scengen.drift.judge import Judge, judge
 from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.errors import BadConfig, ScengenError
 from scengen.fingerprint import fingerprint
-from scengen.pool import pool
+from scengen.pool.files import sha256
 from scengen.validate.recheck import FIRST, REPLAYED
-from scengen.validate.stored import settings_of
+from scengen.validate.stored import settings_of_manifest
 from scengen.work.parallel import Limits
 
 ROOT = Path(__file__).parents[2]
@@ -46,11 +46,11 @@ def same(made):
 def changed(made):
     """The same checks with a bar that nothing passes, and of the second scenario a witness that stops halfway: what
     another MuJoCo does to some scenarios, these do to two."""
-    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    task, settings = load_task(made.task), settings_of_manifest(made.manifest)
     strict = Judge(task, replace(settings, rest=replace(settings.rest, drift=0.0)), "recheck")
     first, second = made.rows()
     half = second.witness[: len(second.witness) // 4]
-    halved = {"witness_sha256": pool.sha256(half.tobytes())}
+    halved = {"witness_sha256": sha256(half.tobytes())}
     short = replace(second, witness=half, certificate=replace(second.certificate, **halved), **halved)
     return [asdict(strict(first)), asdict(Judge(task, settings, "recheck")(short))]
 
@@ -108,7 +108,7 @@ def test_the_control_is_named_where_it_is_missing(made, same, changed, result):
 
 
 def test_a_row_that_is_none_is_unknown_and_no_flip(made):
-    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    task, settings = load_task(made.task), settings_of_manifest(made.manifest)
     row = next(made.rows())
     other = replace(row, witness=np.zeros_like(row.witness))
     found = asdict(Judge(task, settings, "recheck")(other))
@@ -116,7 +116,7 @@ def test_a_row_that_is_none_is_unknown_and_no_flip(made):
 
 
 def test_level_full_makes_every_check_but_one_that_was_not_asked_for(made):
-    task, settings = config.task(made.task), settings_of(made.manifest["config"]["certify"])
+    task, settings = load_task(made.task), settings_of_manifest(made.manifest)
     found = Judge(task, settings, "full")(next(made.rows()))
     assert {check.name for check in found.checks} == set(CHECKS) - {"attack"}
     assert found.same_bits and not any(check.flipped for check in found.checks)
@@ -184,7 +184,7 @@ def test_the_page_is_made_of_its_results_and_the_control_repeats_every_bit():
     spec = importlib.util.spec_from_file_location("drift_all", ROOT / "tools" / "drift_all.py")
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
-    files = [ROOT / tool.FOLDER / f"{task}.json" for task in config.tasks()]
+    files = [ROOT / tool.FOLDER / f"{task}.json" for task in list_tasks()]
     told = [json.loads(path.read_text()) for path in files if path.is_file()]
     assert (ROOT / tool.PAGE).read_text() == tool.page(told), "docs/drift.md is out of date; run make drift"
     made = [(one, pool["versions"]["mujoco"]) for one in told for pool in one["pools"]]

@@ -23,8 +23,8 @@ from scengen.export.cameras import calibration
 from scengen.export.lerobot import DataSet, Feature
 from scengen.export.recording import RecordSettings, record
 from scengen.export.stats import QUANTILES, Shades
-from scengen.pool import pool
 from scengen.pool import Pool
+from scengen.pool.writing import write_pool
 from scengen.sim.world import IDLE, SUCTION, World
 
 PAPER = {
@@ -346,7 +346,7 @@ def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):
 
 def test_a_witness_that_fails_is_recorded_as_a_failure(tmp_path, capsys, witnesses):
     cut = replace(witnesses[0], witness=witnesses[0].witness[:50])
-    pool.write(tmp_path / "cut", Pool.open(REFERENCE).about, [cut])
+    write_pool(tmp_path / "cut", Pool.open(REFERENCE).manifest.without_files(), [cut])
     target = tmp_path / "out"
     assert cli.run(["record", f"pool={tmp_path / 'cut'}", f"to={target}", "cameras=none", "fps=5"]) == 1
     assert f"FAILED {cut.name}" in capsys.readouterr().err

@@ -20,7 +20,7 @@ from pools import QUICKLY, make
 
 from scengen import cli
 from scengen.errors import ScengenError
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.runs.journal import Journal, Record
 from scengen.work.log import Log

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from helpers import REFERENCE
 
-from scengen.pool import pool
-from scengen.pool.pool import Pool
-from scengen.runs.filling import Filling, placed
+from scengen.pool import Pool, writing
+from scengen.pool.writing import write_pool
+from scengen.runs.filling import Filling, moved_shards
 from scengen.runs.journal import Journal, Record
 
 SOURCE = Pool.open(REFERENCE)
@@ -16,7 +16,7 @@ SOURCE = Pool.open(REFERENCE)
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A journal, what is known of its indices, and what adds to both."""
-    monkeypatch.setattr(pool, "SHARD_ROWS", 2)
+    monkeypatch.setattr(writing, "SHARD_ROWS", 2)
     journal, records = Journal(tmp_path / "pool", {}), {}
 
     def add(index, verdict="certified"):
@@ -57,12 +57,12 @@ def test_the_pool_is_that_of_a_run_that_writes_all_at_the_end(run, tmp_path):
         add(index)
         filling.follow(records)
     folder, certified = tmp_path / "pool", list(range(5))
-    ready = placed(journal, certified, folder)
+    ready = moved_shards(journal, certified, folder)
     assert len(ready) == 2 and not written(journal)
-    made = pool.write(folder, SOURCE.about, journal.rows(certified[4:]), (), ready)
-    whole = pool.write(tmp_path / "whole", SOURCE.about, journal.rows(certified))
+    made = write_pool(folder, SOURCE.manifest.without_files(), journal.rows(certified[4:]), (), ready)
+    whole = write_pool(tmp_path / "whole", SOURCE.manifest.without_files(), journal.rows(certified))
     assert made.check().sha256 == whole.sha256
-    assert placed(journal, certified, folder) == ready  # the run was killed before the manifest was written
+    assert moved_shards(journal, certified, folder) == ready  # the run was killed before the manifest was written
 
 
 def test_what_stands_there_already_is_not_written_again_and_what_is_damaged_is_left_out(run, tmp_path):
@@ -75,8 +75,10 @@ def test_what_stands_there_already_is_not_written_again_and_what_is_damaged_is_l
     assert [(journal.folder / name).stat().st_mtime_ns for name in written(journal)] == times
     last = journal.folder / "scenarios-00001.parquet"
     last.write_bytes(last.read_bytes()[:-1])
-    assert [entry["file"] for entry in placed(journal, [0, 1, 2, 3], tmp_path / "pool")] == ["scenarios-00000.parquet"]
-    assert placed(journal, [0, 2, 3], tmp_path / "pool") == []  # other scenarios than were written
+    assert [entry.file for entry in moved_shards(journal, [0, 1, 2, 3], tmp_path / "pool")] == [
+        "scenarios-00000.parquet"
+    ]
+    assert moved_shards(journal, [0, 2, 3], tmp_path / "pool") == []  # other scenarios than were written
 
 
 def test_a_record_takes_little_memory():

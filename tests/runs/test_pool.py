@@ -17,12 +17,14 @@ import pyarrow.parquet as pq
 import pytest
 from pools import QUICKLY, certificate_of, make, rewritten
 
-from scengen import config
+from scengen import load_task
 from scengen.certificate import StoredCertificate
 from scengen.errors import PoolError, UnknownName
-from scengen.pool import pool
-from scengen.pool.pool import FORMAT, Pool, PoolRow
-from scengen.pool.shards import SCHEMAS
+from scengen.pool import Pool, PoolRow
+from scengen.pool.files import sha256
+from scengen.pool.manifest import FORMAT
+from scengen.pool.row import SCHEMAS
+from scengen.pool.writing import write_pool
 from scengen.validate.settings import CertifySettings
 from scengen.validate.verify import Options, verify
 
@@ -31,7 +33,7 @@ ROOT = Path(__file__).parents[2]
 
 def examined(folder, strict=True, workers=1):
     options = Options("replay", workers=workers, strict=strict, limits=None)
-    return verify(Pool.open(folder), config.task("domino_single"), {"quick": CertifySettings()}, options)
+    return verify(Pool.open(folder), load_task("domino_single"), {"quick": CertifySettings()}, options)
 
 
 def failures(folder, strict=True, workers=1):
@@ -86,10 +88,11 @@ def test_light_reading_gives_the_same_values(made):
 
 def test_the_manifest_is_read_by_names(made):
     opened = Pool.open(made)
-    assert (opened.task, opened.split, opened.sampler, opened.seed) == ("domino_single", "id", "iid", 0)
-    assert (opened.settings, opened.indices, opened.chosen) == ("quick", 3, False)
-    assert opened.funnel["certified"] == 3 and opened.reasons == {} and opened.versions["mujoco"]
-    assert opened.task_node == config.task("domino_single").node
+    manifest, config = opened.manifest, opened.manifest.config
+    assert (opened.task, opened.split, config.sampler, config.seed) == ("domino_single", "id", "iid", 0)
+    assert (manifest.settings, manifest.indices, manifest.is_subset) == ("quick", 3, False)
+    assert manifest.funnel["certified"] == 3 and manifest.reasons == {} and manifest.versions["mujoco"]
+    assert manifest.task_node == load_task("domino_single").node
 
 
 def test_plain_pyarrow_reads_it(made):
@@ -103,7 +106,7 @@ def test_nothing_in_a_pool_names_the_machine_or_the_time(made):
 
 
 def test_the_instruction_names_neither_axis_nor_values(made):
-    task = config.task("domino_single")
+    task = load_task("domino_single")
     for axis in task.axes:
         assert axis not in task.instruction and axis.replace("_", " ") not in task.instruction
 
@@ -243,7 +246,7 @@ def drop_a_parameter(row):
 
 def forge_witness(row):
     """Cut the actions short and write hashes to match: only the replay can tell."""
-    forged = pool.sha256(row.witness[:120].tobytes())
+    forged = sha256(row.witness[:120].tobytes())
     row = replace(row, witness=row.witness[:120], witness_sha256=forged)
     return certificate_of(row, witness_sha256=forged)
 
@@ -257,7 +260,7 @@ def hostile_scene(row):
 
 
 def with_scene(row, text):
-    forged = pool.sha256(text)
+    forged = sha256(text)
     return certificate_of(replace(row, scene_xml=text, scene_sha256=forged), scene_sha256=forged)
 
 
@@ -281,7 +284,7 @@ def foreign_task(row):
         (flip_scene, "the scene has another sha256"),
         (flip_witness, "the witness has another sha256"),
         (flip_params, "the id does not belong to the parameters"),
-        (drop_a_parameter, "the parameters are not all there"),
+        (drop_a_parameter, "the parameters are incomplete"),
         (forge_witness, "check witness cannot have passed"),
         (forge_scene, "not the one that the family builds"),
         (hostile_scene, "contains <include>"),
@@ -302,7 +305,7 @@ def test_a_scenario_that_occurs_twice_is_found(mine):
     rewritten(mine, lambda row: replace(first, index=1) if row.index == 1 else None)
     assert sum("the id occurs twice" in f["reason"] for f in failures(mine)) == 2
     rewritten(mine, lambda row: first if row.index == 1 else None)
-    assert any("index 0 stands twice" in f["reason"] for f in failures(mine))
+    assert any("index 0 occurs twice" in f["reason"] for f in failures(mine))
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 3}', '{"format": 3, "shards": []}', "\x00"])
@@ -324,7 +327,10 @@ def test_a_manifest_that_lacks_a_part_is_damaged(mine, gone):
 def test_a_pool_of_another_format_is_one_clear_error(mine, number):
     manifest = json.loads((mine / "manifest.json").read_text())
     (mine / "manifest.json").write_text(json.dumps({**manifest, "format": number}))
-    with pytest.raises(PoolError, match=f"has pool format {number}, this scengen reads {FORMAT}; generate the pool"):
+    with pytest.raises(
+        PoolError,
+        match=f"has pool format {number}, this scengen reads {FORMAT}; generate it again with the command and seed",
+    ):
         Pool.open(mine)
 
 
@@ -343,8 +349,8 @@ def gap_in_a_certificate(columns):
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (uncanonical, "from row 1 on .*no mapping in canonical JSON"),
-        (gap, "column instruction has gaps"),
+        (uncanonical, "from row 1 on .*not a mapping in canonical JSON"),
+        (gap, "column instruction has missing values"),
         (gap_in_a_certificate, "from row 1 on .*the certificate lacks source_sha256"),
         (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 3"),
     ],
@@ -356,7 +362,7 @@ def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says)
     damage(columns)
     pq.write_table(pa.table(columns, schema=pa.schema([f for f in SCHEMAS[7] if f.name in columns])), path)
     manifest = json.loads((mine / "manifest.json").read_text())
-    manifest["shards"][0] |= {"bytes": path.stat().st_size, "sha256": pool.sha256(path.read_bytes())}
+    manifest["shards"][0] |= {"bytes": path.stat().st_size, "sha256": sha256(path.read_bytes())}
     (mine / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(PoolError, match=says):
         list(Pool.open(mine).check().rows())
@@ -367,8 +373,8 @@ def made_with(folder, **changed):
     """Let manifest and rows say that the pool was made with something else."""
     opened = Pool.open(folder)
     rows = [certificate_of(row, **changed) for row in opened.rows()]
-    manifest = {key: value for key, value in changed.items() if key in opened.about}
-    return pool.write(folder, {**opened.about, **manifest}, rows)
+    manifest = {key: value for key, value in changed.items() if hasattr(opened.manifest, key)}
+    return write_pool(folder, replace(opened.manifest, **manifest), rows)
 
 
 def test_a_certificate_expires_with_the_code_of_its_family(mine):

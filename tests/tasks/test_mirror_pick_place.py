@@ -16,7 +16,7 @@ from controls import (
 )
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.bar import Bar
 from scengen.certificate import Certificate
 from scengen.envs.gym import PoolEnv
@@ -26,18 +26,18 @@ from scengen.export import recording
 from scengen.export.lerobot import DataSet
 from scengen.export.recording import record
 from scengen.orientation import VIEW_CENTRE
-from scengen.pool import pool
 from scengen.pool import Pool
+from scengen.pool.writing import write_pool
 from scengen.runs.generate import row_of
 from scengen.sim.world import IDLE
-from scengen.tasks.mirror_pick_place import ASIDE, LIFTED, VIEWS, MirrorPickPlace
+from scengen.tasks.mirror_pick_place import LIFT_HEIGHT, MIN_PICTURE_OFFSET, VIEWS, MirrorPickPlace
 from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
 
 # isort: split
 from robosuite import macros
 
-TASK = config.task("mirror_pick_place")
+TASK = load_task("mirror_pick_place")
 NOMINAL = MirrorPickPlace()
 PLAIN, HALF, FLIPPED, _, QUARTER = range(len(VIEWS))
 WITH_EYES = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
@@ -57,8 +57,8 @@ def row_with(view):
 @pytest.fixture(scope="module")
 def pools(tmp_path_factory):
     """A pool with one row for each view of the same scene, by view."""
-    folder, about = tmp_path_factory.mktemp("views"), Pool.open(REFERENCE).about
-    return [pool.write(folder / str(view), about, [row_with(view)]).folder for view in range(len(VIEWS))]
+    folder, about = tmp_path_factory.mktemp("views"), Pool.open(REFERENCE).manifest.without_files()
+    return [write_pool(folder / str(view), about, [row_with(view)]).folder for view in range(len(VIEWS))]
 
 
 def first_look(folder, **arguments):
@@ -204,7 +204,7 @@ def test_near_the_robot_the_hand_turns_to_the_side_on_which_joint_7_has_room(bar
 def test_the_cube_counts_as_lifted_40_mm_above_its_place_on_the_table(short, counts):
     w = load(TASK, NOMINAL)
     assert play(TASK, NOMINAL, NOMINAL.oracle, w).solved and NOMINAL.success(w)
-    w.data.xipos[w.body("cube"), 2] = NOMINAL.spot[2] + NOMINAL.cube.edge / 2 + LIFTED - short
+    w.data.xipos[w.body("cube"), 2] = NOMINAL.spot[2] + NOMINAL.cube.edge / 2 + LIFT_HEIGHT - short
     assert NOMINAL.success(w) == counts
 
 
@@ -244,7 +244,7 @@ def test_every_refutation_has_its_own_reason():
     each_refuted_for_its_own_reason(
         [
             MirrorPickPlace(y=0.385),
-            MirrorPickPlace(cube=Bar(edge=0.07), view=FLIPPED, y=ASIDE / 2 - 0.001),
+            MirrorPickPlace(cube=Bar(edge=0.07), view=FLIPPED, y=MIN_PICTURE_OFFSET / 2 - 0.001),
             MirrorPickPlace(cube=Bar(mass=1.0, friction=0.1)),
             MirrorPickPlace(x=0.35, y=0.3),
         ]

@@ -10,9 +10,9 @@ import pytest
 FOREIGN = Path(__file__).parents[1] / "foreign"
 HASH = """
 import sys
-from scengen.config import task
+from scengen import load_task
 from scengen.validate.identity import source_sha256
-print(source_sha256(task("push_block", ("hydra.searchpath=[file://" + sys.argv[1] + "/foreign/conf]",)).family))
+print(source_sha256(load_task("push_block", ("hydra.searchpath=[file://" + sys.argv[1] + "/foreign/conf]",)).family))
 """
 
 

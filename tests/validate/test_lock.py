@@ -8,9 +8,9 @@ import sys
 import pytest
 from pools import QUICKLY, make
 
-from scengen import cli, config
+from scengen import cli, list_tasks, load_task
 from scengen.errors import PoolError
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
 from scengen.validate import identity, lock
 from scengen.versions import versions
 
@@ -37,26 +37,26 @@ def verified(folder, tmp_path):
 
 def other(folder, package, version):
     """Let the file name another version of a package."""
-    path = folder / lock.FILE
+    path = folder / lock.LOCK_FILE
     before = path.read_text()
-    told = lock.read(folder)
+    told = lock.read_lock(folder)
     path.write_text(before.replace(f"{package}=={told[package]}", f"{package}=={version}"))
     assert path.read_text() != before
 
 
 def test_the_file_names_what_is_installed_and_what_the_manifest_says(made):
-    opened, locked = Pool.open(made), lock.read(made)
-    assert {name: told for name, told in opened.versions.items() if name in locked} == {
+    opened, locked = Pool.open(made), lock.read_lock(made)
+    assert {name: told for name, told in opened.manifest.versions.items() if name in locked} == {
         name: versions()[name] for name in ("mujoco", "robosuite", "numpy")
     }
     assert {"numba", "llvmlite", "scipy"} < set(locked)
-    for line in (opened.manifest["source_sha256"], opened.manifest["fingerprint"], "python 3."):
-        assert line in (made / lock.FILE).read_text()
+    for line in (opened.manifest.source_sha256, opened.manifest.fingerprint, "python 3."):
+        assert line in (made / lock.LOCK_FILE).read_text()
 
 
 def test_pip_takes_the_file_as_requirements_and_as_constraints(made):
     """All of it is installed here: pip reads every line, finds it satisfied, and asks no index."""
-    file = made / lock.FILE
+    file = made / lock.LOCK_FILE
     for given in (["-r", file], ["-c", file, "mujoco"]):
         asked = ["install", "--dry-run", "--no-deps", "--no-index", *given]
         done = subprocess.run([sys.executable, "-m", "pip", *map(str, asked)], capture_output=True, text=True)
@@ -66,7 +66,7 @@ def test_pip_takes_the_file_as_requirements_and_as_constraints(made):
 
 def test_everything_that_a_family_imports_is_named():
     """The cage is cut out with manifold3d: the lock of its task names it, that of no other does."""
-    found = {name: identity.packages(config.task(name).family) for name in config.tasks()}
+    found = {name: identity.packages(load_task(name).family) for name in list_tasks()}
     assert all({"mujoco", "numpy", "numba", "scipy"} <= set(packages) for packages in found.values())
     assert [name for name, packages in found.items() if "manifold3d" in packages] == ["ball_cage_escape"]
     assert not any("scengen" in packages for packages in found.values())
@@ -74,7 +74,7 @@ def test_everything_that_a_family_imports_is_named():
 
 def test_a_pool_without_the_file_and_one_with_it_are_sound(pool, tmp_path):
     assert verified(pool, tmp_path)[0] == 0
-    (pool / lock.FILE).unlink()
+    (pool / lock.LOCK_FILE).unlink()
     assert verified(pool, tmp_path)[0] == 0
 
 
@@ -83,7 +83,7 @@ def test_another_version_is_told_with_the_way_to_its_environment(pool, tmp_path)
     status, report = verified(pool, tmp_path)
     (told,) = report["remarks"]
     assert status == 0 and told.startswith("made with scipy 1.11.0 (here ")
-    assert f"pip install --no-deps -r {pool / lock.FILE}" in told
+    assert f"pip install --no-deps -r {pool / lock.LOCK_FILE}" in told
 
 
 def test_a_pool_of_another_mujoco_is_declined_with_the_way_to_its_environment(pool, tmp_path):
@@ -92,20 +92,20 @@ def test_a_pool_of_another_mujoco_is_declined_with_the_way_to_its_environment(po
     manifest["versions"]["mujoco"] = "3.4.0"
     (pool / "manifest.json").write_text(json.dumps(manifest))
     status, report = verified(pool, tmp_path)
-    assert status == 2 and any(f"-r {pool / lock.FILE}" in told for told in report["remarks"])
+    assert status == 2 and any(f"-r {pool / lock.LOCK_FILE}" in told for told in report["remarks"])
 
 
 def test_a_file_that_contradicts_the_manifest_is_refuted(pool, tmp_path):
     other(pool, "mujoco", "3.4.0")
     status, report = verified(pool, tmp_path)
     (fault,) = report["failed"]
-    assert status == 1 and fault["id"] == lock.FILE and "it says mujoco 3.4.0, the manifest" in fault["reason"]
+    assert status == 1 and fault["id"] == lock.LOCK_FILE and "it says mujoco 3.4.0, the manifest" in fault["reason"]
     assert not report["remarks"], "nobody is told to install from it"
 
 
 def test_nobody_is_told_to_install_what_no_verdict_touches(pool, tmp_path):
     other(pool, "scipy", "1.11.0")
-    with (pool / lock.FILE).open("a") as file:
+    with (pool / lock.LOCK_FILE).open("a") as file:
         file.write("mujocco==3.5.0\n")
     status, report = verified(pool, tmp_path)
     (told,) = report["remarks"]
@@ -117,19 +117,19 @@ def test_nobody_is_told_to_install_what_no_verdict_touches(pool, tmp_path):
     ["--index-url https://example.org", "scipy @ file:///tmp/x", "-r other.txt", "scipy>=1", "numba==1\nnumba==2"],
 )
 def test_a_line_that_does_more_than_name_a_version_is_refuted(pool, tmp_path, line):
-    with (pool / lock.FILE).open("a") as file:
+    with (pool / lock.LOCK_FILE).open("a") as file:
         file.write(f"{line}\n")
-    with pytest.raises(PoolError, match=r"line \d+ is no `package==version`"):
-        lock.read(pool)
+    with pytest.raises(PoolError, match=r"line \d+ is not `package==version`"):
+        lock.read_lock(pool)
     status, report = verified(pool, tmp_path)
-    assert status == 1 and report["failed"][0]["id"] == lock.FILE
+    assert status == 1 and report["failed"][0]["id"] == lock.LOCK_FILE
 
 
 def test_a_link_is_not_followed(pool):
-    (pool / lock.FILE).unlink()
-    (pool / lock.FILE).symlink_to("/etc/passwd")
-    with pytest.raises(PoolError, match="is no plain file"):
-        lock.read(pool)
+    (pool / lock.LOCK_FILE).unlink()
+    (pool / lock.LOCK_FILE).symlink_to("/etc/passwd")
+    with pytest.raises(PoolError, match="is not a plain file"):
+        lock.read_lock(pool)
 
 
 def test_a_run_is_not_continued_with_other_packages(made, tmp_path, capsys):
@@ -145,4 +145,4 @@ def test_a_run_is_not_continued_with_other_packages(made, tmp_path, capsys):
 
 def test_a_subset_keeps_the_file(made, tmp_path):
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'some'}")) == 0
-    assert (tmp_path / "some" / lock.FILE).read_bytes() == (made / lock.FILE).read_bytes()
+    assert (tmp_path / "some" / lock.LOCK_FILE).read_bytes() == (made / lock.LOCK_FILE).read_bytes()

@@ -17,15 +17,16 @@ import pytest
 from helpers import REFERENCE
 from pools import certificate_of
 
-from scengen import cli, config
+from scengen import cli, compose, load_task
 from scengen.certificate import as_json
 from scengen.errors import PoolError
-from scengen.pool import pool
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
+from scengen.pool.files import sha256
+from scengen.pool.writing import write_pool
 from scengen.validate.claims import Claims
 from scengen.validate.junit import junit
 from scengen.validate.spot import excluded_share
-from scengen.validate.stored import settings_of, task_of_manifest
+from scengen.validate.stored import settings_of_manifest, task_of_manifest
 from scengen.validate.verify import Examiner, Options, verify
 from scengen.work.parallel import Limits
 
@@ -43,13 +44,13 @@ def rows(source):
     return tuple(opened(source).rows())
 
 
-task = cache(config.task)
+task = cache(load_task)
 
 
 @cache
 def claims(source):
     of = opened(source)
-    return Claims.of(of, task_of_manifest(of, task(of.task)), settings_of(of.manifest["config"]["certify"]))
+    return Claims.of(of, task_of_manifest(of, task(of.task)), settings_of_manifest(of.manifest))
 
 
 def reasons(source, row, level="replay", simulated=False):
@@ -65,7 +66,7 @@ def scene(pattern, new):
     def forge(row):
         text, count = re.subn(pattern, new, row.scene_xml, count=1, flags=re.S)
         assert count and text != row.scene_xml
-        forged = pool.sha256(text)
+        forged = sha256(text)
         return certificate_of(replace(row, scene_xml=text, scene_sha256=forged), scene_sha256=forged)
 
     return forge
@@ -137,7 +138,7 @@ def witness(change):
 
     def forge(row):
         actions = np.asarray(change(row.witness.copy()), np.float32)
-        forged = pool.sha256(actions.tobytes())
+        forged = sha256(actions.tobytes())
         row = certificate_of(replace(row, witness=actions, witness_sha256=forged), witness_sha256=forged)
         return numbers("witness", periods=len(actions))(row)
 
@@ -153,7 +154,7 @@ def parameter(name, by):
         params = {**row.params, name: row.params[name] * by}
         scenario = task(row.task).scenario(params)
         text = rebuild(scenario)
-        forged = pool.sha256(text)
+        forged = sha256(text)
         row = replace(row, params=params, id=scenario.id, id_twin=scenario.id, scene_xml=text, scene_sha256=forged)
         return certificate_of(check("feasible", numbers=dict(scenario.features()))(row), scene_sha256=forged)
 
@@ -226,7 +227,7 @@ FALSE = {
     "check failed": (check("robust", passed=False), COMPLETE),
     "check skipped": (check("robust", passed=None), COMPLETE),
     "verdict": (certificate_with(verdict="refuted"), COMPLETE),
-    "passed with a reason": (check("robust", reason="1 of 4"), "with a reason against it"),
+    "passed with a reason": (check("robust", reason="1 of 4"), "gives a reason against it"),
     "level": (certificate_with(settings="full"), "the settings is 'full'"),
     "versions": (certificate_with(versions={"mujoco": "9", "robosuite": "9"}), "the versions is"),
     "source": (certificate_with(source_sha256="0" * 64), "the source_sha256 is"),
@@ -327,7 +328,7 @@ def mine(tmp_path):
 def report(folder, **options):
     of = Pool.open(folder)
     asked = {"level": "replay", "limits": None, "strict": False, "sample": 1, **options}
-    return verify(of, task(of.task), config.levels(task(of.task)), Options(**asked))
+    return verify(of, task(of.task), compose.certify_levels(task(of.task)), Options(**asked))
 
 
 def changed(folder, change):
@@ -339,15 +340,15 @@ def changed(folder, change):
 
 
 MANIFEST = {
-    "funnel": (lambda m: m["funnel"].update(certified=40), "the funnel is not"),
-    "proposed": (lambda m: m["funnel"].update(proposed=200), "the funnel is not"),
-    "a stage left out": (lambda m: m["funnel"].pop("robust"), "the funnel is not"),
+    "funnel": (lambda m: m["funnel"].update(certified=40), "the funnel differs"),
+    "proposed": (lambda m: m["funnel"].update(proposed=200), "the funnel differs"),
+    "a stage left out": (lambda m: m["funnel"].pop("robust"), "the funnel differs"),
     "n": (lambda m: m.update(n=1), "says n = 1"),
     "indices fewer": (lambda m: m.update(indices=1), "none of the 1 that"),
-    "indices more": (lambda m: m.update(indices=9), "a run ends with the last"),
+    "indices more": (lambda m: m.update(indices=9), "a run ends with its last"),
     "indices beyond": (lambda m: m.update(indices=999_999_999), "too many to draw again"),
     "first draws": (lambda m: m.update(first_draws=1), "first_draws = 1"),
-    "reasons": (lambda m: m.update(reasons={"robust: bad luck": 3}), "the reasons tell of 3"),
+    "reasons": (lambda m: m.update(reasons={"robust: bad luck": 3}), "the reasons count 3"),
     "reasons of draws": (lambda m: m.update(reasons={"feasible: bad luck": 3}), "reasons of infeasible draws"),
     "keep": (lambda m: (m["config"].update(keep=["unknown"]), m.update(reasons={"robust: x": 1})), "rejects are kept"),
     "seed": (lambda m: m["config"].update(seed=1), "the seed is 0, the manifest says 1"),
@@ -360,7 +361,7 @@ MANIFEST = {
     "level": (lambda m: m["config"]["certify"].update(name="full"), "called full, whose bound"),
     "unknown level": (lambda m: m["config"]["certify"].update(name="strict"), "called 'strict'"),
     "more than was done": (lambda m: m["config"]["certify"]["robust"].update(runs=14), "check robust was made"),
-    "rejects": (lambda m: m["funnel"].update(robust=5), "the funnel is not"),
+    "rejects": (lambda m: m["funnel"].update(robust=5), "the funnel differs"),
     "subset": (lambda m: m.update(subset={"of": "0" * 64, "chosen": "by hand"}, n=5), "the subset has another number"),
 }  # fmt: skip
 
@@ -375,9 +376,9 @@ def test_a_false_claim_of_a_manifest_is_noticed(mine, name):
 
 def test_older_software_is_declined(mine):
     of = Pool.open(mine)
-    older = {**of.versions, "mujoco": "3.3.0"}
+    older = {**of.manifest.versions, "mujoco": "3.3.0"}
     (mine / "scengen.lock").unlink()  # which tells of the other
-    pool.write(mine, {**of.about, "versions": older}, [certificate_of(r, versions=older) for r in of.rows()])
+    write_pool(mine, replace(of.manifest, versions=older), [certificate_of(r, versions=older) for r in of.rows()])
     found = report(mine)
     assert found.verdict == "declined" and "certified with mujoco 3.3.0" in found.failed[0]["reason"]
 
@@ -385,9 +386,9 @@ def test_older_software_is_declined(mine):
 def test_rows_in_another_order_or_twice_are_noticed(mine):
     of = Pool.open(mine)
     made = list(of.rows())
-    pool.write(mine, of.about, [*made[1:], made[0]])
-    assert any("stands twice, or after a later one" in f["reason"] for f in report(mine).failed)
-    pool.write(mine, of.about, [made[0], made[0], *made[2:]])
+    write_pool(mine, of.manifest.without_files(), [*made[1:], made[0]])
+    assert any("occurs twice, or after a later one" in f["reason"] for f in report(mine).failed)
+    write_pool(mine, of.manifest.without_files(), [made[0], made[0], *made[2:]])
     assert any("the id occurs twice" in f["reason"] for f in report(mine).failed)
 
 
@@ -412,7 +413,7 @@ def test_a_family_of_a_manifest_is_never_imported(mine, tmp_path, monkeypatch):
         (lambda m: m["config"]["certify"].update(settle=1e7), "settling time"),
         (lambda m: m["shards"][0].update(file="../../etc/passwd"), "outside the pool"),
         (lambda m: m["shards"].append(m["shards"][0]), "listed twice"),
-        (lambda m: m.update(more=1), "an entry that no pool has"),
+        (lambda m: m.update(more=1), "no key named 'more'; known: attack, config,"),
         (lambda m: m.update(indices=-1), "indices = -1"),
         (lambda m: m["config"].update(sampler="lhs:1000000000"), "config.sampler"),
         (lambda m: m["config"]["task"]["axes"]["diagonal"].update(severities=10**9), "severities"),
@@ -440,24 +441,24 @@ def test_a_pipe_or_a_link_is_no_shard(mine):
     shard = mine / "scenarios-00000.parquet"
     moved = shard.rename(mine / "elsewhere")
     shard.symlink_to(moved)
-    with pytest.raises(PoolError, match="is no plain file"):
+    with pytest.raises(PoolError, match="is not a plain file"):
         list(Pool.open(mine).rows())
     shard.unlink()
     os.mkfifo(shard)
-    assert Pool.open(mine).damaged() == {shard.name: "is no plain file"}
-    with pytest.raises(PoolError, match="is no plain file"):
+    assert Pool.open(mine).damaged() == {shard.name: "is not a plain file"}
+    with pytest.raises(PoolError, match="is not a plain file"):
         list(Pool.open(mine).columns("id"))
 
 
 @pytest.mark.parametrize(
     ("columns", "says"),
     [
-        ({"id": "../../../evil"}, "id '../../../evil' is not of the form"),
+        ({"id": "../../../evil"}, "id '../../../evil' does not match"),
         ({"task": "../../evil"}, "task '../../evil'"),
-        ({"horizon": float("inf")}, "horizon is no finite number"),
+        ({"horizon": float("inf")}, "horizon is not a finite number"),
         ({"horizon": 1e4}, "horizon = 10000 s"),
         ({"index": -1}, "index = -1"),
-        ({"embodiment": "panda"}, "is no robot"),
+        ({"embodiment": "panda"}, "is not a robot"),
         ({"params": {"count": float("nan")}}, "not finite"),
         ({"params": {"count": "three"}}, "no number for 'count'"),
         ({"witness": np.full((3, 7), np.nan)}, "not finite"),
@@ -466,7 +467,7 @@ def test_a_pipe_or_a_link_is_no_shard(mine):
 )
 def test_a_row_of_another_form_is_refused_wherever_it_is_read(mine, columns, says):
     of = Pool.open(mine)
-    pool.write(mine, of.about, [replace(row, **columns) for row in of.rows()])
+    write_pool(mine, of.manifest.without_files(), [replace(row, **columns) for row in of.rows()])
     with pytest.raises(PoolError, match=re.escape(says)) as error:
         list(Pool.open(mine).rows())
     assert "\n" not in str(error.value) and not report(mine).holds
@@ -494,17 +495,17 @@ def test_a_run_that_ended_with_fewer_than_were_asked_for_is_told(mine):
     changed(mine, lambda m: m.update(n=60))
     found = report(mine)
     assert found.holds and found.remarks == [
-        "60 scenarios were asked for, and the run ended with 6: how many is the author's word"
+        "60 scenarios were asked for, and the run ended with 6: this number is the author's word"
     ]
 
 
 def test_own_settings_are_told(mine):
     changed(mine, lambda m: m["config"]["certify"]["rest"].update(seconds=1.0))
-    assert report(mine).settings == "own settings (quick, but for rest.seconds)"
+    assert report(mine).settings == "own settings (quick, except for rest.seconds)"
 
 
 def test_what_takes_too_long_is_declined_and_the_others_are_not():
-    found = verify(opened("single"), task("domino_single"), config.levels(task("domino_single")),
+    found = verify(opened("single"), task("domino_single"), compose.certify_levels(task("domino_single")),
                    Options("full", sample=1, limits=Limits(0.5, 4000), strict=False))  # fmt: skip
     assert (found.verdict, found.declined, found.sound) == ("declined", 1, 5)
     assert "took longer than 0.5 s" in found.failed[0]["reason"]

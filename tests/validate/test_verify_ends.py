@@ -8,10 +8,11 @@ import pytest
 from helpers import REFERENCE
 from pools import certificate_of
 
-from scengen import config
+from scengen import compose, load_task
 from scengen.errors import ScengenError
-from scengen.pool import pool
-from scengen.pool.pool import Pool
+from scengen.pool import Pool
+from scengen.pool.files import sha256
+from scengen.pool.writing import write_pool
 from scengen.validate import survey, verify
 from scengen.validate.playable import check_row, check_scene
 from scengen.validate.survey import Reject
@@ -32,9 +33,9 @@ def changed(folder, **entries):
 
 def report(folder, **options):
     of = Pool.open(folder)
-    task = config.task(of.task)
+    task = load_task(of.task)
     settings = {"level": "replay", "strict": False, "limits": None, "sample": 1, **options}
-    return verify.verify(of, task, config.levels(task), verify.Options(**settings))
+    return verify.verify(of, task, compose.certify_levels(task), verify.Options(**settings))
 
 
 def faults(found):
@@ -42,10 +43,10 @@ def faults(found):
 
 
 def test_a_redraw_ends_where_more_comes_out_than_the_manifest_counts(mine, monkeypatch):
-    funnel = {**Pool.open(mine).funnel, "proposed": 3}
+    funnel = {**Pool.open(mine).manifest.funnel, "proposed": 3}
     changed(mine, funnel=funnel)
     monkeypatch.setattr(survey, "CHUNK", 2)
-    assert "the funnel tells of 3 draws; 4 of its 6 indices alone give 4" in faults(report(mine))
+    assert "the funnel counts 3 draws; 4 of its 6 indices alone give 4" in faults(report(mine))
 
 
 def test_a_redraw_that_takes_too_long_is_declined(mine, monkeypatch):
@@ -56,17 +57,16 @@ def test_a_redraw_that_takes_too_long_is_declined(mine, monkeypatch):
 
 def test_many_draws_are_declined_for_few_scenarios(mine):
     of = Pool.open(mine)
-    most = survey.MOST + survey.MOST_PER_ROW * len(of)
+    most = survey.MAX_DRAWS + survey.MAX_DRAWS_PER_ROW * len(of)
     for entries, what in (({"indices": most + 1}, "indices"), ({"funnel": {"proposed": most + 1}}, "draws")):
-        manifest = {**of.manifest, **entries}
-        assert survey.too_large(Pool(mine, manifest)).startswith(f"{most + 1} {what} for 6 scenarios")
-    assert not survey.too_large(of)
+        assert survey.too_large(replace(of.manifest, **entries)).startswith(f"{most + 1} {what} for 6 scenarios")
+    assert not survey.too_large(of.manifest)
 
 
 def test_after_some_false_scenarios_the_others_are_not_looked_at(mine, monkeypatch):
-    monkeypatch.setattr(verify, "MOST_FAULTS", 2)
+    monkeypatch.setattr(verify, "MAX_FAULTS", 2)
     of = Pool.open(mine)
-    pool.write(mine, of.about, [replace(row, instruction="Do nothing.") for row in of.rows()])
+    write_pool(mine, of.manifest.without_files(), [replace(row, instruction="Do nothing.") for row in of.rows()])
     found = report(mine)
     assert found.checked == found.refuted == 2
     assert "2 scenarios are refuted; those after them were not looked at" in faults(found)
@@ -97,20 +97,20 @@ TOLD = {"robust: # of #": 2, "rest: tile_# drifts": 1, "feasible: too near": 7}
 )
 def test_what_was_left_out_fails_for_the_reasons_that_are_told(mine, again, entries, fine):
     of = Pool.open(mine)
-    told = Pool(mine, {**of.manifest, "reasons": {**TOLD, **entries}})
+    told = replace(of.manifest, reasons={**TOLD, **entries})
     assert (not list(survey.wrong_losses(told, dict(enumerate(again))))) == fine
 
 
 def test_what_an_attack_on_the_finished_pool_has_refuted_may_be_certified(mine):
     of = Pool.open(mine)
-    manifest = {**of.manifest, "attack": {"rates": [], "hits": []}, "reasons": {"attack: a way around": 1}}
-    assert not list(survey.wrong_losses(Pool(mine, manifest), {3: ""}))
+    manifest = replace(of.manifest, attack={"rates": [], "hits": []}, reasons={"attack: a way around": 1})
+    assert not list(survey.wrong_losses(manifest, {3: ""}))
 
 
 def test_rejects_are_those_that_the_reasons_tell_of(mine):
     of = Pool.open(mine)
-    config_ = {**of.manifest["config"], "keep": ["unknown"]}
-    told = Pool(mine, {**of.manifest, "config": config_, "reasons": {"robust: # of # runs": 2, "idle: it falls": 1}})
+    kept_config = replace(of.manifest.config, keep=("unknown",))
+    told = replace(of.manifest, config=kept_config, reasons={"robust: # of # runs": 2, "idle: it falls": 1})
     kept = [Reject(7, "robust: # of # runs"), Reject(9, "robust: # of # runs")]
     assert not list(survey.wrong_rejects(told, kept, {1: 0}))
     assert list(survey.wrong_rejects(told, kept[:1], {1: 0}))
@@ -136,13 +136,12 @@ def test_a_scene_that_does_not_end_is_named_before_anybody_looks_at_it(monkeypat
 
 def test_a_reject_needs_the_scene_that_belongs_to_it():
     from scengen.validate.examine import Examiner
-    from scengen.validate.stored import settings_of, task_of_manifest
+    from scengen.validate.stored import settings_of_manifest, task_of_manifest
 
     of = Pool.open(REFERENCE)
-    made = verify.Claims.of(
-        of, task_of_manifest(of, config.task(of.task)), settings_of(of.manifest["config"]["certify"])
-    )
-    claims = replace(made, keep=("unknown",))
+    made = verify.Claims.of(of, task_of_manifest(of, load_task(of.task)), settings_of_manifest(of.manifest))
+    config_ = replace(made.manifest.config, keep=("unknown",))
+    claims = replace(made, manifest=replace(made.manifest, config=config_))
     row = next(of.rows())
     names = [check.name for check in row.certificate.checks]
     place = names.index("robust")
@@ -155,7 +154,7 @@ def test_a_reject_needs_the_scene_that_belongs_to_it():
     kept = certificate_of(row, checks=tuple(checks), verdict="unknown", reason="robust: 1 of 4")
     examined = Examiner(claims, "replay", False)((kept, False, False))
     assert examined.reasons == ()
-    nothing = pool.sha256("")
+    nothing = sha256("")
     empty = certificate_of(replace(kept, scene_xml="", scene_sha256=nothing), scene_sha256=nothing)
     assert any(
         "the scene is not the one" in why for why in Examiner(claims, "replay", False)((empty, False, False)).reasons
