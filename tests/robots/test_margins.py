@@ -100,5 +100,5 @@ def test_the_hand_that_pinches_at_an_edge_has_two_tenths_of_a_radian_along_two_t
 def test_the_jaw_takes_the_rim_of_every_plate_where_it_changes_hands():
     for radius in (0.085, 0.122):
         for off in (0.0, STAND_OFF):
-            place = plate_shelf.MEETING + (radius + off) * LEFT + 0.012 * UP
+            place = plate_shelf.HANDOVER_POINT + (radius + off) * LEFT + 0.012 * UP
             assert miss(place, sideways(), base=panda.bases(2)[1]) < 1e-3, (radius, off)
