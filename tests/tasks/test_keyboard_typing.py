@@ -17,16 +17,26 @@ from controls import (
     solution,
 )
 
-from scengen import config
+from scengen import load_task
 from scengen.assets.glyph import STROKES
 from scengen.assets.keyboard import LETTERS, Keyboard
 from scengen.assets.prop import TABLE_TOP
 from scengen.control.loop import Loop
 from scengen.episode import Episode
 from scengen.geometry import UP
-from scengen.tasks.keyboard_typing import CLEAR, DOUBLED, HOME, LONG, MISTAKES, TRAINED, UNSEEN, WORDS, KeyboardTyping
+from scengen.tasks.keyboard_typing import (
+    DOUBLED_WORDS,
+    LONG_WORDS,
+    MIN_CLEARANCE,
+    MISTAKES,
+    PARTNER_HOME,
+    TRAINING_WORDS,
+    UNSEEN_WORDS,
+    WORDS,
+    KeyboardTyping,
+)
 
-TASK = config.task("keyboard_typing")
+TASK = load_task("keyboard_typing")
 NOMINAL = KeyboardTyping(mine=0b00110)
 """WORLD, of which O and R are the agent's: it waits, types two letters in a row, and makes room."""
 PERIODS = round(NOMINAL.hold / Loop.PERIOD)
@@ -54,7 +64,7 @@ def history():
         memory, (partner,) = world.memory, world.partners
         shown = [bool(world.pos(f"typed_{k}")[2] > TABLE_TOP - 0.001) for k in range(5)]
         keys = int(memory["key_0"]), int(memory["key_1"])
-        away = float(np.linalg.norm(partner.hand - HOME))
+        away = float(np.linalg.norm(partner.hand - PARTNER_HOME))
         seen.append(Moment(int(memory["typed"]), shown, keys, NOMINAL.beside(world, world.arm), away))
         if middle is None and memory["held_1"] > NOMINAL.hold / 2:
             middle = row + 1, world.state()
@@ -159,14 +169,14 @@ def test_a_letter_that_comes_twice_must_be_let_go_of_in_between():
 
 
 def test_the_partner_waits_as_long_as_the_agent_is_in_its_way(world):
-    """At the start the agent's hand is less than `CLEAR` beside the keyboard: nothing happens by itself."""
+    """At the start the agent's hand is less than `MIN_CLEARANCE` beside the keyboard: nothing happens by itself."""
     world.reset()
     episode = Episode(NOMINAL, world)
     for _ in range(300):
         episode.step(world.idle.astype(np.float32))
     (partner,) = world.partners
     assert NOMINAL.beside(world, partner) and not NOMINAL.beside(world, world.arm) and not NOMINAL.pending(world)
-    assert np.linalg.norm(partner.hand - HOME) < 0.01 and world.memory["typed"] == 0
+    assert np.linalg.norm(partner.hand - PARTNER_HOME) < 0.01 and world.memory["typed"] == 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,7 +247,7 @@ def test_with_dead_keys_for_the_partner_its_turn_never_ends():
 class Parked(KeyboardTyping):
     """The partner stays where it is."""
 
-    def _partner(self, world, arm):
+    def _partner_action(self, world, arm):
         return arm.idle
 
 
@@ -260,23 +270,23 @@ def test_an_oracle_that_does_not_share_is_not_certified():
 
 def test_words_are_what_their_axes_say():
     assert len(set(WORDS)) == len(WORDS) == 40 and set("".join(WORDS)) <= set(LETTERS) == set(STROKES)
-    assert all(len(word) == len(set(word)) == 5 for word in TRAINED + UNSEEN)
-    assert all(len(word) == 5 > len(set(word)) for word in DOUBLED)
-    assert all(len(word) == len(set(word)) == 7 for word in LONG)
+    assert all(len(word) == len(set(word)) == 5 for word in TRAINING_WORDS + UNSEEN_WORDS)
+    assert all(len(word) == 5 > len(set(word)) for word in DOUBLED_WORDS)
+    assert all(len(word) == len(set(word)) == 7 for word in LONG_WORDS)
     drawn = {split: {TASK.draw(split, 0, i).scenario.letters for i in range(60)} for split in ("id", *TASK.axes)}
-    assert drawn["id"] <= set(TRAINED) and drawn["unseen_words"] <= set(UNSEEN)
-    assert drawn["doubled_letters"] <= set(DOUBLED) and drawn["long_words"] <= set(LONG)
+    assert drawn["id"] <= set(TRAINING_WORDS) and drawn["unseen_words"] <= set(UNSEEN_WORDS)
+    assert drawn["doubled_letters"] <= set(DOUBLED_WORDS) and drawn["long_words"] <= set(LONG_WORDS)
 
 
 def test_most_pairs_of_letters_in_unseen_words_are_new():
-    known, others = ({pair for word in words for pair in pairwise(word)} for words in (TRAINED, UNSEEN))
+    known, others = ({pair for word in words for pair in pairwise(word)} for words in (TRAINING_WORDS, UNSEEN_WORDS))
     assert len(others - known) / len(others) > 0.8
 
 
 def test_home_is_out_of_the_way():
     assert KeyboardTyping(y=0.02, yaw=15.0).infeasible() is None
-    hand = HOME - (TABLE_TOP + 0.2) * UP
-    assert abs(hand[1]) - Keyboard().size[1] / 2 - 0.02 > CLEAR and math.isclose(hand[2], 0.0)
+    hand = PARTNER_HOME - (TABLE_TOP + 0.2) * UP
+    assert abs(hand[1]) - Keyboard().size[1] / 2 - 0.02 > MIN_CLEARANCE and math.isclose(hand[2], 0.0)
 
 
 def test_every_constraint_refutes_what_violates_it():
