@@ -6,7 +6,7 @@
 
 Bottleneck: the centre of mass must be over the ridge, which is 12 or 8 mm wide, and it is not visible. A held rod
 reveals it: the torque at the wrist over the rod's weight is the distance of the centre of mass from the hand. A failed
-attempt ends the episode, so the robot must measure it before it releases the rod.
+attempt ends the episode, so the robot must know the place before it releases the rod.
 
 Decisions where the paper (App. B, T31 and T32) is silent or contradicts itself:
 
@@ -200,6 +200,7 @@ class Balance(Scenario):
         beyond = abs(rod.com) - ridge.width / 2
         needed = MISS_MARGIN
         yield require(beyond >= needed, "the rod balances on its middle", beyond_the_edge=beyond, needed=needed)
+        # Of this height a rod that is laid wrongly tips by 15 % more than `MAX_TILT`.
         drop = 1.15 * math.sin(MAX_TILT) * (rod.length / 2 + abs(rod.com))
         yield require(ridge.height >= drop, "a rod laid wrongly does not tip", height=ridge.height, needed=drop)
         torque = rod.mass * GRAVITY * abs(rod.com)
