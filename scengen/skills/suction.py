@@ -1,4 +1,4 @@
-"""Moves of a suction cup: take hold of a face, carry a body to a place on the millimetre, let go. See `motion`."""
+"""Moves of a suction cup: take hold of a face, carry a body to a pose within millimetres, let go. See `motion`."""
 
 import math
 
@@ -12,28 +12,37 @@ from ..sim.world import Arm
 from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, hold, retreat, steer
 
 FIRMLY = 0.15
-"""How long the cup must hold on before a piece is lifted [s]."""
+"""Time that the cup must hold on before a piece is lifted [s]."""
 BRAKE = 6.0
-"""Carrying is no faster than this times the distance left [1/s]."""
-FIRM, FIRM_TURN = 1.6, 2.0
-"""By how much more than `steer` it asks for, in place and in turn, against the friction of the joints: a hand that
-carries a piece trembles least at these under noisy actions."""
-NEAR, INTEGRAL, LEVER = 0.003, 1.0, 0.08
-"""Distance from which on errors add up [m], how fast they do [1/s], and how far from its middle a piece reaches [m]."""
+"""Speed limit of carrying per metre of remaining distance [1/s]."""
+FIRM = 1.6
+"""Gain of `firm` over `steer` in translation, against the friction of the joints: under noisy actions, a hand that
+carries a piece trembles least at this gain and `FIRM_TURN`."""
+FIRM_TURN = 2.0
+"""Gain of `firm` over `steer` in rotation."""
+NEAR = 0.003
+"""Distance to the target below which errors are integrated [m]."""
+INTEGRAL = 1.0
+"""Integral gain of the error of a carried piece [1/s]."""
+LEVER = 0.08
+"""Distance from the middle of a piece to its farthest point, which turns an angle into a length [m]."""
 MEMORY = 0.15
 """Time over which the error is averaged [s]; noise on the actions makes the hand tremble by half a millimetre."""
-STAND_OFF, SQUARE, SQUARED = 0.012, math.radians(0.1), 2.0
-"""How far in front of an upright face the hand is squared up [m], how exactly [rad], and for how long at most [s]:
-under noise the mean error may stay above that."""
+STAND_OFF = 0.012
+"""Distance in front of an upright face at which the hand is squared up [m]."""
+SQUARE = math.radians(0.1)
+"""Angle within which the hand is squared up [rad]."""
+SQUARED = 2.0
+"""Longest time of squaring up [s]: under noise the mean error may stay above `SQUARE`."""
 ADDING = 2.0
-"""How fast the error of a hand that is to be square adds up [1/s]; at 4 it swings by a degree to either side."""
+"""Integral gain of the error of a hand that is squared up [1/s]; at 4 the hand swings by a degree to either side."""
 
 
 def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
-    """Press the cup onto a face at `spot` [m] until it has held on for `FIRMLY` [s]; by then it lies flat.
+    """Press the cup onto a face at `spot` [m] until it has held on for `FIRMLY` [s]; by then it lies flat on it.
 
     Raises:
-        GaveUp: that took longer than `give_up` [s].
+        GaveUp: the cup did not take hold within `give_up` [s].
     """
     end, sealed, setpoint = arm.world.time + give_up, arm.world.time, np.array([spot[0], spot[1], arm.hand[2]])
     while arm.world.time - sealed < FIRMLY:
@@ -45,11 +54,12 @@ def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 
 
 
 def suck_upright(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.02, give_up: float = 6.0) -> Plan:
-    """Take hold of an upright face of a thing that stands free, at `spot` [m], from `STAND_OFF` in front of it.
+    """Take hold of an upright face of a free-standing body, at `spot` [m], from `STAND_OFF` in front of it.
 
-    What touches it before the lip is closed pushes it along, by 1 to 20 mm: three pads of the cup must meet it within
-    micrometres of each other. So the hand is squared up first, and what its turn lacks adds up until the cup holds.
-    Then it draws back: the ground's friction, which was against the push, would help to peel the cup off in the lift.
+    A cup that touches the face before its lip is closed pushes the body along, by 1 to 20 mm: three pads of the cup
+    must meet the face within micrometres of each other. So the hand is squared up first, and its remaining angular
+    error is integrated until the cup holds. Then the hand draws back: the ground's friction, which was against the
+    push, would help to peel the cup off in the lift.
 
     Args:
         rot: orientation of the hand, which looks at the face.
@@ -84,13 +94,13 @@ def suck_upright(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.02, give_up: 
 
 
 def let_go(arm: Arm) -> Plan:
-    """Suction off, and straight up."""
+    """Switch the suction off, and go straight up."""
     yield from hold(arm, 0.1, OPEN)
     yield from retreat(arm, 0.04)
 
 
 def firm(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3) -> Action:
-    """As `steer` with suction on, but stiffer: for the last millimetres of slow moves, where friction holds back."""
+    """Action as of `steer` with suction on, but stiffer: for the last millimetres of slow moves, against friction."""
     return steer(arm, arm.hand + FIRM * (setpoint - arm.hand), velocity, FIRM_TURN * turn, CLOSED)
 
 
@@ -102,7 +112,7 @@ def carry(
     pace: Pace = STEADY,
     slack: float = math.inf,
 ) -> Plan:
-    """As `carry_to`, of a body that hangs upright: it is brought to `target` [m], turned to `yaw` [rad]."""
+    """Bring a body that hangs upright to `target` [m], turned to `yaw` [rad]; see `carry_to`."""
     yield from carry_to(arm, body, target, about_z(yaw), pace, slack)
 
 
@@ -115,18 +125,18 @@ def carry_to(
     slack: float = math.inf,
     near: float = NEAR,
 ) -> Plan:
-    """Bring a body that hangs on the hand, or is held by a jaw, to `target` [m], turned to `rot`, looking at the body.
+    """Bring a body that hangs on the hand, or is held by a jaw, to `target` [m], turned to `rot`, by feedback.
 
-    The hand follows a straight line to where it must be for the body to be right, plus what the error adds up to,
-    against the weight and the friction of the joints. It waits where it lags on its way by `slack` [m], as something is
-    in the way. Ends when the mean error of every point of the body is within that of the pace.
+    The hand follows a straight line to the pose at which the body is at its target, plus the integral of the error,
+    against the weight and the friction of the joints. If the hand lags by `slack` [m], because something is in the way,
+    it waits. The move ends when the mean error of every point of the body is within that of the pace.
 
     Args:
-        near: distance from which on errors add up [m]; a body that turns in a jaw comes to hang farther off than one on
-            a cup.
+        near: distance to the target below which errors are integrated [m]; a body that turns in a jaw hangs farther off
+            than one on a cup.
 
     Raises:
-        GaveUp: that took too long.
+        GaveUp: the body was not there in the time of the pace.
     """
     end, goal, setpoint = arm.world.time + pace.give_up, np.asarray(target, float), arm.hand
     turned, way, mean = rot @ arm.world.rot(body).T, goal - arm.world.pos(body), np.full(6, 1.0)

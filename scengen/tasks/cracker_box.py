@@ -1,4 +1,4 @@
-"""What the two tasks with a cracker box and a slot share (T08, T09): the scene, and where things are in it."""
+"""What the two tasks with a cracker box and a slot share (T08, T09): the scene, its tolerances, and positions in it."""
 
 import math
 from functools import cached_property
@@ -11,6 +11,11 @@ from ..assets.cracker_box import CrackerBox, slot_for
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Outline, Vec3, corners
 from ..scenario import Scenario
+
+FLAT_TOLERANCE = math.radians(3.0)
+"""Largest angle between the box' thin axis and the vertical [rad]."""
+HEIGHT_TOLERANCE = 0.003
+"""Largest difference between the heights of the box' middle and of its seat [m]."""
 
 
 class BoxAndSlot(Scenario):
@@ -36,28 +41,28 @@ class BoxAndSlot(Scenario):
 
     @cached_property
     def slot(self) -> Bin:
-        """The slot, made to measure."""
+        """Slot that fits the box."""
         return slot_for(self.box, self.clearance)
 
     @property
     def start(self) -> Vec3:
-        """Where the box stands [m]."""
+        """Initial position of the box [m]."""
         return np.array([self.box_x, self.box_y, TABLE_TOP])
 
     @property
     def foot(self) -> Vec3:
-        """Where the slot stands [m]."""
+        """Position of the slot on the table [m]."""
         return np.array([self.slot_x, self.slot_y, TABLE_TOP])
 
     @cached_property
     def seat(self) -> Vec3:
-        """The middle of a box that lies in the middle of the slot [m]."""
+        """Position of the middle of a box that lies in the middle of the slot [m]."""
         return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
 
     @property
-    def _footprint(self) -> Outline:
+    def _box_outline(self) -> Outline:
         return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
 
     @property
-    def _outline(self) -> Outline:
+    def _slot_outline(self) -> Outline:
         return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)

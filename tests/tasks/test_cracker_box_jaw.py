@@ -19,7 +19,7 @@ from controls import (
 from scengen import load_task
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
-from scengen.tasks.cracker_box_jaw import BELOW, PASSES, CrackerBoxJaw
+from scengen.tasks.cracker_box_jaw import GRIP_DEPTH, MIN_SLIDE_CLEARANCE, CrackerBoxJaw
 
 TASK = load_task("cracker_box_jaw")
 NOMINAL = CrackerBoxJaw()
@@ -54,14 +54,14 @@ def test_a_shallow_slot_needs_no_knock():
 
 @pytest.mark.parametrize(("room", "passes"), [(0.0015, True), (-0.0015, False)])
 def test_a_knock_brings_it_down_if_it_passes_between_the_walls(room, passes):
-    clearance = NOMINAL.clearance + (room - NOMINAL.passes) / 2
+    clearance = NOMINAL.clearance + (room - NOMINAL.slide_clearance) / 2
     scenario = with_values(unchecked(CrackerBoxJaw)(), {**values(NOMINAL), "clearance": clearance})
-    assert scenario.passes == pytest.approx(room)
+    assert scenario.slide_clearance == pytest.approx(room)
     assert play(TASK, scenario, scenario.oracle).solved == passes
 
 
 def test_let_go_the_palm_is_just_over_the_table():
-    reach, angle = BOX.size[2] - BELOW + PALM_ABOVE, NOMINAL.flattest
+    reach, angle = BOX.size[2] - GRIP_DEPTH + PALM_ABOVE, NOMINAL.flattest
     lowest = reach * math.sin(angle) - (PALM_ALONG - BOX.size[0] / 2) * math.cos(angle)
     assert 0.005 < lowest < 0.015
     world = load(TASK, NOMINAL)
@@ -111,5 +111,5 @@ def test_whether_it_passes_is_a_matter_of_shape_alone():
     """Both sides of the law grow with the box; the clearance must."""
     for scale in (0.75, 0.9):
         scenario = replace(NOMINAL, box=replace(BOX, scale=scale), clearance=NOMINAL.clearance * scale / BOX.scale)
-        assert scenario.passes / scale == pytest.approx(NOMINAL.passes / BOX.scale)
-    assert NOMINAL.passes > PASSES
+        assert scenario.slide_clearance / scale == pytest.approx(NOMINAL.slide_clearance / BOX.scale)
+    assert NOMINAL.slide_clearance > MIN_SLIDE_CLEARANCE

@@ -22,7 +22,8 @@ from scengen.geometry import UP, about_z, axes
 from scengen.params import values, with_values
 from scengen.robots import suction
 from scengen.robots.suction import CUP_HALF_WIDTH, TORQUE
-from scengen.tasks.cracker_box_suction import BREAKS, FLAT, HIGH, OFF, CrackerBoxSuction
+from scengen.tasks.cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE
+from scengen.tasks.cracker_box_suction import MAX_FALL_SPEED, SEAT_TOLERANCE, CrackerBoxSuction
 
 TASK = load_task("cracker_box_suction")
 NOMINAL = CrackerBoxSuction()
@@ -52,7 +53,7 @@ def world():
     [
         ({}, True),
         ({"off": (NOMINAL.clearance - 0.0005, 0.0, 0.0)}, True),
-        ({"off": (0.0, 0.0, HIGH + 0.001)}, False),
+        ({"off": (0.0, 0.0, HEIGHT_TOLERANCE + 0.001)}, False),
         ({"off": (0.0, 0.0, NOMINAL.slot.depth)}, False),
         ({"standing": True}, False),
     ],
@@ -65,23 +66,23 @@ def test_what_counts_as_in_the_slot(world, change, counts):
 def test_a_box_on_the_floor_of_a_wide_slot_must_lie_in_its_middle():
     wide = replace(NOMINAL, clearance=0.01)
     world = load(TASK, wide)
-    for off, counts in ((OFF - 0.0005, True), (OFF + 0.0005, False)):
+    for off, counts in ((SEAT_TOLERANCE - 0.0005, True), (SEAT_TOLERANCE + 0.0005, False)):
         world.reset()
         assert wide.success(put(world, wide, (off, 0.0, 0.0))) == counts
 
 
 def test_a_box_that_leans_does_not_count(world):
-    for lean, flat in ((FLAT - 0.01, True), (FLAT + 0.01, False)):
+    for lean, flat in ((FLAT_TOLERANCE - 0.01, True), (FLAT_TOLERANCE + 0.01, False)):
         world.reset()
         put(world, NOMINAL, (0.0, 0.0, 0.2), lean)
-        assert (abs(world.rot("box")[2, 0]) > math.cos(FLAT)) == flat
+        assert (abs(world.rot("box")[2, 0]) > math.cos(FLAT_TOLERANCE)) == flat
 
 
 @pytest.mark.parametrize(("share", "breaks"), [(0.8, False), (2.2, True)])
 def test_a_fall_breaks_the_crackers_from_the_height_of_a_textbook(world, share, breaks):
     """v^2 = 2 g h. A fall is looked at every 10 ms, in which it gains 0.1 m/s: at 2.2 h it is seen for certain."""
     world.reset()
-    height, broken = BREAKS**2 / (2 * 9.81), False
+    height, broken = MAX_FALL_SPEED**2 / (2 * 9.81), False
     put(world, NOMINAL, (0.0, 0.0, share * height))
     for _ in range(30):
         world.step(world.idle)
@@ -98,7 +99,7 @@ def test_a_box_that_turns_sinks_as_fast_as_its_fastest_corner(world):
     mujoco.mj_forward(world.model, world.data)
     levers = [rot @ (BOX.size * sign / 2) for sign in itertools.product((-1, 1), repeat=3)]
     speeds = [world.velocity("box")[3:] + np.cross(spin, lever) for lever in levers]
-    assert NOMINAL.sinking(world) == pytest.approx(-min(speed[2] for speed in speeds))
+    assert NOMINAL.fall_speed(world) == pytest.approx(-min(speed[2] for speed in speeds))
 
 
 @pytest.mark.parametrize("scale", [0.75, 0.85, 1.0, 1.05])
