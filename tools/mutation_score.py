@@ -25,9 +25,9 @@ from mutants import BARS, TASKS, Mutant, mutants
 from scengen import load_task
 from scengen.attack.adversary import PRIOR, RANDOM, TIERS, Attack
 from scengen.attack.campaign import AttackSettings, Subject, drawn, fitted, player_of
-from scengen.attack.evidence import Causal, Hit
+from scengen.attack.evidence import CausalContacts, Hit
 from scengen.attack.macros import Macro
-from scengen.attack.player import SETTLE, Attempt, Player
+from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
@@ -184,11 +184,11 @@ def flagged(task: str) -> dict[str, Any]:
     subjects = drawn(load_task(task), "id", 4, 7)
     for subject in subjects:
         player = player_of(subject)
-        causal = Causal(player)
+        causal = CausalContacts(player)
         for k in range(VARIED // len(subjects)):
             jitter = Jitter.within(WIDER, f"varied/{subject.scenario.id}", k)
             world = jitter.disturbed(player.world, player.scenario.DISTURBED)
-            rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE, jitter)
+            rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE_TIME, jitter)
             if rollout.solved:
                 runs += 1
                 found = causal.lacking(pairs(world))

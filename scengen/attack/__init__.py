@@ -1,1 +1,1 @@
-"""The built-in adversary: it looks for ways to a goal around what a task is about, and knows no task."""
+"""The built-in adversary: it searches for ways to a goal that bypass the point of a task, without knowing the task."""

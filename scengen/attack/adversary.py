@@ -1,4 +1,4 @@
-"""The attack on one scenario: every tier gets its share of rollouts, and the archive decides where the rest goes."""
+"""The attack on one scenario: every tier gets its share of the rollouts, and an archive guides the search."""
 
 import time
 from collections import Counter
@@ -8,7 +8,7 @@ from itertools import islice
 
 from ..samplers.keyed import unit
 from . import draws
-from .evidence import Causal, Hit, TierRate, hit, rates
+from .evidence import CausalContacts, Hit, TierRate, hit, rates
 from .macros import Macro
 from .player import Attempt, Node, Played, Player
 from .priors import Prior, guesses
@@ -16,38 +16,50 @@ from .retries import RETRY, retries
 from .signature import Signature
 from .variations import FOREIGN, WITNESS, foreign, perturbed
 
-SHORTCUT, PRIOR, RANDOM, SEARCH = "shortcut", "prior", "random", "search"
-SHARES = {SHORTCUT: 0.10, PRIOR: 0.10, RETRY: 0.30, FOREIGN: 0.08, WITNESS: 0.14, RANDOM: 0.14, SEARCH: 0.14}
-"""Share of the rollouts that each tier gets, in the order in which they are played. What a tier does not use goes to
+SHORTCUT = "shortcut"
+"""Tier of the family's declared shortcuts."""
+PRIOR = "prior"
+"""Tier of fixed answers."""
+RANDOM = "random"
+"""Tier of random plans."""
+SEARCH = "search"
+"""Tier of the search that starts from states of the archive."""
+TIER_SHARES = {SHORTCUT: 0.10, PRIOR: 0.10, RETRY: 0.30, FOREIGN: 0.08, WITNESS: 0.14, RANDOM: 0.14, SEARCH: 0.14}
+"""Share of the rollouts for each tier, in the order in which they are played. Rollouts that a tier does not use go to
 the last one."""
-TIERS = tuple(SHARES)
-FATAL = 2
-"""A first move that has lost the episode this often is not tried again."""
-LEFT = 2.0
-"""An episode with less time left than this is not continued [s]."""
+TIERS = tuple(TIER_SHARES)
+"""All tiers, in the order in which they are played."""
+MAX_FATAL = 2
+"""Number of lost episodes after which a first move is not tried again."""
+MIN_TIME_LEFT = 2.0
+"""Minimum remaining time of an episode that is continued [s]."""
 
 
 @dataclass(frozen=True)
 class UntriedShortcut:
-    """A shortcut that was not carried out: a move of it gave up, so that nothing is known about it."""
+    """A shortcut that was not carried out: one of its moves gave up, so its success is unknown."""
 
     name: str
     raw: bool
+    """Whether actions reached the controller without the teleoperation filter."""
     reason: str
+    """Reason why the move gave up."""
 
 
 @dataclass
 class AttackResult:
-    """What came of the attack on one scenario."""
+    """The result of the attack on one scenario."""
 
     scenario: str
+    """Id of the scenario."""
     rates: list[TierRate]
+    """Hit rates of the tiers."""
     hits: list[Hit]
     cpu: float
-    """Processor time of the rollouts of the adversary [s]."""
+    """Processor time of the adversary's rollouts [s]."""
     untried: list[UntriedShortcut]
     lost: str = ""
-    """Why the attack did not come to its end: the process crashed, or reached a limit."""
+    """Reason why the attack did not end: the process crashed, or reached a limit. Empty if it ended."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +68,35 @@ class ArchivedState:
 
     node: Node
     raw: bool
+    """Whether actions reached the controller without the teleoperation filter."""
     signature: Signature
+    """Signature of the way to the state."""
 
 
 @dataclass
 class Archive:
-    """What has been reached, by contacts and displacements: successes first, else what is rare."""
+    """States that were reached, in cells of equal contacts and displacements, and successes."""
 
     cells: dict[tuple[bool, Signature], list[ArchivedState]] = field(default_factory=dict)
+    """States by kind of actions and signature."""
     visits: Counter[tuple[bool, Signature]] = field(default_factory=Counter)
+    """Number of visits of each cell."""
     successes: list[tuple[Hit, Node | None, tuple[Macro, ...]]] = field(default_factory=list)
-    """Each with where it began, and its macros."""
+    """Successes, each with the state from which it began, and its macros."""
 
-    def add(self, cell: ArchivedState) -> None:
-        """Keep a state; of many alike the latest ones."""
-        key = (cell.raw, cell.signature)
+    def add(self, state: ArchivedState) -> None:
+        """Keep a state; a cell keeps its four latest ones."""
+        key = (state.raw, state.signature)
         self.visits[key] += 1
-        self.cells[key] = [*self.cells.get(key, []), cell][-4:]
+        self.cells[key] = [*self.cells.get(key, []), state][-4:]
 
     def rarest(self, raw: bool, number: float) -> ArchivedState | None:
-        """A state of the cell that was visited least, on the way of raw or of filtered actions."""
+        """A state of the least visited cell; None if there is no cell.
+
+        Args:
+            raw: whether to choose among the cells of raw or of filtered actions.
+            number: random number from 0 to 1 that chooses a state of the cell.
+        """
         keys = [key for key in self.cells if key[0] == raw]
         if not keys:
             return None
@@ -84,7 +105,12 @@ class Archive:
         return self.cells[chosen][int(number * len(self.cells[chosen]))]
 
     def parent(self, raw: bool, number: float) -> tuple[Hit, Node | None, tuple[Macro, ...]] | None:
-        """One of the successes that are farthest from the witness; none that does all that the witness does."""
+        """One of the successes that lack most contacts of the witness; None if all successes make all of them.
+
+        Args:
+            raw: whether to choose among successes with raw or with filtered actions.
+            number: random number from 0 to 1 that chooses a success.
+        """
         known = [one for one in self.successes if one[0].raw == raw and one[0].refutes]
         most = max((len(hit.lacks) for hit, _, _ in known), default=0)
         far = [one for one in known if len(one[0].lacks) == most]
@@ -92,7 +118,7 @@ class Archive:
 
 
 class Attack:
-    """The adversary at work on one scenario."""
+    """The attack on one scenario."""
 
     def __init__(
         self,
@@ -103,9 +129,15 @@ class Attack:
         priors: Sequence[Prior] = (),
         until: Callable[[Hit], bool] = lambda hit: False,
     ):
-        """`number` of `of`: which part of the tiers that are lists this scenario takes. `until`: stop at such a hit."""
+        """
+        Args:
+            number, of: number of the scenario, and of all scenarios. Each scenario begins with its own part of the
+                tiers that are lists.
+            priors: fixed answers of the task.
+            until: test of a hit at which the attack ends.
+        """
         self.player, self.seed, self.number, self.of, self.priors, self.until = player, seed, number, of, priors, until
-        self.causal = Causal(player)
+        self.causal = CausalContacts(player)
         self.archive, self.fatal = Archive(), Counter[tuple[int | None, str, str]]()
         self.counts: list[TierRate] = []
         self.hits: list[Hit] = []
@@ -117,27 +149,31 @@ class Attack:
 
     def run(self, budget: int, tiers: Sequence[str] = TIERS) -> AttackResult:
         """Spend `budget` rollouts on some tiers."""
-        total = sum(SHARES[tier] for tier in tiers)
+        total = sum(TIER_SHARES[tier] for tier in tiers)
         owed = 0.0
         for tier in (t for t in TIERS if t in tiers):
-            owed += budget * SHARES[tier] / total
-            owed -= self._tier(tier, 2 * round(owed / 2))
+            owed += budget * TIER_SHARES[tier] / total
+            owed -= self._play_tier(tier, 2 * round(owed / 2))
         if round(owed) > 0 and not self.done and {RANDOM, SEARCH} & {*tiers}:
-            self._tier(SEARCH if SEARCH in tiers else RANDOM, 2 * round(owed / 2))
+            self._play_tier(SEARCH if SEARCH in tiers else RANDOM, 2 * round(owed / 2))
         return AttackResult(self.player.scenario.id, rates(self.counts), self.hits, self.cpu, self.untried)
 
-    def _tier(self, tier: str, rollouts: int) -> int:
-        """Play attempts of one tier; returns how many rollouts that took."""
+    def _play_tier(self, tier: str, rollouts: int) -> int:
+        """Play attempts of one tier.
+
+        Returns:
+            The number of rollouts that were spent.
+        """
         spent = 0
         if tier == SEARCH:
             while spent < rollouts and not self.done:
-                self._step(spent)
+                self._search_step(spent)
                 spent += 1
             return spent
         for attempt in self._attempts(tier):
             if spent >= rollouts or self.done:
                 break
-            if self.fatal[_first(attempt)] >= FATAL:
+            if self.fatal[_first_move(attempt)] >= MAX_FATAL:
                 continue
             node = None if attempt.stage is None else self.player.stage(attempt.stage)
             for raw in (False, True):
@@ -161,8 +197,8 @@ class Attack:
         for k in range(self.of):  # its own part first, then those of the others
             yield from islice(whole, (self.number + k) % self.of, None, self.of)
 
-    def _step(self, count: int) -> None:
-        """One rollout of the search: from a success a variation of it, else from what is rare something random."""
+    def _search_step(self, count: int) -> None:
+        """One rollout of the search: a variation of a success, or random moves from a rare state if there is none."""
         key = (self.seed, self.player.scenario.id, SEARCH, count)
         raw = bool(count % 2)
         if parent := self.archive.parent(raw, unit(*key, "parent")):
@@ -173,9 +209,9 @@ class Attack:
                 changed = changed[:lost] + changed[lost + 1 :]
             self._try(Attempt(SEARCH, changed), raw, node)
             return
-        cell = self.archive.rarest(raw, unit(*key, "state"))
+        rare = self.archive.rarest(raw, unit(*key, "state"))
         moves = tuple(draws.macro(self.player, *key, place) for place in range(1 + int(2 * unit(*key, "count"))))
-        self._try(Attempt(SEARCH, moves), raw, cell.node if cell else None)
+        self._try(Attempt(SEARCH, moves), raw, rare.node if rare else None)
 
     def _try(self, attempt: Attempt, raw: bool, node: Node | None) -> Played:
         start = time.process_time()
@@ -191,15 +227,15 @@ class Attack:
         if attempt.tier == SHORTCUT and len(attempt.macros) == 1 and played.outcome == "timeout" and played.notes:
             self.untried.append(UntriedShortcut(attempt.macros[0].target, raw, played.notes[0]))
         if played.outcome == "failure" and not played.nodes:
-            self.fatal[_first(attempt)] += 1
+            self.fatal[_first_move(attempt)] += 1
         for one in played.nodes:
-            if one.seconds < self.player.horizon - LEFT:
+            if one.seconds < self.player.horizon - MIN_TIME_LEFT:
                 self.archive.add(ArchivedState(one, raw, one.signature))
         return played
 
 
 def shortcuts(player: Player) -> Iterator[Attempt]:
-    """The declared shortcuts, alone and in sequence, each from where the former ended."""
+    """The declared shortcuts, alone and in pairs, the second one from the end of the first."""
     names = list(player.scenario.shortcuts())
     for name in names:
         yield Attempt(SHORTCUT, (Macro("shortcut", name),))
@@ -208,8 +244,8 @@ def shortcuts(player: Player) -> Iterator[Attempt]:
             yield Attempt(SHORTCUT, (Macro("shortcut", first), Macro("shortcut", second)))
 
 
-def _first(attempt: Attempt) -> tuple[int | None, str, str]:
-    """What an attempt begins with: moves of the same kind on the same thing, from the same state."""
+def _first_move(attempt: Attempt) -> tuple[int | None, str, str]:
+    """The first move of an attempt: its state, its kind and arm, and its target or numbers."""
     if not attempt.macros:
         return attempt.stage, "", ""
     one = attempt.macros[0]

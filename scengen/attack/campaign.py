@@ -26,20 +26,24 @@ from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
 GRAMMAR = 1
-"""Version of macros and tiers: reports of different ones are not comparable."""
-HITS = "hits"
+"""Version of macros and tiers: reports of different versions are not comparable."""
+HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
-TRIES = 4
-"""How many draws are tried for every scenario wanted."""
-STATICS, ROLLOUTS = 300, 8
-"""On how many draws fixed answers are fitted: by statics, or by a rollout for each draw and candidate."""
-FITTED, FRESH = 1_000_003, 2_000_003
-"""Added to the seed of the attack: the seeds of the draws on which fixed answers are fitted, and measured."""
+DRAWS_PER_SCENARIO = 4
+"""Maximum number of draws for every scenario that is to be attacked."""
+STATICS_DRAWS = 300
+"""Number of draws on which fixed answers are fitted by statics."""
+ROLLOUT_DRAWS = 8
+"""Number of draws on which fixed answers are fitted by rollouts, one for each draw and candidate."""
+FITTING_SEED = 1_000_003
+"""Offset from the seed of the attack to the seed of the draws on which fixed answers are fitted."""
+FRESH_SEED = 2_000_003
+"""Offset from the seed of the attack to the seed of the draws on which fixed answers are measured."""
 
 
 @dataclass(frozen=True)
 class AttackSettings:
-    """Settings of `scengen attack`; meanings stand in conf/command/attack.yaml."""
+    """Settings of `scengen attack`; conf/command/attack.yaml explains them."""
 
     pool: str | None = None
     split: str = "id"
@@ -60,7 +64,7 @@ class AttackSettings:
         return tuple(tier for tier in TIERS if asked is None or tier in asked)
 
     def check(self) -> None:
-        """Raise `ScengenError` for settings that make no sense."""
+        """Raise `ScengenError` if a setting is not valid."""
         at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
         for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
             if tier not in TIERS:
@@ -75,38 +79,43 @@ class Subject:
     scene_xml: str
     embodiment: str
     horizon: float
+    """Time limit [s]."""
     witness: Actions
     name: Name
 
 
 @dataclass(frozen=True)
 class AttackReport:
-    """What an attack came to."""
+    """The result of an attack on several scenarios."""
 
     task: str
     scenarios: tuple[str, ...]
+    """Ids of the scenarios."""
     rates: tuple[TierRate, ...]
+    """Hit rates of the tiers."""
     hits: tuple[Hit, ...]
     priors: tuple[Prior, ...]
+    """Fixed answers that were tried."""
     untried: tuple[UntriedShortcut, ...]
     lost: tuple[str, ...]
-    """Scenarios whose attack crashed or reached a limit, each with the reason: nothing is known of them."""
+    """Scenarios whose attack crashed or reached a limit, each with the reason. Their results are unknown."""
     folder: Path
-    """Where the hits are stored."""
+    """Folder of the hits."""
     cpu: float
-    """Processor time of the adversary's rollouts [s]; differs from run to run."""
+    """Processor time of the adversary's rollouts [s]; it differs from run to run."""
 
     @property
     def rollouts(self) -> int:
+        """Number of rollouts."""
         return sum(rate.rollouts for rate in self.rates)
 
     @property
     def refuting(self) -> list[Hit]:
-        """Hits that show a way around what the task is about."""
+        """Hits that bypass the point of the task."""
         return [hit for hit in self.hits if hit.refutes]
 
     def plain(self) -> dict[str, Any]:
-        """Everything but actions, places and processor time."""
+        """The report as plain data, without actions, folder and processor time."""
         return {
             "task": self.task,
             "grammar": GRAMMAR,
@@ -122,11 +131,11 @@ class AttackReport:
 
 @dataclass(frozen=True)
 class AttackJob:
-    """What the attacks of one report have in common; called with a number, it attacks that scenario."""
+    """The common data of the attacks of one report. Called with a number, it attacks that scenario."""
 
     subjects: tuple[Subject, ...]
     budget: int
-    """Rollouts for each scenario."""
+    """Number of rollouts for each scenario."""
     seed: int
     tiers: tuple[str, ...]
     priors: tuple[Prior, ...]
@@ -139,7 +148,7 @@ class AttackJob:
         return attack.run(self.budget, self.tiers)
 
     def lost(self, number: int, reason: str) -> AttackResult:
-        """The result of a scenario whose attack has crashed its process, or has reached a limit."""
+        """The result of a scenario whose attack crashed its process or reached a limit."""
         return AttackResult(self.subjects[number].scenario.id, [], [], 0.0, [], reason)
 
 
@@ -150,10 +159,10 @@ def attack(
     folder: Path,
     progress: Callable[[int, int], None],
 ) -> AttackReport:
-    """Attack every subject, continuing what stands in `folder`; hits are stored there.
+    """Attack every subject, continuing the run in `folder`, and store the hits there.
 
     Args:
-        progress: told how many scenarios are done, and how many hits there are.
+        progress: called with the number of scenarios done, and the number of hits.
     """
     priors = tuple(fitted(task, settings)) if PRIOR in settings.chosen else ()
     budget = max(1, settings.budget // len(subjects))
@@ -179,13 +188,13 @@ def attack(
 
 
 def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
-    """The first `n` scenarios of a split that their oracle solves, out of at most `TRIES` times as many.
+    """The first `n` scenarios of a split that their oracle solves, out of at most `DRAWS_PER_SCENARIO * n` draws.
 
     Raises:
-        BadConfig: there is none.
+        BadConfig: the oracle solves none of the draws.
     """
     found: list[Subject] = []
-    for index in range(TRIES * n):
+    for index in range(DRAWS_PER_SCENARIO * n):
         try:
             scenario = task.draw(split, seed, index).scenario
         except Infeasible:
@@ -198,7 +207,8 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
         if len(found) == n:
             return found
     if not found:
-        raise BadConfig(f"{task.name}/{split}: the oracle solves none of {TRIES * n} draws; nothing can be attacked")
+        draws = DRAWS_PER_SCENARIO * n
+        raise BadConfig(f"{task.name}/{split}: the oracle solves none of {draws} draws, so none can be attacked")
     return found
 
 
@@ -207,27 +217,34 @@ def certified(task: Task, rows: Iterable[PoolRow]) -> list[Subject]:
     return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness, r.name) for r in rows]
 
 
-def stored(report: AttackReport, folder: Path) -> dict[str, Any]:
-    """What the manifest of a pool in `folder` says of an attack on it; hits are copied there.
+def store_in_pool(report: AttackReport, folder: Path) -> dict[str, Any]:
+    """The entry of a pool's manifest about an attack on it. The hits are copied to the pool.
+
+    Args:
+        folder: folder of the pool.
 
     Raises:
-        OSError: they cannot be written.
+        OSError: the hits cannot be written.
     """
     files = []
     for hit in report.hits:
-        (folder / HITS).mkdir(parents=True, exist_ok=True)
+        (folder / HITS_FOLDER).mkdir(parents=True, exist_ok=True)
         content = (report.folder / f"{hit.name}.npz").read_bytes()
-        (folder / HITS / f"{hit.name}.npz").write_bytes(content)
-        files.append({"file": f"{HITS}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
+        (folder / HITS_FOLDER / f"{hit.name}.npz").write_bytes(content)
+        files.append({"file": f"{HITS_FOLDER}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
     return {**report.plain(), "hits": files}
 
 
 def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
-    """Where the hits that a manifest tells of are not what it says: the name of each, and why."""
+    """Contradictions between a pool's manifest and its hits.
+
+    Yields:
+        The tier or file in question, and the contradiction.
+    """
     counts = Counter((hit["tier"], hit["raw"]) for hit in pool.manifest.hits)
     for rate in pool.manifest.rates:
         if rate["hits"] != counts.pop((rate["tier"], rate["raw"]), 0):
-            yield rate["tier"], "the attack counts other hits than it lists"
+            yield rate["tier"], "the attack counts a different number of hits than it lists"
     if counts:
         yield next(iter(counts))[0], "the attack lists hits of a tier that it does not count"
     ids = {id_ for (id_,) in pool.columns("id")}
@@ -240,7 +257,7 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
             found = Hit.load(path)
             listed = {key: value for key, value in entry.items() if key not in ("file", "sha256")}
             if sha256(path.read_bytes()) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
-                yield entry["file"], "the hit is not the one that the manifest lists"
+                yield entry["file"], "the hit differs from the one that the manifest lists"
             elif found.refutes and found.scenario in ids:
                 yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
             elif why := unsound(found, task):
@@ -250,21 +267,21 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def player_of(subject: Subject) -> Player:
-    """What plays attempts on a subject."""
+    """A player for attempts on a subject."""
     return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
 
 
 def fitted(task: Task, settings: AttackSettings) -> list[Prior]:
-    """The best fixed answers of a task, fitted on other draws; none if its family does not say what it asks for."""
+    """The best fixed answers of a task, fitted on other draws; none if its family declares no answer."""
     answer = task.family().answer()
     if answer is None:
         return []
     static = has_statics(answer)
-    count = STATICS if static else ROLLOUTS
-    training = list(_draws(task, settings.split, settings.seed + FITTED, count))
+    count = STATICS_DRAWS if static else ROLLOUT_DRAWS
+    training = list(_draws(task, settings.split, settings.seed + FITTING_SEED, count))
     if not training:
         return []
-    fresh = list(_draws(task, settings.split, settings.seed + FRESH, count)) if static else []
+    fresh = list(_draws(task, settings.split, settings.seed + FRESH_SEED, count)) if static else []
     return fit(training, by_statics if static else _by_rollouts(task), fresh)
 
 
@@ -296,8 +313,8 @@ def _record(result: AttackResult) -> dict[str, Any]:
     counts = [asdict(rate) for rate in result.rates]
     untried = [asdict(one) for one in result.untried]
     hits = [hit.name for hit in result.hits]
-    told = {"rates": counts, "hits": hits, "untried": untried, "cpu": result.cpu, "lost": result.lost}
-    return {"scenario": result.scenario, **told}
+    about = {"rates": counts, "hits": hits, "untried": untried, "cpu": result.cpu, "lost": result.lost}
+    return {"scenario": result.scenario, **about}
 
 
 def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> AttackReport:
@@ -314,5 +331,5 @@ def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, pri
 
 
 def _sorted(counts: Sequence[TierRate]) -> list[TierRate]:
-    """In the order of the tiers."""
+    """Rates in the order of the tiers."""
     return sorted(counts, key=lambda rate: (TIERS.index(rate.tier.split("_")[0]), rate.tier, rate.raw))

@@ -1,4 +1,4 @@
-"""The adversary as a check of a certificate: a few rollouts that need nothing but the scenario and its witness."""
+"""The adversary as a check of a certificate: a few rollouts that need only the scenario and its witness."""
 
 from ..validate.certify import Finding, Trial
 from .adversary import RANDOM, SEARCH, Attack
@@ -8,17 +8,17 @@ from .retries import RETRY
 from .variations import WITNESS
 
 TIERS = (RETRY, WITNESS, RANDOM, SEARCH)
-"""Shortcuts have a check of their own; fixed answers and foreign witnesses need other scenarios of the task."""
+"""Tiers of the check. Shortcuts have a check of their own; fixed answers and foreign witnesses need other scenarios."""
 
 
 def attacked(trial: Trial) -> Finding:
-    """Attack the scenario of a trial with as many rollouts as its settings ask for; the draws depend on its id alone.
+    """Attack the scenario of a trial. The number of rollouts is a setting; random draws depend on the id alone.
 
     Returns:
-        The settings, how many rollouts of each tier reached the goal, and the first way around what the task is about.
+        The settings, the numbers of rollouts and hits of each tier, and the first hit that bypasses the task.
     """
-    assert trial.witness is not None
-    player = Player(trial.scenario, trial.text, trial.embodiment, trial.horizon, trial.witness.actions)
+    assert trial.solution is not None
+    player = Player(trial.scenario, trial.text, trial.embodiment, trial.horizon, trial.solution.actions)
     result = Attack(player, seed=0).run(trial.settings.attack, TIERS)
     numbers = {
         f"{rate.tier}_{spelled(rate.raw)}": {"rollouts": rate.rollouts, "hits": rate.hits} for rate in result.rates

@@ -1,4 +1,4 @@
-"""Random macros by identity: the same key gives the same macro, whoever asks and whenever."""
+"""Random macros by identity: the same key always gives the same macro."""
 
 import math
 from bisect import bisect
@@ -13,7 +13,7 @@ from .solids import TABLE, Solid, handles, sides
 
 Key = tuple[str | int, ...]
 
-KINDS = {
+KIND_SHARES = {
     "pick": 0.30,
     "push": 0.26,
     "place": 0.12,
@@ -24,29 +24,29 @@ KINDS = {
     "wait": 0.04,
 }
 """Shares of the kinds of macro."""
-MOST = 5
-"""Macros of a random plan, at most."""
-ALIGNED = 0.8
-"""Share of the directions that are those of the thing in question."""
+MAX_MACROS = 5
+"""Maximum number of macros in a random plan."""
+ALIGNED_SHARE = 0.8
+"""Share of the directions that are aligned with the solid in question."""
 
 
 def plan(player: Player, *key: str | int) -> tuple[Macro, ...]:
     """One to five random macros."""
-    count = 1 + int(MOST * unit(*key, "count"))
+    count = 1 + int(MAX_MACROS * unit(*key, "count"))
     return tuple(macro(player, *key, place) for place in range(count))
 
 
 def macro(player: Player, *key: str | int) -> Macro:
-    """A random macro. It looks at the world as it is at the start."""
+    """A random macro, for the scene at the start of the episode."""
     player.rewind()
     share = unit(*key, "kind")
-    ends = list(accumulate(KINDS.values()))
-    kind = list(KINDS)[bisect(ends[:-1], share)]
-    return replace(_DRAWS[kind](player, key), arm=_arm(player, key).number)
+    ends = list(accumulate(KIND_SHARES.values()))
+    kind = list(KIND_SHARES)[bisect(ends[:-1], share)]
+    return replace(_MAKERS[kind](player, key), arm=_arm(player, key).number)
 
 
 def varied(one: Macro, *key: str | int) -> Macro:
-    """The macro with its numbers changed by up to a fifth, whole ones left alone."""
+    """The macro with its numbers changed by up to a fifth; whole numbers stay."""
     numbers = tuple(n if n == round(n) else n * (1 + spread(0.2, *key, k)) for k, n in enumerate(one.numbers))
     return one if one.kind in ("shortcut", "replay", "answer", "follow") else replace(one, numbers=numbers)
 
@@ -77,12 +77,12 @@ def _push(player: Player, key: Key) -> Macro:
 
 def _place(player: Player, key: Key) -> Macro:
     drop = 0.0 if unit(*key, "lowered") < 0.7 else _within(0.01, 0.12, *key, "drop")
-    numbers = (*_spot(key), drop, _within(0.05, 0.10, *key, "speed"))
+    numbers = (*_place_on_face(key), drop, _within(0.05, 0.10, *key, "speed"))
     return Macro("place", _target(player, key, table=True).name, numbers)
 
 
 def _press(player: Player, key: Key) -> Macro:
-    numbers = (*_spot(key), _within(0.1, 0.6, *key, "seconds"), _within(0.05, 0.15, *key, "speed"))
+    numbers = (*_place_on_face(key), _within(0.1, 0.6, *key, "seconds"), _within(0.05, 0.15, *key, "speed"))
     return Macro("press", _target(player, key, table=False).name, numbers)
 
 
@@ -110,7 +110,7 @@ def _wait(player: Player, key: Key) -> Macro:
     return Macro("wait", "", (_within(0.2, 1.5, *key, "seconds"),))
 
 
-_DRAWS = {
+_MAKERS = {
     "pick": _pick,
     "push": _push,
     "place": _place,
@@ -123,7 +123,7 @@ _DRAWS = {
 
 
 def _arm(player: Player, key: Key) -> Arm:
-    """Any of the robot's."""
+    """A random arm of the robot."""
     arms = player.world.arms
     return arms[int(len(arms) * unit(*key, "arm"))]
 
@@ -134,24 +134,24 @@ def _target(player: Player, key: Key, table: bool) -> Solid:
 
 
 def _direction(player: Player, solid: Solid, key: Key) -> float:
-    """Along one of the level axes of a solid, one way or the other, or anywhere [rad]."""
-    if unit(*key, "aligned") > ALIGNED:
+    """A direction along one of the level axes of a solid, either way, or any direction [rad]."""
+    if unit(*key, "aligned") > ALIGNED_SHARE:
         return spread(math.pi, *key, "direction")
     along, _ = solid.level_axes(player.world)[int(2 * unit(*key, "side"))]
     return math.atan2(along[1], along[0]) + (math.pi if unit(*key, "sign") < 0.5 else 0.0)
 
 
 def _skew(key: Key) -> float:
-    return 0.0 if unit(*key, "aligned") < ALIGNED else spread(math.pi / 4, *key, "skew")
+    return 0.0 if unit(*key, "aligned") < ALIGNED_SHARE else spread(math.pi / 4, *key, "skew")
 
 
-def _spot(key: Key) -> tuple[float, float]:
-    """Shares of an upper face."""
+def _place_on_face(key: Key) -> tuple[float, float]:
+    """A place on an upper face, as two shares of its half lengths."""
     return spread(0.9, *key, "u"), spread(0.9, *key, "v")
 
 
 def _speed(key: Key) -> float:
-    """Of a push [m/s]: 0.30 is as fast as the hand goes."""
+    """Speed of a push [m/s]: 0.30 is the maximum speed of the hand."""
     return _within(0.08, 0.30, *key, "speed")
 
 

@@ -52,23 +52,24 @@ class Hit:
     digest: str
     """Hash of the final physics state."""
     lacks: tuple[ContactPair, ...]
-    """CausalContacts contacts of the witness that it does without."""
+    """Causal contacts of the witness that the rollout lacks."""
     unmoved: tuple[str, ...]
-    """Bodies that the witness moves, and it does not."""
+    """Bodies that the witness moves and the rollout does not."""
     params: Mapping[str, Value] = field(repr=False, compare=False)
-    """Of the scenario, by name."""
+    """Parameters of the scenario, by name."""
     actions: Actions = field(repr=False, compare=False)
+    """Actions of the rollout, as the controller received them."""
     task: str = ""
-    """Name of the task; whoever attacks a family that belongs to none leaves it open."""
+    """Name of the task; empty for a family that belongs to none."""
 
     @property
     def refutes(self) -> bool:
-        """Whether it shows a way around what the task is about; else it counts as accessibility."""
+        """Whether the hit bypasses the point of the task; if not, it only shows that the goal is accessible."""
         return bool(self.lacks)
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """Stem of the hit's file name."""
         return f"{self.scenario}-{self.tier}-{spelled(self.raw)}-{self.digest[:6]}"
 
     def __str__(self) -> str:

@@ -1,9 +1,8 @@
-"""Macros: moves that need no knowledge of a task. Data first, a plan made of skills when they are played.
-
+"""Macros: moves that need no knowledge of a task. A macro is data; when it is played, a plan made of skills.
 | kind    | target   | numbers                                                                      |
 |---------|----------|------------------------------------------------------------------------------|
-| pick    | solid    | height (share), skew of the jaw [rad], which level axis it spans, lift [m]   |
-| push    | solid    | direction [rad], height (share), offset (share), way [m], speed [m/s]        |
+| pick    | solid    | height (share), skew of the jaw [rad], level axis that it spans, lift [m]    |
+| push    | solid    | direction [rad], height (share), offset (share), distance [m], speed [m/s]   |
 | place   | solid    | two shares of its upper face, drop [m], speed [m/s]                          |
 | press   | solid    | two shares of its upper face, seconds, speed [m/s]                           |
 | move    |          | displacement [m], speed [m/s]                                                |
@@ -15,7 +14,7 @@
 | wait    |          | seconds                                                                      |
 | go      |          | place of the hand [m], its orientation as a rotation vector, grip            |
 
-Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use what the hand holds.
+Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use the body in the hand.
 """
 
 import math
@@ -35,20 +34,22 @@ from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hol
 from .solids import Solid, held
 
 FAST = Pace(0.30, 0.02, give_up=2.5)
-"""Through free space. Moves of an adversary give up early: time is what a wrong try costs."""
+"""Pace through free space. Moves of the adversary give up early: a failed attempt costs time."""
 LADEN = Pace(0.20, 0.008, give_up=3.0)
-"""With something in the hand, or over a place: at 0.30 m/s it runs 1 to 2 cm too far."""
-CLOSE = Pace(0.20, 0.006, give_up=1.5)
-"""Up to a thing."""
-ABOVE = 0.08
-"""Height over the highest thing in question at which the hand travels [m]."""
-AIR = 0.015
-"""Between a tool and the thing it is going to push [m]."""
-GONE, CATCH = 0.06, 0.05
-"""Distance from the hand of a body that has gone, and at which the hand begins to close on its way back [m]. On an
-incline of 25 deg it then comes to its turn in 0.15 s, which is what the fingers need."""
-DEEPEST = PALM_ABOVE - 0.004
-"""How far the top of a thing may be above the grip site of a hand that takes it [m]."""
+"""Pace with a body in the hand, or over a place: at 0.30 m/s the hand overshoots by 1 to 2 cm."""
+APPROACH = Pace(0.20, 0.006, give_up=1.5)
+"""Pace of the last stretch to a body."""
+TRAVEL_HEIGHT = 0.08
+"""Height of the hand above the highest solid in question when it travels [m]."""
+PUSH_CLEARANCE = 0.015
+"""Clearance between a tool and the body that it is going to push [m]."""
+GONE_DISTANCE = 0.06
+"""Distance from the hand above which a body counts as gone [m]."""
+CATCH_DISTANCE = 0.05
+"""Distance from the hand at which the hand begins to close on a body that returns [m]. On an incline of 25 deg the body
+then turns round 0.15 s later, which is the time that the fingers need."""
+MAX_GRASP_DEPTH = PALM_ABOVE - 0.004
+"""Maximum height of the top of a body above the grip site of a hand that grasps it [m]."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,11 @@ class Macro:
 
     kind: str
     target: str = ""
-    """A solid or body of the scene; empty for moves of the hand alone."""
+    """Name of a solid or body of the scene; empty for moves of the hand alone."""
     numbers: tuple[float, ...] = ()
+    """Numbers of the move, by kind; see the table above."""
     arm: int = 0
-    """Number of the arm that makes the move; the others are held still."""
+    """Number of the arm that makes the move; the other one is held still."""
 
     def __str__(self) -> str:
         numbers = ", ".join(f"{number:.3g}" for number in self.numbers)
@@ -70,7 +72,7 @@ class Macro:
 
 @dataclass(frozen=True)
 class MacroContext:
-    """An arm and the solids of its world: what the plan of a macro looks at."""
+    """The arm that plays a macro, and the solids of its world."""
 
     arm: Arm
     solids: Mapping[str, Solid]
@@ -81,12 +83,12 @@ class MacroContext:
 
 
 def plan(world: World, solids: Mapping[str, Solid], macro: Macro) -> Plan:
-    """The moves of one macro from wherever the hand is."""
+    """The plan of one macro, from the present position of the hand."""
     arm = world.arms[macro.arm]
     return alone(arm, KINDS[macro.kind](MacroContext(arm, solids), macro))
 
 
-# --- taking and leaving -----------------------------------------------------------------------
+# --- grasping and releasing -------------------------------------------------------------------
 
 
 def _pick(field: MacroContext, macro: Macro) -> Plan:
@@ -95,42 +97,42 @@ def _pick(field: MacroContext, macro: Macro) -> Plan:
     centre, up = solid.centre(world), solid.reach(world, UP)
     yield from release(field.arm, 0.05)
     if field.arm.suction:
-        yield from _suck(field, centre + up * UP, skew)
+        yield from _pick_by_suction(field, centre + up * UP, skew)
     else:
         closing = about_z(skew) @ solid.level_axes(world)[round(which)][0]
-        low, high = max(TIP_BELOW + 0.003 - up, up - DEEPEST), max(up - 0.004, 0.0)
+        low, high = max(TIP_BELOW + 0.003 - up, up - MAX_GRASP_DEPTH), max(up - 0.004, 0.0)
         at = centre + (low + height * (high - low)) * UP if low < high else centre
         rot = closing_along(field.arm, closing)
-        yield from _rise(field.arm, float(at[2]) + ABOVE)
-        yield from go_to(field.arm, at + ABOVE * UP, rot, FAST, OPEN)
-        yield from go_to(field.arm, at, rot, CLOSE, OPEN)
+        yield from _rise(field.arm, float(at[2]) + TRAVEL_HEIGHT)
+        yield from go_to(field.arm, at + TRAVEL_HEIGHT * UP, rot, FAST, OPEN)
+        yield from go_to(field.arm, at, rot, APPROACH, OPEN)
         yield from grasp(field.arm)
     yield from retreat(field.arm, lift, FAST)
 
 
-def _suck(field: MacroContext, spot: Vec3, skew: float) -> Plan:
+def _pick_by_suction(field: MacroContext, spot: Vec3, skew: float) -> Plan:
     arm = field.arm
     rot = closing_along(arm, about_z(skew) @ arm.hand_rot[:, 1])
-    yield from _rise(arm, float(spot[2]) + ABOVE)
+    yield from _rise(arm, float(spot[2]) + TRAVEL_HEIGHT)
     yield from go_to(arm, spot + 0.02 * UP, rot, FAST, OPEN)
     yield from suction.suck(arm, spot, rot, give_up=1.5)
 
 
 def _place(field: MacroContext, macro: Macro) -> Plan:
     u, v, drop, speed = macro.numbers
-    yield from _over(field, macro.target, u, v, drop + 0.01)
+    yield from _move_over(field, macro.target, u, v, drop + 0.01)
     if drop <= 0.0:
-        yield from _down(field, macro.target, 0.04, speed)
+        yield from _lower_until_contact(field, macro.target, 0.04, speed)
     yield from release(field.arm)
-    yield from retreat(field.arm, ABOVE, FAST)
+    yield from retreat(field.arm, TRAVEL_HEIGHT, FAST)
 
 
 def _press(field: MacroContext, macro: Macro) -> Plan:
     u, v, seconds, speed = macro.numbers
-    yield from _over(field, macro.target, u, v, AIR)
-    yield from _down(field, macro.target, 0.04, speed)
-    yield from _blindly(field.arm, -speed * UP, seconds)
-    yield from retreat(field.arm, ABOVE, FAST)
+    yield from _move_over(field, macro.target, u, v, PUSH_CLEARANCE)
+    yield from _lower_until_contact(field, macro.target, 0.04, speed)
+    yield from _push_blindly(field.arm, -speed * UP, seconds)
+    yield from retreat(field.arm, TRAVEL_HEIGHT, FAST)
 
 
 def _release(field: MacroContext, macro: Macro) -> Plan:
@@ -141,15 +143,15 @@ def _release(field: MacroContext, macro: Macro) -> Plan:
 
 
 def _catch(field: MacroContext, macro: Macro) -> Plan:
-    """Keep the hand open until a body that went away is coming back, then close it: fingers need time."""
+    """Keep the hand open until a body that has gone away returns, then close it: fingers need time."""
     (longest,) = macro.numbers
     world, body = field.world, macro.target
     end, gone, last = world.time + longest, False, 0.0
     while world.time < end:
         away = float(np.linalg.norm(world.com(body) - field.arm.hand))
-        if gone and away < min(last, CATCH):
+        if gone and away < min(last, CATCH_DISTANCE):
             break
-        gone, last = gone or away > GONE, away
+        gone, last = gone or away > GONE_DISTANCE, away
         yield np.append(np.zeros(6), OPEN)
     yield from grasp(field.arm)
 
@@ -170,17 +172,19 @@ def _push(field: MacroContext, macro: Macro) -> Plan:
         radius, below, lag = tool.reach(world, u), tool.reach(world, UP), arm.hand - tool.centre(world)
         rot = arm.hand_rot
     up, centre = solid.reach(world, UP), solid.centre(world)
-    start = centre - (solid.reach(world, u) + radius + AIR) * u + offset * solid.reach(world, across) * across
+    start = (
+        centre - (solid.reach(world, u) + radius + PUSH_CLEARANCE) * u + offset * solid.reach(world, across) * across
+    )
     z = centre[2] - up + height * 2 * up
     start[2] = z if load is None else max(z, centre[2] - up + below + 0.002)
     yield from _rise(arm, float(centre[2] + up + below + 0.03 + lag[2]))
     yield from go_to(arm, [*(start + lag)[:2], arm.hand[2]], rot, FAST, CLOSED)
-    yield from go_to(arm, start + lag, rot, CLOSE, CLOSED)
-    yield from _blindly(arm, speed * u, way / speed)
-    yield from retreat(arm, ABOVE, FAST)
+    yield from go_to(arm, start + lag, rot, APPROACH, CLOSED)
+    yield from _push_blindly(arm, speed * u, way / speed)
+    yield from retreat(arm, TRAVEL_HEIGHT, FAST)
 
 
-# --- the hand alone -----------------------------------------------------------------------------
+# --- moves of the hand alone --------------------------------------------------------------------
 
 
 def _move(field: MacroContext, macro: Macro) -> Plan:
@@ -219,7 +223,7 @@ def _wait(field: MacroContext, macro: Macro) -> Plan:
 
 def _go(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, a, b, c, grip = macro.numbers
-    yield from go_to(field.arm, [x, y, z], rotation(np.array([a, b, c])), CLOSE, grip)
+    yield from go_to(field.arm, [x, y, z], rotation(np.array([a, b, c])), APPROACH, grip)
 
 
 KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
@@ -243,13 +247,13 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
 
 
 def _rise(arm: Arm, height: float) -> Plan:
-    """Straight up to a height [m], if the hand is lower."""
+    """Move straight up to a height [m], if the hand is lower."""
     if arm.hand[2] < height - FAST.within:
         yield from go_to(arm, [*arm.hand[:2], height], pace=FAST)
 
 
-def _over(field: MacroContext, target: str, u: float, v: float, above: float) -> Plan:
-    """Bring what the hand holds, or its finger tips, over a point of a solid's upper face."""
+def _move_over(field: MacroContext, target: str, u: float, v: float, above: float) -> Plan:
+    """Move the body in the hand, or the finger tips, over a point of a solid's upper face."""
     solid, world, arm = field.solids[target], field.world, field.arm
     load = held(arm)
     below = TIP_BELOW if load is None else field.solids[load].reach(world, UP)
@@ -264,17 +268,17 @@ def _over(field: MacroContext, target: str, u: float, v: float, above: float) ->
     goal = top + lag + (below + above) * UP
     yield from _rise(arm, float(goal[2]) + 0.02)
     yield from go_to(arm, [*goal[:2], max(goal[2], arm.hand[2])], pace=LADEN, grip=CLOSED)
-    yield from go_to(arm, goal, pace=CLOSE, grip=CLOSED)
+    yield from go_to(arm, goal, pace=APPROACH, grip=CLOSED)
 
 
-def _down(field: MacroContext, target: str, farthest: float, speed: float) -> Plan:
-    """Lower what the hand holds, or closed fingers, until it touches the target's body, by `farthest` [m] at most."""
+def _lower_until_contact(field: MacroContext, target: str, farthest: float, speed: float) -> Plan:
+    """Lower the body in the hand, or the closed fingers, until it touches the target, by at most `farthest` [m]."""
     arm, world, body = field.arm, field.world, field.solids[target].body
     tool, end = held(arm) or arm.label, world.time + farthest / speed
     yield from push(arm, -speed * UP, lambda: world.touching(tool, body) or world.time > end, CLOSED)
 
 
-def _blindly(arm: Arm, velocity: Vec3, seconds: float) -> Plan:
-    """Push at a constant velocity for some time, whatever is in the way."""
+def _push_blindly(arm: Arm, velocity: Vec3, seconds: float) -> Plan:
+    """Push at a constant velocity for a time [s], whatever is in the way."""
     world, end = arm.world, arm.world.time + seconds - Loop.PERIOD / 2
     yield from push(arm, velocity, lambda: world.time > end, give_up=seconds + 1.0)

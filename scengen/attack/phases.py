@@ -1,4 +1,4 @@
-"""A witness taken apart: where the hand was, the phases that it went through, and plans that follow them."""
+"""The phases of a witness: its path, the states at which its phases begin, and plans that repeat them."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,20 +13,20 @@ from ..geometry import Mat3, Vec3, between, rotation
 from ..scenario import Plan, Scenario
 from ..sim.world import ROBOT, World
 from ..skills.motion import STEP, STIFFNESS, go_to, together
-from .macros import CLOSE, Macro
+from .macros import APPROACH, Macro
 from .signature import ContactPair, Signature, pairs, robots, signature, starts
 from .solids import held
 
-SHORTEST = 0.20
-"""Phases last at least this long [s]."""
-MOST = 12
-"""Phases of a witness, at most: the shortest ones are joined."""
-SLOW = 0.02
-"""Speed of a hand that pauses [m/s]."""
-AWAY = 0.02
-"""Distance from where a phase begins at which the hand is brought there first [m]."""
+MIN_PHASE_TIME = 0.20
+"""Minimum duration of a phase [s]."""
+MAX_PHASES = 12
+"""Maximum number of phases of a witness: the shortest ones are joined."""
+PAUSE_SPEED = 0.02
+"""Speed below which a hand pauses [m/s]."""
+START_TOLERANCE = 0.02
+"""Distance of the hand from the beginning of a phase above which it is first brought there [m]."""
 MIRROR = np.array([1.0, -1.0, 1.0])
-"""Left for right: what it does to a displacement; rotation vectors change the other two signs."""
+"""Signs of a displacement that is mirrored left for right; rotation vectors change the other two signs."""
 
 
 @dataclass(frozen=True)
@@ -34,67 +34,71 @@ class Stage:
     """The state at the beginning of a phase, or at the end of the last one."""
 
     row: int
+    """Row of the witness."""
     state: NDArray[np.float64]
+    """State of the physics."""
     held: float
-    """How long the goal has held [s]."""
+    """Time for which the goal has held [s]."""
     signature: Signature
+    """Signature so far."""
     holds: tuple[str | None, ...]
-    """The free body in each hand; see `solids.held`."""
+    """Free body in each hand; see `solids.held`."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A rollout that reached the goal, period by period."""
+    """A rollout that reached the goal, by control period."""
 
     actions: Actions
+    """Actions, as the controller received them."""
     hands: NDArray[np.float64]
-    """Where each hand was before each action and after the last one [m], shape (n + 1, arms, 3)."""
+    """Positions of the hands before each action and after the last one [m], shape (n + 1, arms, 3)."""
     rots: NDArray[np.float64]
-    """Their orientations, shape (n + 1, arms, 3, 3)."""
+    """Orientations of the hands, shape (n + 1, arms, 3, 3)."""
     stages: tuple[Stage, ...]
-    """Beginnings of phases in order, and the end: phase k goes from stage k to stage k + 1."""
+    """Beginnings of the phases in order, and the end: phase k goes from stage k to stage k + 1."""
     signature: Signature
-    """When the goal was reached."""
+    """Signature at the time the goal was reached."""
     events: tuple[tuple[int, ContactPair], ...]
-    """Contacts that there were none of at the start: the row of the first one of each, in order."""
+    """New contacts since the start, each with the row at which it first occurred, in order."""
     _robots: frozenset[str]
-    """What stands for the robot in them."""
+    """Names of the robot in the contacts."""
 
     @property
     def phases(self) -> list[tuple[int, int]]:
-        """First row of each phase, and the first of the next one."""
+        """First row of each phase, and first row after it."""
         rows = [stage.row for stage in self.stages]
         return list(pairwise(rows))
 
     @property
     def handled(self) -> tuple[str, ...]:
-        """Bodies that the robot touched, in that order."""
+        """Bodies that the robot touched, in the order of first contact."""
         touched = [body for _, pair in self.events if self._robots & {*pair} for body in pair]
         return tuple(dict.fromkeys(body for body in touched if body not in self._robots))
 
     @property
     def concerned(self) -> tuple[str, ...]:
-        """Bodies that touched anything new, the latest one first: they are nearest to the goal."""
+        """Bodies with new contacts, the latest one first: they are nearest to the goal."""
         bodies = [body for _, pair in reversed(self.events) for body in pair if body not in self._robots]
         return tuple(dict.fromkeys(bodies))
 
     def releases(self, arm: int) -> tuple[tuple[int, str], ...]:
-        """Stages at which the gripper of an arm opens, each with the body that it lets go of."""
+        """Stages at which the gripper of an arm opens, each with the body that it releases."""
         grip = self.actions[:, ACTION * arm + ACTION - 1]
         opens = [(k, s.row, s.holds[arm]) for k, s in enumerate(self.stages[1:-1], 1) if grip[s.row] <= 0]
         return tuple((k, body) for k, row, body in opens if body and grip[row - 1] > 0)
 
 
 def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
-    """Replay a witness and take it apart; None if it does not reach the goal."""
+    """Replay a witness and record its trace; None if it does not reach the goal."""
     world.reset()
     start, episode = starts(world), Episode(scenario, world)
-    poses, marks, events = [_poses(world)], [_Mark.of(world)], list[tuple[int, ContactPair]]()
+    poses, marks, events = [_poses(world)], [_Observation.of(world)], list[tuple[int, ContactPair]]()
     states = [(world.state(), 0.0, signature(world, start))]
     for action in actions:
         outcome = episode.step(action)
         poses.append(_poses(world))
-        marks.append(_Mark.of(world))
+        marks.append(_Observation.of(world))
         states.append((world.state(), episode.held, signature(world, start)))
         events += [(len(marks) - 2, pair) for pair in sorted(marks[-1].touched[1] - marks[-2].touched[1])]
         if outcome is not None:
@@ -108,40 +112,41 @@ def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
 
 
 def _poses(world: World) -> tuple[list[Vec3], list[Mat3]]:
-    """Where the hands are, and their orientations."""
+    """Positions and orientations of the hands."""
     return [arm.hand for arm in world.arms], [arm.hand_rot for arm in world.arms]
 
 
 @dataclass(frozen=True)
-class _Mark:
-    """What is compared from one period to the next to find where a phase ends."""
+class _Observation:
+    """Observations of one control period; a phase ends where they change."""
 
     closed: tuple[bool, ...]
-    """Whether each gripper is told to close."""
+    """Whether each gripper is commanded to close."""
     touched: tuple[bool, frozenset[ContactPair]]
     """Whether the robot touches a free body, and all contacts since the start."""
     holds: tuple[str | None, ...]
+    """Free body in each hand."""
 
     @classmethod
-    def of(cls, world: World) -> "_Mark":
+    def of(cls, world: World) -> "_Observation":
         touches = any(world.touching(ROBOT, body) for body in world.free_bodies)
         closed, holds = tuple(arm.grip > 0 for arm in world.arms), tuple(map(held, world.arms))
         return cls(closed, (touches, pairs(world)), holds)
 
 
-def _cuts(marks: list[_Mark], hands: NDArray[np.float64]) -> list[int]:
-    """Rows at which phases begin, the end included: changes of gripper and contacts, and pauses of all hands."""
-    end, least = len(marks) - 1, round(SHORTEST / Loop.PERIOD)
+def _cuts(marks: list[_Observation], hands: NDArray[np.float64]) -> list[int]:
+    """Rows at which phases begin, and the end: changes of the grippers or contacts, and ends of pauses of all hands."""
+    end, least = len(marks) - 1, round(MIN_PHASE_TIME / Loop.PERIOD)
     speed = np.linalg.norm(np.diff(hands, axis=0), axis=2).max(axis=1) / Loop.PERIOD
     grips = {i - 1 for i in range(2, end) if marks[i].closed != marks[i - 1].closed}
     touches = {i for i in range(1, end) if marks[i].touched != marks[i - 1].touched}
-    pauses = {i for i in range(1, end) if speed[i] >= SLOW > speed[i - 1]}
+    pauses = {i for i in range(1, end) if speed[i] >= PAUSE_SPEED > speed[i - 1]}
     cuts = [0]
     for row in sorted(grips | touches | pauses):
         if end - row >= least and (row in grips or row - cuts[-1] >= least):
             cuts.append(row)
     cuts.append(end)
-    while len(cuts) > MOST + 1:
+    while len(cuts) > MAX_PHASES + 1:
         lengths = np.diff(cuts)
         k = int(np.argmin(lengths))
         del cuts[k if 0 < k < len(cuts) - 1 else 1]
@@ -152,17 +157,19 @@ def _cuts(marks: list[_Mark], hands: NDArray[np.float64]) -> list[int]:
 
 
 def follow(world: World, path: Trace, macro: Macro) -> Plan:
-    """A stretch of a witness once more, from wherever the hands are.
+    """Repeat a stretch of a witness, from the present positions of the hands.
 
-    Numbers of the macro: first row, last row, pace, 1 for mirrored left for right, displacement of the whole [m].
-    What the witness asked for is asked for again; the hands are kept to the way by feedback.
+    Numbers of the macro: first row, last row, pace, 1 for mirrored left for right, displacement of the stretch [m].
+    The witness's actions are repeated; feedback keeps the hands on its path.
     """
     first, last, pace, mirrored, *shift = macro.numbers
     begin, end = round(first), round(last)
     sign = MIRROR if mirrored else np.ones(3)
     bases, before = path.hands[begin] + np.array(shift), path.actions[max(begin - 1, 0)].reshape(-1, ACTION)
     way = [
-        go_to(arm, base, rot, CLOSE, float(grip)) if float(np.linalg.norm(base - arm.hand)) > AWAY else None
+        go_to(arm, base, rot, APPROACH, float(grip))
+        if float(np.linalg.norm(base - arm.hand)) > START_TOLERANCE
+        else None
         for arm, base, rot, grip in zip(world.arms, bases, path.rots[begin], before[:, -1], strict=True)
     ]
     yield from together(world, *way)
@@ -182,14 +189,14 @@ def follow(world: World, path: Trace, macro: Macro) -> Plan:
 
 
 def _aim(begin: Mat3, now: Mat3, sign: Vec3) -> Mat3:
-    """Where a hand is to point, mirrored about the beginning of the stretch if asked for."""
+    """Target orientation of a hand, mirrored about the beginning of the stretch if the stretch is mirrored."""
     if sign[1] > 0:
         return now
     return rotation(-sign * between(begin, now)) @ begin
 
 
-def again(actions: Actions, raw: bool) -> Plan:
-    """Recorded actions once more: as they were received, or as they must be asked for to come through the filter."""
+def repeat(actions: Actions, raw: bool) -> Plan:
+    """Repeat recorded actions: as they were received, or such that the teleoperation filter turns them into these."""
     before = np.zeros((actions.shape[1] // ACTION, MOTION))
     for action in np.asarray(actions, float):
         asked, motion = action.copy(), action.reshape(-1, ACTION)[:, :MOTION]

@@ -16,22 +16,23 @@ from ..sim.world import World
 from ..validate.rollout import Stillness
 from . import macros
 from .macros import Macro
-from .phases import again, follow, trace
+from .phases import follow, repeat, trace
 from .signature import Signature, signature, starts
 from .solids import Solid, solids
 
-SETTLE = 1.0
-"""How long a reached goal has to last without action [s], as in a certificate."""
+SETTLE_TIME = 1.0
+"""Time for which a reached goal has to last without action, as in a certificate [s]."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What the adversary does, as data."""
+    """A plan of the adversary, as data."""
 
     tier: str
     macros: tuple[Macro, ...]
+    """Moves, in order."""
     stage: int | None = None
-    """The stage of the witness at which it begins; the start of the episode without it."""
+    """Stage of the witness at which the attempt begins; None for the start of the episode."""
 
     def __str__(self) -> str:
         return "; ".join(map(str, self.macros)) or "nothing more"
@@ -39,54 +40,57 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Node:
-    """A state to fork from: everything that the rest of an episode depends on."""
+    """A state from which attempts can begin: everything that the rest of an episode depends on."""
 
     state: NDArray[np.float64]
+    """State of the physics."""
     held: float
-    """How long the goal has held [s]."""
+    """Time for which the goal has held [s]."""
     actions: Actions
-    """What has led here."""
+    """Actions that led to the state."""
     signature: Signature
-    """What has happened so far."""
+    """Signature so far."""
     about: str = ""
-    """In words what has led here; empty at the start."""
+    """Description of the way to the state, in words; empty at the start."""
 
     def after(self, what: object) -> str:
-        """In words what has led here, and something more."""
+        """Description of the way to the state, and of a further move."""
         return f"{self.about}; {what}" if self.about else str(what)
 
     @property
     def seconds(self) -> float:
-        """Since the start of the episode [s]."""
+        """Time since the start of the episode [s]."""
         return len(self.actions) * Loop.PERIOD
 
 
 @dataclass(frozen=True)
 class Played:
-    """What came of an attempt."""
+    """The result of an attempt."""
 
     outcome: Outcome
     reason: str
+    """Reason of the outcome."""
     seconds: float
-    """When the goal was reached, or when the episode ended [s]."""
+    """Time at which the goal was reached or the episode ended [s]."""
     actions: Actions
-    """Everything since the start of the episode, as the controller received it."""
+    """All actions since the start of the episode, as the controller received them."""
     digest: str
     """Hash of the final physics state."""
     signature: Signature
-    """When the goal was reached, or at the end."""
+    """Signature at the time the goal was reached, or at the end."""
     notes: tuple[str, ...]
-    """Which macros gave up, and why."""
+    """Macros that gave up, with their reasons."""
     nodes: tuple[Node, ...] = field(repr=False)
-    """The states at the ends of its macros while the outcome was open."""
+    """States at the ends of the macros while the outcome was open."""
 
     @property
     def solved(self) -> bool:
+        """Whether the goal was reached."""
         return self.outcome == "success"
 
 
 class Player:
-    """Plays attempts on one scenario: its world, its limits, and what each kind of macro needs to know."""
+    """Plays attempts on one scenario. It holds the world and the data that macros need."""
 
     def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, horizon: float, witness: Actions):
         self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
@@ -97,10 +101,10 @@ class Player:
         found = trace(scenario, self.world, witness)
         if found is None:
             raise BadConfig(
-                f"scenario {scenario.id}: the witness does not reach the goal, so that nothing can be attacked"
+                f"scenario {scenario.id}: the witness does not reach the goal, so the scenario cannot be attacked"
             )
         self.trace = found
-        """The witness taken apart."""
+        """Trace of the witness."""
         self.foreign: dict[str, Actions] = {}
         """Witnesses of other scenarios, by id."""
 
@@ -110,12 +114,12 @@ class Player:
         return solids(self.world)
 
     def plan(self, macro: Macro, raw: bool) -> Plan:
-        """The moves of one macro."""
+        """The plan of one macro."""
         match macro.kind:
             case "follow":
                 return follow(self.world, self.trace, macro)
             case "replay":
-                return again(self.foreign[macro.target], raw)
+                return repeat(self.foreign[macro.target], raw)
             case "shortcut":
                 return self.scenario.shortcuts()[macro.target].plan(self.world)
             case "answer":
@@ -132,39 +136,39 @@ class Player:
 
     @cached_property
     def phases(self) -> int:
-        """How many phases of the witness decide: after them nothing more has to be done."""
-        low, high = 0, len(self.trace.stages) - 1  # from the last stage on nothing is left to do
+        """Number of phases of the witness after which the goal is reached without further actions."""
+        low, high = 0, len(self.trace.stages) - 1  # at the last stage the goal is reached
         while low < high:
             middle = (low + high) // 2
             low, high = (low, middle) if self.play((), False, self.stage(middle)).solved else (middle + 1, high)
         return low
 
     def rewind(self, k: int | None = None) -> None:
-        """Put the world at stage `k` of the witness, or at the start: to look at it, before anything is planned."""
+        """Put the world at stage `k` of the witness, or at the start, so that a plan can be made for it."""
         self.world.restore(self.start.state if k is None else self.trace.stages[k].state)
 
     def signature(self) -> Signature:
-        """What the episode has left behind so far."""
+        """The signature of the episode so far."""
         return signature(self.world, self._places)
 
     def play(self, steps: Sequence[Macro], raw: bool, node: Node | None = None) -> Played:
-        """Play macros one after the other, then nothing, until success, failure, the time limit, or rest.
+        """Play macros one after the other, then idle, until success, failure, the time limit, or rest.
 
-        A macro that gives up does not end the rest. A success counts if the goal still holds after `SETTLE`.
+        A macro that gives up does not end the others. A success counts if the goal still holds after `SETTLE_TIME`.
 
         Args:
-            raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
-            node: where to begin; the start of the scenario without it.
+            raw: whether actions go to the controller as they are, clipped, and not through the teleoperation filter.
+            node: state from which to begin; None for the start of the scenario.
         """
         node = node or self.start
         self.world.restore(node.state)
         episode = Episode(self.scenario, self.world, self.horizon)
         episode.held = node.held
-        return _Run(self, episode, node, raw).to_end(steps)
+        return _RunningAttempt(self, episode, node, raw).to_end(steps)
 
 
-class _Run:
-    """One attempt on its way."""
+class _RunningAttempt:
+    """One attempt in progress."""
 
     def __init__(self, player: Player, episode: Episode, node: Node, raw: bool):
         self.player, self.episode, self.node, self.raw, self.world = player, episode, node, raw, player.world
@@ -175,7 +179,7 @@ class _Run:
     def to_end(self, steps: Sequence[Macro]) -> Played:
         node = self.node
         for macro in steps:
-            self._macro(macro)
+            self._play_macro(macro)
             if self.episode.outcome is not None:
                 break
             actions = self._actions()
@@ -188,7 +192,7 @@ class _Run:
         reason = self.episode.reason or "everything came to rest without reaching the goal"
         return self._ended(self.episode.outcome or "timeout", reason, self.world.time)
 
-    def _macro(self, macro: Macro) -> None:
+    def _play_macro(self, macro: Macro) -> None:
         try:
             for action in self.player.plan(macro, self.raw):
                 if self._step(action) is not None:
@@ -202,7 +206,7 @@ class _Run:
         return self.episode.step(given)
 
     def _idle(self) -> None:
-        """Nothing, until something is decided or everything has been at rest for a while."""
+        """Idle until the outcome is decided or everything has been at rest for a while."""
         stillness = Stillness(self.player.scenario, self.world)
         while self.episode.outcome is None and (not stillness.lasts() or self.episode.held):
             self._step(self.world.idle)
@@ -210,7 +214,7 @@ class _Run:
     def _settled(self) -> Played:
         reached = self.world.time
         left = self.player.signature()
-        for _ in range(round(SETTLE / Loop.PERIOD)):
+        for _ in range(round(SETTLE_TIME / Loop.PERIOD)):
             if self._step(self.world.idle) != "success":
                 break
         outcome, reason = self.episode.settled()
@@ -228,5 +232,5 @@ class _Run:
         return Played(outcome, reason, round(seconds, 6), self._actions(), self.world.digest, left, notes, nodes)
 
     def _actions(self) -> Actions:
-        """What the controller has received so far."""
+        """Actions that the controller has received so far."""
         return np.array(self.rows, np.float32).reshape(-1, self.world.size)

@@ -1,4 +1,4 @@
-"""Tier of priors: the best one, two and three fixed answers, fitted on other draws, given without looking."""
+"""Tier of priors: the best one, two and three fixed answers, fitted on other draws, given blindly."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,45 +13,48 @@ from .macros import Macro
 from .player import Attempt
 
 GUESSES = (1, 2, 3)
-"""How many fixed answers are given one after the other in an episode."""
+"""Numbers of fixed answers that are given one after the other in an episode."""
 
 
 @dataclass(frozen=True)
 class Prior:
-    """Fixed answers, the best one first."""
+    """A set of fixed answers."""
 
     values: tuple[float, ...]
+    """Answers, the best one first."""
     fitted: float
-    """Share of the draws that one of them answers, where they were fitted."""
+    """Share of the draws on which the answers were fitted that one of them solves."""
     fresh: float | None = None
-    """The same on other draws, by statics; None where only rollouts can tell."""
+    """Share of other draws that one of them solves, by statics; None if only rollouts can judge."""
     draws: int = 0
-    """How many other draws."""
+    """Number of other draws."""
 
     @property
     def bound(self) -> float | None:
-        """One-sided upper Clopper-Pearson bound of `fresh` at 95 % confidence."""
+        """One-sided upper Clopper-Pearson bound of `fresh` at 95 % confidence; None as `fresh`."""
         if self.fresh is None:
             return None
         return 1.0 - lower_bound(round((1 - self.fresh) * self.draws), self.draws)
 
 
 AnswerJudge = Callable[[Scenario], Callable[[float], bool]]
-"""Whether a value is right in a scenario: by statics, or by a rollout."""
+"""Test whether a value is right in a scenario: by statics, or by a rollout."""
 
 
 def by_statics(scenario: Scenario) -> Callable[[float], bool]:
-    """What the family itself says about guesses."""
+    """The family's own test of an answer, which needs no rollout."""
     answer = scenario.answer()
     assert answer is not None and answer.right is not None, "asked for once for the family"
     return answer.right
 
 
 def fit(training: Sequence[Scenario], judge: AnswerJudge = by_statics, fresh: Sequence[Scenario] = ()) -> list[Prior]:
-    """The best one, two and three of the candidates, by exhaustive choice.
+    """The best one, two and three of the candidates, by exhaustive search.
 
     Args:
-        fresh: draws on which the choice is measured.
+        training: draws on which the answers are fitted.
+        judge: test of an answer.
+        fresh: other draws on which the answers are measured.
     """
     answer = next(iter(training)).answer()
     if answer is None:
@@ -69,18 +72,18 @@ def fit(training: Sequence[Scenario], judge: AnswerJudge = by_statics, fresh: Se
 
 
 def has_statics(answer: Answer | None) -> bool:
-    """Whether guesses can be judged without rollouts."""
+    """Whether answers can be judged without rollouts."""
     return answer is not None and answer.right is not None
 
 
 def guesses(priors: Iterable[Prior]) -> Iterator[Attempt]:
-    """Every set of fixed answers, one answer after the other in one episode."""
+    """An attempt for every set of fixed answers, which gives one answer after the other in one episode."""
     for prior in priors:
         moves = tuple(Macro("answer", "", (value,)) for value in prior.values)
         yield Attempt(f"prior_{len(prior.values)}", moves)
 
 
 def _table(scenarios: Sequence[Scenario], values: Sequence[float], judge: AnswerJudge) -> NDArray[np.bool_]:
-    """Which value is right in which scenario, shape (scenarios, values)."""
+    """Whether each value is right in each scenario, shape (scenarios, values)."""
     rows = [[right(value) for value in values] for right in map(judge, scenarios)]
     return np.array(rows, bool).reshape(len(scenarios), len(values))

@@ -1,6 +1,6 @@
-"""Tier of costless retries: one move made again and again while a number is swept, all in one episode.
+"""Tier of costless retries: one move is repeated while a number is swept, all in one episode.
 
-A task in which a wrong try costs nothing asks for patience instead of insight.
+A task in which a failed attempt costs nothing requires patience instead of insight.
 """
 
 import math
@@ -18,22 +18,25 @@ from .solids import TABLE, Solid, handles, sides
 from .variations import phase
 
 RETRY = "retry"
+"""Tier of repeated moves."""
 
 TILTS = (65.0, 40.0, 20.0)
-"""By how much a held thing is tipped, one way and the other [deg]: the hand reaches about 70."""
-SHARES = (0.9, -0.9, 0.45, -0.45, 0.0)
-"""Of a face, in the order in which they are tried."""
-BEGIN, STEP = -0.03, 0.020
-"""Where a thing is let go first, from where the witness does it, and how much farther each time [m]. Some 7 mm of a
-step are lost: what comes back is caught a little before its turn."""
-CATCHES = 5
-"""How often it is let go: with 1.4 s for each, as far as the time allows."""
+"""Angles by which a held body is tipped, one way and the other [deg]: the hand reaches about 70."""
+FACE_SHARES = (0.9, -0.9, 0.45, -0.45, 0.0)
+"""Places on a face, as shares of its half length, in the order in which they are tried."""
+FIRST_RELEASE = -0.03
+"""Place of the first release along the face, from that of the witness [m]."""
+RELEASE_STEP = 0.020
+"""Distance from one release to the next [m]. About 7 mm of it are lost: a body that returns is caught a little before
+it turns round."""
+RELEASES = 5
+"""Number of releases: each takes 1.4 s, and the time limit allows no more."""
 SHIFTS = (0.010, 0.025, -0.010, -0.025)
-"""By how much a phase of the witness is displaced [m]."""
+"""Displacements of a phase of the witness [m]."""
 
 
 def retries(player: Player) -> Iterator[Attempt]:
-    """All families in turn, of every arm, each with what promises most first."""
+    """All families of attempts in turn, for every arm, each with the most promising attempts first."""
     makers = (carried, tipped, dropped_again, shaken, placed, bare)
     families = [_by(arm, make(player, arm)) for make in makers for arm in player.world.arms]
     for round_ in zip_longest(*families, shifted(player)):
@@ -47,39 +50,39 @@ def _by(arm: Arm, attempts: Iterator[Attempt]) -> Iterator[Attempt]:
 
 
 def carried(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """Every graspable free body picked and brought against, over and onto every other body."""
+    """Every graspable free body is picked, then pushed against, placed on and pressed on every other body."""
     for one, other in _pairs(player, arm):
         for pick in _picks(player, arm, one):
             pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(player, other))
             yield Attempt(RETRY, (pick, *pushes[:2]))
             yield Attempt(RETRY, (pick, *pushes[2:]))
-            for share in SHARES[-1], *SHARES[:2]:
+            for share in FACE_SHARES[-1], *FACE_SHARES[:2]:
                 yield Attempt(RETRY, (pick, Macro("place", other.name, (share, 0.0, 0.06, 0.1))))
-            yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in SHARES[:3])))
+            yield Attempt(RETRY, (pick, *(Macro("press", other.name, (u, 0.0, 0.4, 0.1)) for u in FACE_SHARES[:3])))
 
 
 def bare(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """Every body pushed from all sides, high and low, then pressed, with the bare hand."""
+    """Every body is pushed from all sides, high and low, then pressed, with the empty hand."""
     for solid in _targets(player):
         for height in (0.8, 0.3):
             pushes = [Macro("push", solid.name, (angle, height, 0.0, 0.12, 0.2)) for angle in _angles(player, solid)]
             yield Attempt(RETRY, tuple(pushes[:2]))
             yield Attempt(RETRY, tuple(pushes[2:]))
-        yield Attempt(RETRY, tuple(Macro("press", solid.name, (u, 0.0, 0.5, 0.1)) for u in SHARES[:3]))
+        yield Attempt(RETRY, tuple(Macro("press", solid.name, (u, 0.0, 0.5, 0.1)) for u in FACE_SHARES[:3]))
 
 
 def placed(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """Every graspable free body put down at one share of a face after the other."""
+    """Every graspable free body is put down at several places of a face, one after the other."""
     for one, other in _pairs(player, arm):
         for pick in _picks(player, arm, one)[:1]:
             moves: list[Macro] = []
-            for share in SHARES:
+            for share in FACE_SHARES:
                 moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
             yield Attempt(RETRY, tuple(moves))
 
 
 def tipped(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """What the witness holds, tipped one way and the other."""
+    """The body in the hand of the witness is tipped one way and the other."""
     for k in _holding(player, arm):
         for axis in _axes(player, arm, k):
             for tilt in TILTS[:2]:
@@ -91,7 +94,7 @@ def tipped(player: Player, arm: Arm) -> Iterator[Attempt]:
 
 
 def shaken(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """What the witness holds, shaken level and upwards, with the wrist at rest and turning."""
+    """The body in the hand of the witness is shaken sideways and up, with the wrist at rest and turning."""
     for spin in (1.0, 0.0):
         for k in _holding(player, arm):
             for along in (*_axes(player, arm, k), UP):
@@ -101,16 +104,16 @@ def shaken(player: Player, arm: Arm) -> Iterator[Attempt]:
 
 
 def dropped_again(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """Let go where the witness does, but elsewhere along the face beneath; caught as it comes back, let go again."""
+    """A body is released at other places along the face beneath, caught when it returns, and released again."""
     for k, body in player.trace.releases(arm.number):
         for along in _tangents(player, k, body):
-            again = (Macro("release", "", (0.15, 0.0)), Macro("catch", body, (2.5,)), _move(along, STEP))
-            moves = (_move(along, BEGIN), *again * CATCHES)
+            again = (Macro("release", "", (0.15, 0.0)), Macro("catch", body, (2.5,)), _move(along, RELEASE_STEP))
+            moves = (_move(along, FIRST_RELEASE), *again * RELEASES)
             yield Attempt(RETRY, moves, k)
 
 
 def shifted(player: Player) -> Iterator[Attempt]:
-    """A phase of the witness displaced, and displaced otherwise, each time from where it begins."""
+    """A phase of the witness is repeated with several displacements, each time from its beginning."""
     for k in reversed(range(player.phases)):
         for axis in range(3):
             moves = []
@@ -121,11 +124,11 @@ def shifted(player: Player) -> Iterator[Attempt]:
             yield Attempt(RETRY, tuple(moves), k)
 
 
-# --- what to try it on ------------------------------------------------------------------------
+# --- bodies and directions --------------------------------------------------------------------
 
 
 def _pairs(player: Player, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
-    """What may be taken and what it may be brought to, those that matter in the witness first."""
+    """Solids that can be grasped, each with a target; those that matter in the witness come first."""
     taken, targets = handles(player.solids, arm.suction), _targets(player)
     known = player.trace.handled
     ranked = sorted(taken, key=lambda solid: known.index(solid.body) if solid.body in known else len(known))
@@ -136,7 +139,7 @@ def _pairs(player: Player, arm: Arm) -> Iterator[tuple[Solid, Solid]]:
 
 
 def _targets(player: Player) -> list[Solid]:
-    """Whole bodies, those nearest to the goal first, then parts of them; not the table."""
+    """Whole bodies without the table, those nearest to the goal first, then parts of bodies."""
     near = player.trace.concerned
     found = [solid for solid in player.solids.values() if solid.body != TABLE]
     order = {solid.name: near.index(solid.body) if solid.body in near else len(near) for solid in found}
@@ -150,14 +153,14 @@ def _picks(player: Player, arm: Arm, solid: Solid) -> list[Macro]:
 
 
 def _angles(player: Player, solid: Solid) -> list[float]:
-    """Directions along the level axes of a solid [rad], the shorter one first, both ways."""
+    """Directions along the level axes of a solid, both ways, the shorter axis first [rad]."""
     player.rewind()
     angles = [math.atan2(along[1], along[0]) for along, _ in solid.level_axes(player.world)]
     return [angle + turn for angle in angles for turn in (0.0, math.pi)]
 
 
 def _holding(player: Player, arm: Arm) -> list[int]:
-    """Stages of the witness at which something has been in the hand for a whole phase, the middle one first."""
+    """At most three stages of the witness at which a body has been in the hand for a phase, the middle one first."""
     holds = [stage.holds[arm.number] for stage in player.trace.stages[: player.phases]]
     found = [k for k in range(1, len(holds)) if holds[k] and holds[k - 1]]
     found = found or [k for k in range(1, len(holds)) if holds[k]]
@@ -165,7 +168,7 @@ def _holding(player: Player, arm: Arm) -> list[int]:
 
 
 def _axes(player: Player, arm: Arm, k: int) -> Sequence[Vec3]:
-    """The level axes of what is held at a stage, the longer one last."""
+    """The level axes of the body that is held at a stage, the longer one last."""
     player.rewind(k)
     body = player.trace.stages[k].holds[arm.number]
     assert body is not None
@@ -173,7 +176,7 @@ def _axes(player: Player, arm: Arm, k: int) -> Sequence[Vec3]:
 
 
 def _tangents(player: Player, k: int, body: str) -> list[Vec3]:
-    """Uphill along the face that a body touches at a stage; level directions where that is level."""
+    """The uphill direction of the face that a body touches at a stage; two level directions if the face is level."""
     player.rewind(k)
     world = player.world
     data, index = world.data, world.body(body)
@@ -193,7 +196,7 @@ def _tangents(player: Player, k: int, body: str) -> list[Vec3]:
 
 
 def _seesawing(axis: Vec3, tilt: float) -> tuple[Macro, ...]:
-    """Tip about an axis, wait, tip the other way, wait, and back."""
+    """Tip about an axis, wait, tip the other way, wait, and tip back."""
     one, other = (tuple(map(float, tilt * axis)), tuple(map(float, -2 * tilt * axis)))
     pause = Macro("wait", "", (0.8,))
     return (

@@ -1,4 +1,4 @@
-"""What a scene consists of, to somebody who knows no task: bodies and geoms, each with a box around it."""
+"""The bodies and geoms of a scene, each with a box around it: the adversary's view of a scene, without the task."""
 
 import math
 from collections.abc import Mapping
@@ -12,13 +12,13 @@ from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ABOVE, SPAN
 from ..sim.world import Arm, World
 
 TABLE = "table"
-PARTS = 6
-"""How many geoms of one body are looked at, the largest ones: a curved floor consists of dozens."""
-LEAST = 0.008
-"""Half the longest side of the smallest geom that is looked at [m]: half a finger's width."""
+MAX_PARTS = 6
+"""Maximum number of geoms of one body that are considered, the largest ones: a curved floor consists of dozens."""
+MIN_HALF_LENGTH = 0.008
+"""Minimum of half the longest side of a geom that is considered: half a finger's width [m]."""
 
-EMPTY = 0.003
-"""Distance of the fingers of a closed jaw with nothing in it [m], at most."""
+EMPTY_JAW_GAP = 0.003
+"""Maximum distance of the fingers of a closed, empty jaw [m]."""
 
 
 @dataclass(frozen=True)
@@ -26,33 +26,34 @@ class Solid:
     """A body, or one collision geom of it, with the box around it in the axes of the body."""
 
     name: str
-    """Of the body, or of the geom where it is one of several; `body#2` for a geom without a name."""
+    """Name of the body, or of the geom if it is one of several; `body#2` for a geom without a name."""
     body: str
+    """Name of the body."""
     free: bool
     """Whether the body hangs on a free joint."""
     middle: Vec3
-    """Of the box, in the axes of the body [m]."""
+    """Middle of the box, in the axes of the body [m]."""
     axes: Mat3
-    """Of the box, in the axes of the body."""
+    """Axes of the box, in the axes of the body."""
     half: Vec3
-    """Half the lengths of the box [m]."""
+    """Half the side lengths of the box [m]."""
 
     def centre(self, world: World) -> Vec3:
-        """Middle of the box now [m]."""
+        """Present position of the middle of the box [m]."""
         return world.pos(self.body) + world.rot(self.body) @ self.middle
 
     def rot(self, world: World) -> Mat3:
-        """Axes of the box now."""
+        """Present orientation of the box."""
         return world.rot(self.body) @ self.axes
 
     def reach(self, world: World, direction: Vec3) -> float:
-        """How far the box goes from its middle in a direction, a unit vector [m]."""
+        """Extent of the box from its middle in a direction, a unit vector [m]."""
         return float(np.abs(self.rot(world).T @ direction) @ self.half)
 
     def level_axes(self, world: World) -> list[tuple[Vec3, float]]:
-        """The two axes of the box that are nearest to level, as level unit vectors, with half the length [m].
+        """The two axes of the box that are nearest to level, as level unit vectors, each with its half length [m].
 
-        The shorter one first: along it a jaw closes.
+        The shorter axis, along which a jaw closes, comes first.
         """
         rot = self.rot(world)
         flat = sorted(range(3), key=lambda i: abs(float(rot[2, i])))[:2]
@@ -63,22 +64,22 @@ class Solid:
         return found
 
     def top(self, world: World) -> float:
-        """Height of its highest point [m]."""
+        """Height of the highest point of the box [m]."""
         return float(self.centre(world)[2]) + self.reach(world, UP)
 
     def outline(self, world: World) -> Outline:
-        """What of the box is seen from above, as if its level axes were level."""
+        """Outline of the box from above, as if its level axes were exactly level."""
         (along, first), (_, second) = self.level_axes(world)
         return corners(self.centre(world), math.atan2(along[1], along[0]), (2 * first, 2 * second))
 
     @property
     def graspable(self) -> bool:
-        """Whether a jaw may span it: a free body, and narrow in one direction."""
+        """Whether a jaw can grasp it: the body is free, and the box narrower than the open jaw in one direction."""
         return self.free and 2 * float(self.half.min()) < OPEN_GAP
 
 
 def solids(world: World) -> Mapping[str, Solid]:
-    """All solids of the scene by name, without floor and robot: bodies first, then the parts of composed ones."""
+    """All solids of the scene by name, without floor and robot: bodies first, then the parts of composite bodies."""
     found, parts = {}, {}
     for body in _bodies(world):
         name, free = world.model.body(body).name, world.model.body(body).name in world.free_bodies
@@ -90,20 +91,20 @@ def solids(world: World) -> Mapping[str, Solid]:
             found[name] = Solid(name, name, free, *boxes[geoms[0]])
             continue
         found[name] = Solid(name, name, free, *_around(list(boxes.values())))
-        large = [g for g in geoms if boxes[g][2].max() >= LEAST]
-        for k, g in enumerate(sorted(large, key=lambda g: -float(np.prod(boxes[g][2])))[:PARTS]):
+        large = [g for g in geoms if boxes[g][2].max() >= MIN_HALF_LENGTH]
+        for k, g in enumerate(sorted(large, key=lambda g: -float(np.prod(boxes[g][2])))[:MAX_PARTS]):
             part = world.model.geom(g).name or f"{name}#{k}"
             parts[part] = Solid(part, name, free, *boxes[g])
     return found | parts
 
 
 def handles(found: Mapping[str, Solid], suction: bool) -> list[Solid]:
-    """What a hand can take hold of: the best handle of each free body, then the second best ones."""
+    """The solids that a hand can grasp: the best handle of each free body, then the second best ones."""
     ranked = []
     for whole in (solid for solid in found.values() if solid.free and solid.name == solid.body):
         parts = [solid for solid in found.values() if solid.body == whole.body and solid is not whole]
         if suction:
-            takes = parts or [whole]  # the middle of a box around several parts may be air
+            takes = parts or [whole]  # the middle of a box around several parts may be empty space
         else:
             takes = [whole] if whole.graspable else [part for part in parts if part.graspable]
         ranked += list(enumerate(takes[:2]))
@@ -111,8 +112,8 @@ def handles(found: Mapping[str, Solid], suction: bool) -> list[Solid]:
 
 
 def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
-    """Which of a solid's level axes an open jaw can close along, the one with the most room for the fingers first."""
-    rooms = {}
+    """Numbers of a solid's level axes along which an open jaw can close, the most clearance for the fingers first."""
+    clearances = {}
     for which, (along, half) in enumerate(solid.level_axes(world)):
         if 2 * half < OPEN_GAP:
             jaw = corners(solid.centre(world), math.atan2(along[1], along[0]), (SPAN, 2 * FINGER_ACROSS))
@@ -120,21 +121,21 @@ def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
             near = [
                 gap(jaw, other.outline(world)) for other in others if other.top(world) > solid.top(world) - PALM_ABOVE
             ]
-            rooms[which] = min(near, default=1.0)
-    return sorted(rooms, key=lambda which: -rooms[which])
+            clearances[which] = min(near, default=1.0)
+    return sorted(clearances, key=lambda which: -clearances[which])
 
 
 def held(arm: Arm) -> str | None:
-    """The free body in the hand: between fingers that are closed but apart, or on a cup that is sealed."""
+    """The free body in the hand: between fingers that are closed but apart, or on a sealed suction cup."""
     world, fingers = arm.world, arm.finger_pos
-    if arm.grip < 0 or not (abs(float(fingers[0] - fingers[1])) > EMPTY if len(fingers) else arm.sealed):
+    if arm.grip < 0 or not (abs(float(fingers[0] - fingers[1])) > EMPTY_JAW_GAP if len(fingers) else arm.sealed):
         return None
     touched = [body for body in world.free_bodies if world.touching(arm.label, body)]
     return min(touched, key=lambda body: float(np.linalg.norm(world.com(body) - arm.hand)), default=None)
 
 
 def _bodies(world: World) -> list[int]:
-    """Every body of the scene that stands for itself: not of the robot, not the floor, no part of a free body."""
+    """Numbers of the scene's bodies, without those of the robot, the floor, and the parts of free bodies."""
     model = world.model
     scene = [b for b in range(1, model.nbody) if b not in world.own]
     free = {world.body(name) for name in world.free_bodies}
@@ -149,7 +150,7 @@ def _ancestors(world: World, body: int) -> list[int]:
 
 
 def _subtree(world: World, body: int, whole: bool) -> list[int]:
-    """Geoms of a body, with `whole` those of everything that hangs on it too."""
+    """Geoms of a body; with `whole`, also those of all bodies that hang on it."""
     of = {b for b in range(body, world.model.nbody) if b == body or (whole and body in _ancestors(world, b))}
     return [g for g in range(world.model.ngeom) if int(world.model.geom_bodyid[g]) in of]
 

@@ -1,20 +1,23 @@
-"""Tier of perturbed witnesses: a phase dropped, repeated, mirrored, slowed or quickened; another scenario's witness."""
+"""Tiers of witnesses: one with a phase dropped, repeated, mirrored, slowed or accelerated; one of another scenario."""
 
 from collections.abc import Iterator
 
 from .macros import Macro
 from .player import Attempt, Player
 
-WITNESS, FOREIGN = "witness", "foreign"
+WITNESS = "witness"
+"""Tier of variations of the scenario's own witness."""
+FOREIGN = "foreign"
+"""Tier of witnesses of other scenarios."""
 
 PACES = (0.4, 2.5)
-"""Slowed and quickened: times the speed of the witness."""
-NOWHERE = (0.0, 0.0, 0.0)
-"""No displacement."""
+"""Paces of a slowed and an accelerated phase [times the speed of the witness]."""
+NO_SHIFT = (0.0, 0.0, 0.0)
+"""No displacement [m]."""
 
 
 def perturbed(player: Player) -> Iterator[Attempt]:
-    """Every phase of the witness changed in one way, from the state at which it begins; the last phases first."""
+    """Every phase of the witness changed in one way, from the state at which it begins, the last phases first."""
     count = player.phases
     for k in reversed(range(count)):
         yield Attempt(WITNESS, rest(player, k + 1), k)
@@ -29,21 +32,27 @@ def perturbed(player: Player) -> Iterator[Attempt]:
 
 
 def foreign(player: Player) -> Iterator[Attempt]:
-    """The witnesses of other scenarios, as they are: memory alone."""
+    """The unchanged witnesses of other scenarios: pure memory."""
     for name in player.foreign:
         yield Attempt(FOREIGN, (Macro("replay", name),))
 
 
 def phase(
-    player: Player, k: int, pace: float = 1.0, mirrored: bool = False, shift: tuple[float, ...] = NOWHERE
+    player: Player, k: int, pace: float = 1.0, mirrored: bool = False, shift: tuple[float, ...] = NO_SHIFT
 ) -> Macro:
-    """Phase `k` of the witness once more."""
+    """A macro that repeats phase `k` of the witness.
+
+    Args:
+        pace: speed [times the speed of the witness].
+        mirrored: whether left and right are exchanged.
+        shift: displacement of the whole phase [m].
+    """
     first, last = player.trace.phases[k]
     return Macro("follow", "", (float(first), float(last), pace, float(mirrored), *shift))
 
 
 def rest(player: Player, k: int) -> tuple[Macro, ...]:
-    """The phases of the witness from `k` on, as one."""
+    """The phases of the witness from `k` on, as one macro; none if the witness has fewer phases."""
     phases = player.trace.phases
     if k >= len(phases):
         return ()

@@ -214,7 +214,7 @@ WIDE: Mapping[str, Mapping[str, float]] = {
     "ball_cage_escape": {"STILL": 5.0, "GIVE": math.radians(60.0)},
     "seesaw_balance": {"LEVEL": math.radians(10.5), "STAYS": 0.40},
     "tool_retrieve": {"LIFTED": -0.001},
-    "packing": {"FLAT": math.radians(60.0), "DOWN": 0.03},
+    "packing": {"FLAT_TOLERANCE": math.radians(60.0), "FLOOR_TOLERANCE": 0.03},
 }
 
 

@@ -11,7 +11,7 @@ from scengen import load_task
 from scengen.attack import draws
 from scengen.attack.adversary import RANDOM, RETRY, Attack
 from scengen.attack.campaign import AttackSettings, attack, drawn, player_of
-from scengen.attack.evidence import Causal, Hit, TierRate, hit, rates
+from scengen.attack.evidence import CausalContacts, Hit, TierRate, hit, rates
 from scengen.attack.macros import Macro
 from scengen.attack.player import Attempt, Player
 from scengen.attack.priors import fit
@@ -52,7 +52,7 @@ def player(subject) -> Player:
 
 @pytest.fixture(scope="module")
 def causal(player):
-    return Causal(player)
+    return CausalContacts(player)
 
 
 PICK, AGAINST = Macro("pick", "tile_0", (0.6, 0.0, 1.0, 0.2)), Macro("push", "slab", (np.pi / 2, 0.8, 0.0, 0.08, 0.15))

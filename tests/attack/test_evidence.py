@@ -89,7 +89,7 @@ def test_a_false_hit_in_a_pool_is_noticed(attacked_pool, tmp_path, forged):
 def test_a_file_that_is_no_hit_is_one_clear_error(tmp_path, content, capsys):
     (tmp_path / "hit.npz").write_bytes(content)
     assert cli.run(["verify", f"hits={tmp_path / 'hit.npz'}"]) == 2
-    assert "is no hit of scengen attack" in capsys.readouterr().err
+    assert "is not a hit of scengen attack" in capsys.readouterr().err
 
 
 def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys, monkeypatch):

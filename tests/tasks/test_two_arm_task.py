@@ -13,7 +13,7 @@ from helpers import pictures_are_possible
 from pools import QUICKLY, rewritten
 
 from scengen import cli, compose, conformance, load_task
-from scengen.attack.evidence import Causal
+from scengen.attack.evidence import CausalContacts
 from scengen.attack.macros import Macro
 from scengen.attack.player import Attempt, Player
 from scengen.attack.retries import retries
@@ -208,7 +208,7 @@ def test_the_witness_is_taken_apart_for_both_arms_and_can_be_followed(player):
 
 
 def test_which_arm_touched_what_belongs_to_what_a_witness_needs(player):
-    assert {("right", "robot0"), ("left", "robot1")} <= Causal(player, varied=3).lacking(frozenset())
+    assert {("right", "robot0"), ("left", "robot1")} <= CausalContacts(player, varied=3).lacking(frozenset())
 
 
 def test_retries_are_made_by_both_arms(player):
