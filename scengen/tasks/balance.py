@@ -51,10 +51,6 @@ LIFT_HEIGHT = 0.10
 """Height to which the rod is lifted to be weighed [m]."""
 CARRY_HEIGHT = 0.015
 """Height over the ridge at which the rod is aligned [m]."""
-AIM_PACE = Pace(0.08, 0.0015)
-"""Pace over the ridge; its tolerance is a quarter of what the narrower ridge forgives."""
-LOWER_PACE = Pace(0.03, 0.001)
-"""Pace down to the ridge."""
 EXPECTED_MASS = 0.125
 """Mass that a guess assumes without having weighed the rod [kg]: the middle of training."""
 RIDGE = "stand/ridge"
@@ -140,8 +136,10 @@ class Balance(Scenario):
         arm, across = world.arm, about_z(yaw) @ self.normal
         wrist = closing_along(arm, np.cross(across, UP)) @ arm.hand_rot.T
         across = math.copysign(1.0, float(wrist @ world.rot("rod")[:, 1] @ across)) * across
-        # The last move ends where the rod touches the ridge; after the others it swings in the hand for 0.25 s.
-        for height, pace in ((CARRY_HEIGHT, STEADY), (CARRY_HEIGHT, AIM_PACE), (-0.03, LOWER_PACE)):
+        # The rod is aligned to 1.5 mm, a quarter of what the narrower ridge forgives. After a move above the ridge it
+        # swings in the hand for 0.25 s; the last move ends where it touches the ridge.
+        aim, lower = Pace(0.08, 0.0015), Pace(0.03, 0.001)
+        for height, pace in ((CARRY_HEIGHT, STEADY), (CARRY_HEIGHT, aim), (-0.03, lower)):
             rod = world.rot("rod")[:, 1]
             turn, spot = shortest(rod, across), world.pos("rod") + along * rod
             there = self.top + height * UP + turn @ (arm.hand - spot)

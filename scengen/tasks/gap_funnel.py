@@ -45,25 +45,10 @@ from ..robots.ik import shortfall
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
+from ..skills import motion
 from ..skills.jaw import carry, pick, release
-from ..skills.motion import (
-    CLOSED,
-    COARSE,
-    STEADY,
-    Condition,
-    Pace,
-    closing_along,
-    go_to,
-    hold,
-    retreat,
-    stay,
-    steer,
-    until,
-    wait,
-)
+from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait
 
-REST_SPEED = 0.02
-"""Speed below which the ball counts as at rest [m/s]: it stops within 3 mm."""
 MAX_RISE = 0.02
 """Height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall."""
 STANDOFF_DISTANCE = 0.03
@@ -125,7 +110,8 @@ class GapFunnel(Scenario):
     def success(self, world: World) -> bool:
         half, high = self.zone.size / 2, self.ball.radius + MAX_RISE
         within = inside(world, "ball", "zone", np.array([-half, -half, 0.0]), np.array([half, half, high]))
-        return within and still(world, "ball", REST_SPEED) and not world.touching(ROBOT, "ball")
+        # From 0.02 m/s a ball stops within 3 mm.
+        return within and still(world, "ball", 0.02) and not world.touching(ROBOT, "ball")
 
     def failure(self, world: World) -> str | None:
         if fallen(world, "ball"):
@@ -146,7 +132,7 @@ class GapFunnel(Scenario):
         """Grasp the ball across the gap's axis, draw it over the table to a spot, and release it."""
         arm = world.arm
         yield from pick(arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=0.0)
-        yield from carry(arm, "ball", [spot[0], spot[1], world.com("ball")[2]], pace=Pace(0.15, 0.002))
+        yield from carry(arm, "ball", [spot[0], spot[1], world.com("ball")[2]], pace=motion.Pace(0.15, 0.002))
         yield from hold(arm, 0.2)
         yield from release(arm, 0.3)
         yield from retreat(arm, APPROACH_HEIGHT)
@@ -165,7 +151,7 @@ class GapFunnel(Scenario):
         start = world.com("ball") - (self.ball.radius + FINGER_ACROSS + STANDOFF_DISTANCE) * along
         start[2] = TABLE_TOP + (TIP_BELOW + 0.010)  # at the height of the ball's middle the fingers are flat
         side = np.array([-along[1], along[0], 0.0])
-        rot = closing_along(arm, side)
+        rot = motion.closing_along(arm, side)
         yield from go_to(arm, start + APPROACH_HEIGHT * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot)
         precise = stay(arm, start, rot, lambda: math.dist(arm.hand, start) < 0.001)
@@ -206,7 +192,7 @@ class GapFunnel(Scenario):
         """Carry it over the wall, as far as the arm reaches, and release it there."""
         height = self.wall.height + APPROACH_HEIGHT
         yield from pick(world.arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=height)
-        yield from carry(world.arm, "ball", self.gap_at + 0.1 * self.normal + height * UP, pace=STEADY)
+        yield from carry(world.arm, "ball", self.gap_at + 0.1 * self.normal + height * UP, pace=motion.STEADY)
         yield from release(world.arm)
 
     def answer(self) -> Answer:

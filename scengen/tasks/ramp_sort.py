@@ -302,7 +302,7 @@ class RampSort(Scenario):
 
     @cached_property
     def middle(self) -> Vec3:
-        """The point on the table below the middle of the ramp [m]."""
+        """Point on the table below the middle of the ramp [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @cached_property

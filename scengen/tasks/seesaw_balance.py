@@ -308,5 +308,5 @@ class SeesawBalance(Scenario):
         return min(near, key=lambda at: abs(at - along))
 
     def on_deck(self, along: float, tilt: float) -> Vec3:
-        """The point of the deck's upper face at `along` [m] when it is tilted [rad], in the world [m]."""
+        """Point of the deck's upper face at `along` [m] when it is tilted [rad], in the world [m]."""
         return self.foot + about_z(math.radians(self.heading)) @ self.seesaw.on_deck(along, tilt)
