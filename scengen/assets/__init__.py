@@ -1,1 +1,1 @@
-"""Bodies that two tasks share or that the paper ships. Each file runs alone and shows itself."""
+"""Bodies that two tasks share or that the paper specifies. Run a file on its own to view its asset."""

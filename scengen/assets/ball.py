@@ -14,7 +14,7 @@ STEEL_DENSITY = 7850.0
 
 @dataclass(frozen=True, kw_only=True)
 class Ball(Prop):
-    """A solid ball, of steel unless told otherwise; the origin is its centre.
+    """A solid ball, of steel by default. The origin is its centre.
 
     The paper gives neither size nor mass. A ball of 36 mm leaves 22 mm of the open jaw on either side.
     """
@@ -23,8 +23,8 @@ class Ball(Prop):
     density: float = param(STEEL_DENSITY, "kg/m^3", 200.0, 12000.0)
     friction: float = param(0.4, "1", 0.05, 1.5)
     rolling: float | None = None
-    """Resistance to rolling, as a share of the load; None: as little as MuJoCo has by default. Tasks in which it counts
-    have a parameter of their own for it."""
+    """Rolling resistance, as a share of the load. Default: MuJoCo's, which is very small. Tasks in which it matters
+    have their own parameter for it."""
     rgba: Rgba = (0.62, 0.65, 0.70, 1.0)
 
     @property

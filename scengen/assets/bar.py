@@ -1,4 +1,4 @@
-"""Bars and posts."""
+"""Bars and posts with a square base."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from .box import Cube
 
 @dataclass(frozen=True, kw_only=True)
 class Bar(Cube):
-    """A cube, or a bar or post of the same width."""
+    """A cube, or a bar or post as wide as a cube."""
 
     long: float = param(1.0, "1", 1.0, 2.5)
     """Length along y, in widths."""

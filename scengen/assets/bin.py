@@ -1,4 +1,4 @@
-"""A shallow bin: a rectangular floor with four walls, lower than what is packed into it."""
+"""A shallow bin: a rectangular floor with four walls that are lower than the packed pieces."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from ..params import param
 from .prop import Prop, Rgba, show, solid
 
 PLASTIC_DENSITY = 1000.0
-"""Density [kg/m^3]; without effect while the bin is fixed."""
+"""Density of the bin [kg/m^3]; without effect while the bin is fixed."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bin(Prop):
-    """The space inside is `width` along x by `length` along y. The origin is the middle of the foot.
+    """A bin whose inside is `width` along x by `length` along y. The origin is the middle of its base.
 
     The paper gives no sizes (App. B, T33).
     """
@@ -28,12 +28,12 @@ class Bin(Prop):
 
     @property
     def area(self) -> float:
-        """Of the floor inside [m^2]."""
+        """Area of the floor inside [m^2]."""
         return self.width * self.length
 
     @property
     def outer(self) -> tuple[float, float]:
-        """Full length along x and y, walls included [m]."""
+        """Outer lengths along x and y, walls included [m]."""
         return self.width + 2 * self.wall, self.length + 2 * self.wall
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:

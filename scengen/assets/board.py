@@ -1,12 +1,12 @@
-"""Board: a rectangular plate, flat on the table, with a strip along one side that may be of a heavier stuff.
+"""Board: a rectangular plate, flat on the table, with a strip along one side that may be of a heavier material.
 
         y  ________________
-        ^ |################|  strip      x along the strip, y across it; the origin under the middle
+        ^ |################|  strip      x along the strip, y across it; the origin below the middle
         | |                |
         | |                |
         | |________________|
 
-It stays on a table's edge as long as its centre of mass does, whatever overhangs.
+At an edge of the table the board stays as long as its centre of mass is over the table.
 """
 
 from dataclasses import dataclass
@@ -21,25 +21,25 @@ from .prop import Prop, Rgba, show, solid
 STRIP_WIDTH = 0.020
 """Width of the strip [m]."""
 STRIP_COLOUR: Rgba = (0.30, 0.32, 0.36, 1.0)
-"""Colour of a strip that is heavier than the rest."""
+"""Colour of a strip that is heavier than the rest of the board."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Board(Prop):
-    """Two boxes side by side, the strip at the far side in y.
+    """Two boxes side by side; the strip is at +y.
 
     Thickness: paper, App. D.1 ("3 thicknesses: 2, 3, 5 mm"), which gives no other length and no mass. The mass is
-    that of plywood, 530 kg/m^3; both sides are longer than the jaw opens.
+    that of plywood, 530 kg/m^3. Both sides are longer than the opening of the jaw.
     """
 
     length: float = param(0.100, "m", 0.06, 0.20)
-    """Along the strip."""
+    """Length along the strip."""
     width: float = param(0.150, "m", 0.09, 0.25)
-    """Across it."""
+    """Width across the strip."""
     thickness: float = param(0.005, "m", 0.002, 0.020)
     mass: float = param(0.040, "kg", 0.005, 0.3)
     off_centre: float = param(0.0, "m", 0.0, 0.03)
-    """How far the centre of mass is from the middle, towards the strip; at 0 all is of one density."""
+    """Distance of the centre of mass from the middle, towards the strip. At 0 the density is uniform."""
     friction: float = param(0.35, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.86, 0.70, 0.45, 1.0)
 
@@ -50,12 +50,12 @@ class Board(Prop):
 
     @property
     def strip_mass(self) -> float:
-        """Of the strip [kg], such that the centre of mass is where it is said to be."""
+        """Mass of the strip that puts the centre of mass at `off_centre` [kg]."""
         return self.mass * (2 * self.off_centre + STRIP_WIDTH) / self.width
 
     @property
     def tipping_overhang(self) -> float:
-        """How far the strip's side may stand out over an edge that is parallel to it [m]: then it tips."""
+        """Overhang at which the board tips, if the strip's side overhangs a parallel edge [m]."""
         return self.width / 2 - self.off_centre
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:

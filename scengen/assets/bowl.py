@@ -1,4 +1,4 @@
-"""Bowls: a spherical shell on a flat foot, with a bead along the rim to be held by."""
+"""Bowls: a spherical shell on a flat foot, with a bead along the rim as a grip."""
 
 import math
 from dataclasses import dataclass
@@ -8,44 +8,45 @@ from .prop import Rgba, show
 from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
 SHELL_BANDS = 6
-"""Cones that stand for the shell. Tangents of the inner sphere, chords of the outer one: 0.25 mm of 3 mm get lost."""
+"""Number of cones that replace the shell. They are tangents of the inner sphere and chords of the outer one, which
+removes 0.25 mm of 3 mm."""
 BEAD_HEIGHT = 0.012
 """Height of the bead [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bowl(Turned):
-    """A bowl that stands on the middle of its foot, which is flush with the shell: no ring stands out to be gripped.
+    """A bowl with a foot that is flush with the shell, so that there is no ring to grip. The origin is below the foot.
 
-    Suction holds on to the flat of the foot alone, inside or outside: on a sphere of 77 mm a flat lip 27 mm wide stands
-    off by 1.2 mm at its edge.
+    Suction cups hold only the flat of the foot, inside or outside: on a sphere of 77 mm the edge of a flat lip 27 mm
+    wide is 1.2 mm away from the surface.
 
     Radius: paper, App. C ("2 sizes", no lengths): 0.065 and 0.080 m are a cereal and a soup bowl.
     """
 
     radius: float = param(0.075, "m", 0.060, 0.095)
-    """Outer one, at the rim."""
+    """Outer radius at the rim."""
     depth: float = param(0.055, "m", 0.035, 0.060)
     """Height of the rim above the ground."""
     foot: float = param(0.028, "m", 0.015, 0.045)
     """Radius of the flat underside."""
     wall: float = param(0.003, "m", 0.002, 0.004)
     bead: float = param(0.005, "m", 0.004, 0.008)
-    """Thickness of the rim, over its last 12 mm; it is thicker towards the inside."""
+    """Thickness of the rim over its uppermost 12 mm; the additional thickness is on the inside."""
     hole: float = param(0.0, "m", 0.0, 0.020)
-    """Radius of a round hole in the middle of the foot; 0: none."""
+    """Radius of a round hole in the middle of the foot; 0 for no hole."""
     mass: float = param(0.050, "kg", 0.01, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.36, 0.52, 0.62, 1.0)
 
     @property
     def height(self) -> float:
-        """Of the rim above the ground [m]."""
+        """Height of the rim above the ground [m]."""
         return self.depth
 
     @property
     def centre(self) -> float:
-        """Height of the centre of both spheres [m]: as far from the edge of the foot as from the rim."""
+        """Height of the centre of both spheres, which is equally far from the edge of the foot and from the rim [m]."""
         return ((self.radius**2 - self.foot**2) / (self.depth - FOOT_PROTRUSION) + self.depth + FOOT_PROTRUSION) / 2
 
     @property
@@ -55,13 +56,13 @@ class Bowl(Turned):
 
     @property
     def inner(self) -> float:
-        """Radius of the inner sphere [m]: no part of the shell lies within, other than floor and bead."""
+        """Radius of the inner sphere [m]. Only floor and bead reach into it, no other part of the shell."""
         return self.outer - self.wall
 
     @property
     def floor(self) -> float:
         """Height of the floor inside [m]."""
-        return self._corner(self.inner / math.cos(self._step / 2), self._first)[1]
+        return self._corner(self.inner / math.cos(self._band_angle / 2), self._foot_angle)[1]
 
     @property
     def stance(self) -> tuple[float, float]:
@@ -69,9 +70,9 @@ class Bowl(Turned):
 
     @property
     def sections(self) -> list[Section]:
-        angles = [self._first + i * self._step for i in range(SHELL_BANDS + 1)]
+        angles = [self._foot_angle + i * self._band_angle for i in range(SHELL_BANDS + 1)]
         outside = [self._corner(self.outer, a) for a in angles]
-        inside = [self._corner(self.inner / math.cos(self._step / 2), a) for a in angles]
+        inside = [self._corner(self.inner / math.cos(self._band_angle / 2), a) for a in angles]
         hole = min(self.hole, 0.8 * self.foot) if self.hole >= MIN_DETAIL else 0.0
         bottom = [(hole, FOOT_PROTRUSION), outside[0], inside[0], (hole, inside[0][1])]
         shell = [(outside[i], outside[i + 1], inside[i + 1], inside[i]) for i in range(SHELL_BANDS)]
@@ -81,17 +82,17 @@ class Bowl(Turned):
         return [Section("bottom", tuple(bottom)), *walls, Section("bead", tuple(bead), leaky=True)]
 
     @property
-    def _first(self) -> float:
-        """Angle at the spheres' centre between the axis and the edge of the foot [rad]."""
+    def _foot_angle(self) -> float:
+        """Angle at the centre of the spheres between the axis and the edge of the foot [rad]."""
         return math.atan2(self.foot, self.centre - FOOT_PROTRUSION)
 
     @property
-    def _step(self) -> float:
-        """Angle of one band [rad]: from the edge of the foot to the lower end of the bead they share the shell."""
-        return (math.acos((self.centre - self.depth + BEAD_HEIGHT) / self.outer) - self._first) / SHELL_BANDS
+    def _band_angle(self) -> float:
+        """Angle of one band [rad]: the bands divide the shell between the edge of the foot and the bead."""
+        return (math.acos((self.centre - self.depth + BEAD_HEIGHT) / self.outer) - self._foot_angle) / SHELL_BANDS
 
     def _corner(self, distance: float, angle: float) -> tuple[float, float]:
-        """The point at that distance from the spheres' centre, at that angle from straight down."""
+        """Radius and height of the point at a distance [m] from the spheres' centre, at an angle from straight down."""
         return distance * math.sin(angle), self.centre - distance * math.cos(angle)
 
 

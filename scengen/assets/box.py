@@ -1,4 +1,4 @@
-"""Boxes that stand on the middle of their foot: dominoes, blocks with an unknown filling, cubes, lids."""
+"""Boxes, whose origin is the middle of the base: dominoes, blocks with an unknown filling, cubes, lids."""
 
 import abc
 import math
@@ -12,11 +12,11 @@ from ..params import param
 from .prop import Prop, Rgba, show, shown, solid
 
 DARK_COLOUR = (0.16, 0.10, 0.10, 1.0)
-"""Paint on the loaded side of a cube."""
+"""Colour of the loaded side of a cube."""
 
 
 class Box(Prop):
-    """What all boxes share. Subclasses are dataclasses that name their edges as their tasks do."""
+    """Base class of boxes. Subclasses are dataclasses that name the edges as their tasks do."""
 
     mass: float
     friction: float
@@ -34,7 +34,7 @@ class Box(Prop):
 
 @dataclass(frozen=True, kw_only=True)
 class Domino(Box):
-    """One tile, which stands on its smallest face. x is the thin axis, the way it falls.
+    """One tile, which stands on its smallest face. It falls along x, the thin axis.
 
     Mass range: paper, App. D.1 ("tile mass 0.02-0.08 kg"); the paper gives no lengths.
     """
@@ -58,17 +58,17 @@ class Domino(Box):
 
 @dataclass(frozen=True, kw_only=True)
 class Block(Box):
-    """A painted box with a square foot and an unknown filling: from outside all are alike, whatever they weigh.
+    """A painted box with a square base and an unknown filling: blocks of different masses look alike.
 
-    The paper gives no lengths. The width leaves the 80 mm jaw 20 mm of air on either side; the density that follows
-    from the nominal mass, 3100 kg/m^3, lies between glass and a steel-filled shell.
+    The paper gives no lengths. The width leaves 20 mm of the 80 mm jaw on either side. The nominal mass gives a density
+    of 3100 kg/m^3, between glass and a steel-filled shell.
     """
 
     width: float = param(0.040, "m", 0.02, 0.07)
     height: float = param(0.050, "m", 0.02, 0.12)
     mass: float = param(0.25, "kg", 0.02, 1.0, hidden=True)
     friction: float = param(0.8, "1", 0.05, 1.5)
-    """Rubber on painted wood: 0.7 to 0.9."""
+    """Sliding friction: rubber on painted wood has 0.7 to 0.9."""
     rgba: Rgba = (0.20, 0.36, 0.66, 1.0)
 
     @property
@@ -78,10 +78,10 @@ class Block(Box):
 
 @dataclass(frozen=True, kw_only=True)
 class Cube(Box):
-    """A solid cube to be fetched.
+    """A solid cube, to be picked up.
 
-    The paper gives no numbers. The edge leaves the 80 mm jaw 15 mm of air on either side; the mass is that of soft
-    plastic foam to hardwood at this size (125 cm^3: 0.06 kg for pine, 0.09 kg for beech, 0.14 kg for nylon).
+    The paper gives no numbers. The edge leaves 15 mm of the 80 mm jaw on either side. The mass is that of soft plastic
+    foam to hardwood at this size (125 cm^3: 0.06 kg for pine, 0.09 kg for beech, 0.14 kg for nylon).
     """
 
     edge: float = param(0.050, "m", 0.02, 0.07)
@@ -95,22 +95,22 @@ class Cube(Box):
 
 
 LEAD_DENSITY = 11340.0
-"""Density [kg/m^3]."""
+"""Density of lead [kg/m^3]."""
 SLUG_SHARE = 0.9
-"""Share of a loaded cube's mass that is in its slug; the rest is foam, 35 kg/m^3 at 52 mm and 0.05 kg."""
+"""Share of a loaded cube's mass that is in its slug. The rest is foam, 35 kg/m^3 at 52 mm and 0.05 kg."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedCube(Box):
-    """A cube of foam with a slug of lead behind its dark side, which is that along x.
+    """A cube of foam with a slug of lead behind its dark side, at +x.
 
-    A heavier one holds a larger slug, which cannot come as close to the side.
+    A heavier cube has a larger slug, whose centre cannot come as close to the side.
     """
 
     edge: float = param(0.040, "m", 0.02, 0.07)
     mass: float = param(0.04, "kg", 0.01, 0.5, hidden=True)
     lean: float = param(0.0, "1", 0.0, 0.35, hidden=True)
-    """How far the centre of mass is from the middle, as a share of the edge; at 0 no side is dark."""
+    """Distance of the centre of mass from the middle, as a share of the edge. At 0 no side is dark."""
     friction: float = param(0.45, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
 
@@ -120,17 +120,17 @@ class LoadedCube(Box):
 
     @property
     def com(self) -> float:
-        """How far from the middle the centre of mass is, along x [m]."""
+        """Distance of the centre of mass from the middle, along x [m]."""
         return self.lean * self.edge
 
     @property
     def slug(self) -> float:
-        """Edge of the slug, a cube [m]."""
+        """Edge of the slug, which is a cube [m]."""
         return (SLUG_SHARE * self.mass / LEAD_DENSITY) ** (1 / 3)
 
     @property
     def steepest(self) -> float:
-        """The lean at which the slug touches the side from within."""
+        """Largest possible `lean`: the slug touches the side from inside."""
         return SLUG_SHARE * (self.edge - self.slug) / (2 * self.edge)
 
     @property
@@ -142,7 +142,7 @@ class LoadedCube(Box):
         return np.array([own, across, across])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        """One box to touch, a dark side to see; how its mass is spread is told to the body and not by its parts."""
+        """Add one box for contacts and a dark side for pictures. The body, not its geoms, defines mass and inertia."""
         super().fill(body, spec)
         if not self.lean:
             return
@@ -155,9 +155,9 @@ class LoadedCube(Box):
 
 @dataclass(frozen=True, kw_only=True)
 class Lid(Box):
-    """A flat square lid without knob, twice as wide as the jaw opens, that lies on whatever it covers.
+    """A flat square lid without a knob, twice as wide as the opening of the jaw. It lies on what it covers.
 
-    The paper gives no numbers and calls it lightweight (App. B, T26): this one is as dense as balsa wood, 260 kg/m^3.
+    The paper gives no numbers and calls it lightweight (App. B, T26). The density is that of balsa wood, 260 kg/m^3.
     """
 
     width: float = param(0.160, "m", 0.08, 0.30)

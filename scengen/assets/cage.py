@@ -6,10 +6,10 @@
       |   |___|____   _|      as wide as the cage
       |___|
 
-Collision geometry is an exact convex decomposition: plates are boxes, and the part of the holed plate around the hole
-is cut by rays from the hole's centre into wedges whose inner faces touch the circle from outside. So the hole is a
-regular polygon that contains the nominal circle, and the cavity is the nominal cuboid: no ball sticks where it should
-pass, and none passes that is wider than the hole.
+Collision geometry is an exact convex decomposition. Plates are boxes. Rays from the hole's centre cut the part of the
+holed plate around the hole into wedges, whose inner faces touch the circle from outside. So the hole is a regular
+polygon that contains the nominal circle, and the cavity is the nominal cuboid: a ball narrower than the hole does not
+stick, and a wider one does not pass.
 """
 
 import math
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 WEDGES = 20
-"""Sides of the polygon. Its corners lie radius * (1 / cos(pi / 20) - 1) outside the circle: 1.2 % of the radius,
-0.37 mm for the largest hole that the bounds allow."""
+"""Number of sides of the polygon. Its corners lie radius * (1 / cos(pi / 20) - 1) outside the circle: 1.2 % of the
+radius, 0.37 mm for the largest hole within the bounds."""
 SEGMENTS = 64
-"""Sides of the circle in the picture; 0.02 mm from the true one at the nominal radius."""
+"""Number of sides of the circle in pictures, which is within 0.02 mm of the true one at the nominal radius."""
 
 MIN_SIZE = 1e-6
-"""Sills lower and strips of plate narrower than this are left out [m]: MuJoCo refuses boxes without extent."""
+"""Size below which sills and strips of plate are left out [m]: MuJoCo refuses boxes without extent."""
 
 TRAP_COLOUR: Rgba = (0.30, 0.12, 0.45, 0.45)
-"""Colour of the trap: violet, which nothing else is."""
+"""Colour of the trap: violet, which no other thing has."""
 
 BOTTOM, END, SIDE, TOP = range(4)
-"""Values of `face`. The other end and the other side are these in a cage that is turned round."""
+"""Values of `face`. For the other end or side, turn the cage round."""
 FACES = {BOTTOM: (2, -1, 0), END: (0, 1, 1), SIDE: (1, 1, 0), TOP: (2, 1, 0)}
-"""For each face: the axis it looks along, which way, and the axis along which `offset` is measured."""
+"""Axis and sign of the outward normal of each face, and the axis of `offset`."""
 
 MESH = mujoco.mjtGeom.mjGEOM_MESH
 Box = tuple[Vec3, Vec3]
@@ -51,7 +51,7 @@ Box = tuple[Vec3, Vec3]
 
 @dataclass(frozen=True, kw_only=True)
 class HoledCage(Prop):
-    """A closed box with one round hole. x is the long axis; the origin is the centre of its foot.
+    """A closed box with one round hole. x is the long axis; the origin is the centre of the base.
 
     The paper gives no lengths (App. C: "one circular hole on a configurable face"). Ours fit the task's hand: the
     width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of the box without its trap in 3 mm acrylic
@@ -66,28 +66,28 @@ class HoledCage(Prop):
     hole: float = param(0.0175, "m", 0.005, 0.03)
     """Radius of the hole."""
     offset: float = param(0.043, "m", -0.08, 0.08)
-    """Where the hole's centre lies, from the middle of its face, along x (on an end: along y)."""
+    """Position of the hole's centre, from the middle of its face, along x (on an end: along y)."""
     sill: float = param(0.0041, "m", 0.0, 0.015)
-    """Height of the bar across the floor; it is as thick as the walls. At 0 there is none."""
+    """Height of the sill across the floor, which is as thick as the walls. At 0 there is none."""
     sill_x: float = param(-0.004, "m", -0.08, 0.08)
-    """Where the sill stands, from the middle of the floor."""
+    """Position of the sill along x, from the middle of the floor."""
     trap: float = param(0.016, "m", 0.002, 0.03)
-    """How far the floor steps down at the end at -x."""
+    """Depth of the trap below the floor, at the end at -x."""
     trap_x: float = param(-0.0285, "m", -0.08, 0.08)
-    """Where the wall of that step stands, from the middle of the floor; it is as thick as the others."""
+    """Position of the trap's inner wall along x, from the middle of the floor. It is as thick as the other walls."""
     trap_sill: float = param(0.0012, "m", 0.0, 0.015)
-    """Height of the bar on that wall, above the floor."""
+    """Height above the floor of the sill on that wall."""
     mass: float = param(0.100, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     closed: bool = False
-    """Whether the hole is stopped up: the same cage without its way out."""
+    """Whether the hole is closed: the same cage without an exit."""
     rgba: Rgba = (0.35, 0.62, 0.85, 0.25)
 
     # --- geometry, in the cage's own axes -------------------------------------------------
 
     @property
     def size(self) -> Vec3:
-        """Outer edges [m]."""
+        """Outer edges along x, y and z, without the trap [m]."""
         return np.array([self.length, self.width, self.height])
 
     @property
@@ -97,7 +97,7 @@ class HoledCage(Prop):
 
     @property
     def cavity(self) -> Vec3:
-        """Inner edges [m]."""
+        """Inner edges along x, y and z, without the trap [m]."""
         return self.size - 2 * self.wall
 
     @property
@@ -114,7 +114,7 @@ class HoledCage(Prop):
 
     @property
     def margin(self) -> float:
-        """Least distance from the rim of the hole to what stands on its face [m]; negative: it does not fit."""
+        """Smallest distance from the rim of the hole to walls and sills on its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]
         free = [self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2]
         if self.face == BOTTOM:
@@ -131,15 +131,15 @@ class HoledCage(Prop):
         return _tilt_over(self.sill, radius)
 
     def tilt_into_trap(self, radius: float) -> float:
-        """The same for the trap's sill, the other way [rad]."""
+        """Tilt, the other way, at which a ball that lies against the trap's sill rolls into the trap [rad]."""
         return _tilt_over(self.trap_sill, radius)
 
     def tilt_out_of_trap(self, radius: float) -> float:
-        """Tilt at which a ball rolls out of the trap again [rad]."""
+        """Tilt at which a ball rolls out of the trap [rad]."""
         return _tilt_over(self.trap + self.trap_sill, radius)
 
     def least_tilt(self, radius: float) -> float:
-        """Tilt that lets a ball roll over the sill and, where the hole is in an upright wall, over its rim [rad]."""
+        """Smallest tilt at which a ball rolls over the sill and over the rim of a hole in an upright wall [rad]."""
         over_sill = self.tilt_over_sill(radius)
         if self.face in (BOTTOM, TOP):
             return over_sill
@@ -147,7 +147,7 @@ class HoledCage(Prop):
         return max(over_sill, math.acos(max(-1.0, 1 - rim / radius)))
 
     def pocket(self, radius: float) -> tuple[float, float]:
-        """Where the centre of a ball between the sills may lie: least and largest x [m]."""
+        """Smallest and largest x of the centre of a ball between the sills [m]."""
         return self.trap_x + self.beside(self.trap_sill, radius), self.sill_x - self.beside(self.sill, radius)
 
     def traps(self, place: Vec3, radius: float) -> bool:
@@ -157,15 +157,15 @@ class HoledCage(Prop):
         return inside and -self.trap < place[2] < self.wall + radius / 2
 
     def on_sill(self, place: Vec3, radius: float) -> bool:
-        """Whether a ball in the cage is above the sill: nearer to it than half of where it lies against it.
+        """Whether a ball in the cage is above the sill: nearer to it than half its distance when it touches the sill.
 
-        It stays there for 10 ms at least where it is slower than 1 m/s.
+        A ball slower than 1 m/s stays there for at least 10 ms.
         """
         within = bool(np.all(np.abs(place - self.middle) < self.size / 2))
         return within and abs(place[0] - self.sill_x) < self.beside(self.sill, radius) / 2
 
     def beside(self, sill: float, radius: float) -> float:
-        """How far from the middle of a bar a ball lies that touches floor and bar [m]."""
+        """Distance along x from the middle of a sill to a ball that touches floor and sill [m]."""
         height = min(sill, radius)
         return self.wall / 2 + math.sqrt(2 * radius * height - height**2)
 
@@ -174,10 +174,10 @@ class HoledCage(Prop):
     def inertial(self) -> tuple[Vec3, Mat3]:
         """Centre of mass [m] and inertia about it [kg m^2].
 
-        The body is cuboid - cavity - hole + sills, cuboid and cavity with those of the trap, all of one density:
-        inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass;
-        own = volume / 12 * (|e|^2 - e e^T, diagonal only) for a cuboid with edges e, and for the hole, a disc of radius
-        R and thickness w, volume * R^2 / 2 about its axis and volume * (3 R^2 + w^2) / 12 across it.
+        The body is cuboid - cavity - hole + sills at uniform density; cuboid and cavity include those of the trap.
+        inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass.
+        For a cuboid with edges e, own = volume / 12 * (|e|^2 - e e^T, diagonal only). For the hole, a disc of radius R
+        and thickness w, own is volume * R^2 / 2 about its axis and volume * (3 R^2 + w^2) / 12 across it.
         """
         pit, hollow = self._trap()
         parts = [_cuboid(*box, 1.0) for box in [(self.middle, self.size), pit, *self._sills()]]
@@ -198,7 +198,7 @@ class HoledCage(Prop):
     # --- collision geometry ---------------------------------------------------------------
 
     def boxes(self) -> list[Box]:
-        """Cuboids whose union, with the wedges, is the cage. Plates overlap at the edges of the cage."""
+        """Cuboids that form the cage together with the wedges. Plates overlap at the edges of the cage."""
         plates = []
         for axis in range(3):
             for sign in (-1, 1):
@@ -233,41 +233,41 @@ class HoledCage(Prop):
         ]
 
     def _trap(self) -> tuple[Box, Box]:
-        """What the trap adds under the foot of the cage, and what is hollow in it, up to the floor."""
+        """Outer cuboid of the trap below the cage, and its cavity, up to the floor."""
         w, end, stop = self.wall, -self.length / 2, self.trap_x + self.wall / 2
         out, within = self.size[1] / 2, self.cavity[1] / 2
         hollow = _box([end + w, -within, w - self.trap], [stop - w, within, w])
         return _box([end, -out, -self.trap], [stop, out, 0.0]), hollow
 
     def _trap_plates(self) -> list[Box]:
-        """Floor, ends and sides of the trap, up to the upper side of the floor."""
+        """Plates of the trap: floor, ends and sides, up to the upper side of the cage's floor."""
         w, end, stop, out = self.wall, -self.length / 2, self.trap_x + self.wall / 2, self.size[1] / 2
         plates = [_box([end, -out, -self.trap], [stop, out, w - self.trap])]
         plates += [_box([x, -out, -self.trap], [x + w, out, w]) for x in (end, stop - w)]
         return plates + [_box([end, y, -self.trap], [stop, y + w, w]) for y in (-out, out - w)]
 
     def _plate_from(self, axis: int, sign: int) -> float:
-        """Where a plate begins along x [m]: the floor at the wall of the trap, others at the end of the cage."""
+        """Lower end of a plate along x [m]: the floor begins at the wall of the trap, others at the end of the cage."""
         return self.trap_x - self.wall / 2 if (axis, sign) == FACES[BOTTOM][:2] else -self.length / 2
 
     def _patch(self) -> tuple[float, float, float]:
-        """The rectangle that is cut into wedges, seen from the hole: its two ends and its half width [m]."""
+        """Both ends and half width of the rectangle that is cut into wedges, from the hole's centre [m]."""
         axis, _, along = FACES[self.face]
-        (first, last), reach = self._ends(), self.hole / math.cos(math.pi / WEDGES) + self.wall
+        (first, last), reach = self._holed_plate(), self.hole / math.cos(math.pi / WEDGES) + self.wall
         ends = max(first - self.offset, -reach), min(last - self.offset, reach)
         return *ends, self.size[3 - axis - along] / 2
 
-    def _ends(self) -> tuple[float, float]:
-        """From where to where the holed plate reaches, along the axis of `offset` [m]."""
+    def _holed_plate(self) -> tuple[float, float]:
+        """Both ends of the holed plate along the axis of `offset` [m]."""
         axis, sign, along = FACES[self.face]
         half = self.size[along] / 2
         return (self._plate_from(axis, sign) if along == 0 else -half), half
 
     def _beside_patch(self) -> list[Box]:
-        """What is left of the holed plate at both ends of the patch."""
+        """Parts of the holed plate beside the patch."""
         axis, _, along = FACES[self.face]
         start, stop, _ = self._patch()
-        (first, last), boxes = self._ends(), []
+        (first, last), boxes = self._holed_plate(), []
         for low, high in ((first - self.offset, start), (stop, last - self.offset)):
             if high - low > MIN_SIZE:
                 centre, size = self.hole_centre.copy(), self.size.copy()
@@ -286,7 +286,7 @@ class HoledCage(Prop):
             mid = np.array([math.cos(middle), math.sin(middle)])
             rays = [np.array([math.cos(middle + s), math.sin(middle + s)]) for s in (-step / 2, step / 2)]
             inner = [self.hole / math.cos(step / 2) * ray for ray in rays]
-            outer = [_leaving(ray, start, stop, half) * ray for ray in rays]
+            outer = [_exit_distance(ray, start, stop, half) * ray for ray in rays]
             outer += [c for c in corners if c @ mid > math.cos(step / 2) * math.hypot(*c)]
             polygons.append(np.array(inner + outer))
         return polygons
@@ -294,7 +294,7 @@ class HoledCage(Prop):
     # --- body -----------------------------------------------------------------------------
 
     def manifold(self) -> "Manifold":
-        """The true body by constructive solid geometry: what is shown, and what the decomposition is tested against."""
+        """The exact body by constructive solid geometry, for pictures and as the reference for the decomposition."""
         from manifold3d import Manifold
 
         def block(centre: Vec3, size: Vec3) -> Manifold:
@@ -303,13 +303,13 @@ class HoledCage(Prop):
         (pit, size), hollow = self._trap()
         body = block(self.middle, self.size) + block(pit + self.wall / 4 * UP, size + self.wall / 2 * UP)
         body = body - block(self.middle, self.cavity) - block(*hollow)
-        for centre, size in self._sills():  # let into floor and walls by half a wall, so that the parts are one
+        for centre, size in self._sills():  # extended into floor and walls by half a wall, to be one part with them
             body += block(centre - self.wall / 4 * UP, size + self.wall * np.array([0, 1, 0.5]))
         if self.closed:
             return body
         bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
         turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[self.face]
-        outwards = self.hole_centre + self.wall / 2 * self.normal  # the bore begins at the cavity, and spares the sill
+        outwards = self.hole_centre + self.wall / 2 * self.normal  # the bore begins at the cavity, not at the sill
         return body - bore.rotate(turn).translate(outwards.tolist())
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -317,10 +317,10 @@ class HoledCage(Prop):
         body.explicitinertial, body.mass, body.ipos = True, self.mass, com
         body.fullinertia = np.array([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
         for i, (centre, size) in enumerate(self.boxes()):
-            self._touchable(body, f"box_{i}", BOX, size / 2, centre)
+            self._add_collider(body, f"box_{i}", BOX, size / 2, centre)
         for i, corners in enumerate(self.wedges()):
             spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
-            self._touchable(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
+            self._add_collider(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
         above, below = self.manifold().split_by_plane(UP.tolist(), 0.0)
         for name, part, rgba in (("look", above, self.rgba), ("trap", below, TRAP_COLOUR)):
             look = part.to_mesh()
@@ -331,28 +331,28 @@ class HoledCage(Prop):
             )
             shown(body, name, rgba, type=MESH).meshname = name
 
-    def _touchable(
+    def _add_collider(
         self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom, size: ArrayLike = (), pos: ArrayLike = (0, 0, 0)
     ) -> mujoco.MjsGeom:
-        """A geom of the decomposition; group 3 is not drawn, the picture is the mesh's."""
+        """Add a geom of the decomposition. Group 3 is not drawn; pictures show the mesh."""
         return solid(body, name, size, pos, type=type, friction=self.friction, mass=0.0, group=3)
 
 
 def lowered(tilt: float) -> Vec3:
-    """Where down is, in the axes of a cage whose end at +x is lowered by `tilt` [rad]."""
+    """Unit vector down, in the axes of a cage whose end at +x is lowered by `tilt` [rad]."""
     return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
 
 
 def lean(rot: Mat3) -> float:
-    """How far the end at +x of a cage is lowered [rad], as a ball feels it that is free to roll along the cage."""
+    """Angle by which the end at +x of a cage is lowered, for a ball that is free to roll along the cage [rad]."""
     return math.atan2(-rot[2, 0], rot[2, 2])
 
 
 def _tilt_over(height: float, radius: float) -> float:
-    """Tilt of the floor at which a ball that lies against a bar or a step rolls over it [rad].
+    """Tilt of the floor at which a ball that lies against a sill or a step rolls over it [rad].
 
-    The ball turns about the bar's edge, and does so once the vertical through its centre passes that edge:
-    cos(tilt) = 1 - height / radius. Where the bar is as high as the centre no tilt below a right angle will do.
+    The ball turns about the edge of the sill, once the vertical through its centre passes that edge:
+    cos(tilt) = 1 - height / radius. If the sill is as high as the centre, the tilt is a right angle.
     """
     return math.acos(max(0.0, 1 - height / radius))
 
@@ -369,8 +369,8 @@ def _cuboid(centre: Vec3, size: Vec3, sign: float) -> tuple[float, Vec3, Mat3]:
     return sign * float(np.prod(size)), centre, np.diag(own)
 
 
-def _leaving(ray: NDArray[np.float64], start: float, stop: float, half: float) -> float:
-    """Distance [m] at which a ray from the hole's centre leaves the patch."""
+def _exit_distance(ray: NDArray[np.float64], start: float, stop: float, half: float) -> float:
+    """Distance from the hole's centre at which a ray leaves the patch [m]."""
     ends = [(stop if ray[0] > 0 else start) / ray[0]] if ray[0] else []
     return min([*ends, *([half / abs(ray[1])] if ray[1] else [])])
 

@@ -1,4 +1,4 @@
-"""A bin with a handle: so deep that what falls in stays in, so light that a jaw draws it over the table."""
+"""A bin with a handle: deep, so that balls that fall in stay in; light, so that a jaw can pull it over the table."""
 
 from dataclasses import dataclass
 
@@ -10,44 +10,44 @@ from ..params import param
 from .prop import Prop, Rgba, show, solid
 
 GRASP_DEPTH = 0.010
-"""How far below the top of the handle it is taken hold of [m]: the palm, 31 mm above that, stays over the rim."""
-
-
-PLASTIC_DENSITY, HANDLE_DENSITY = 1000.0, 500.0
-"""Density of the bin, and of the handle [kg/m^3]."""
+"""Depth of the grasp below the top of the handle [m]. The palm, 31 mm above the grasp, stays above the rim."""
+PLASTIC_DENSITY = 1000.0
+"""Density of the bin [kg/m^3]."""
+HANDLE_DENSITY = 500.0
+"""Density of the handle, which is hollow [kg/m^3]."""
 HANDLE_HEIGHT = 0.03
-"""From the ground to the handle [m]."""
+"""Height of the lower side of the handle above the ground [m]."""
 HANDLE_FRICTION = 1.0
-"""Friction of the handle."""
+"""Sliding friction of the handle, which is covered with rubber."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatchBin(Prop):
-    """The handle stands out at the side of -x. The origin is the middle of the bin's foot.
+    """A bin whose handle protrudes at -x. The origin is the middle of the bin's base.
 
-    The paper gives no sizes (App. B, T15). The handle is as narrow as a jaw needs to hold it by 20 N, and as long as
-    keeps the palm, which reaches 32 mm across, out of what falls into the bin.
+    The paper gives no sizes (App. B, T15). The handle is so narrow that a jaw holds it with 20 N, and so long that the
+    palm, which reaches 32 mm across, is not in the way of things that fall into the bin.
     """
 
     width: float = param(0.100, "m", 0.04, 0.20)
-    """Inside, along x."""
+    """Inner length along x."""
     length: float = param(0.060, "m", 0.03, 0.20)
-    """Inside, along y."""
+    """Inner length along y."""
     depth: float = param(0.082, "m", 0.02, 0.15)
     wall: float = param(0.005, "m", 0.002, 0.02)
     floor: float = param(0.004, "m", 0.002, 0.02)
     friction: float = param(0.25, "1", 0.05, 1.0)
     reach: float = param(0.050, "m", 0.03, 0.10)
-    """How far the handle stands out."""
+    """Length by which the handle protrudes."""
     grip: float = param(0.020, "m", 0.005, 0.06)
-    """Its width, which the jaw takes."""
+    """Width of the handle, which the jaw grips."""
     rgba: Rgba = (0.85, 0.55, 0.15, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half_x, half_y, deep = self.width / 2, self.length / 2, self.depth / 2
         outer_x, outer_y, thick = half_x + self.wall, half_y + self.wall, self.wall / 2
         middle = self.floor + deep
-        parts = {  # it stands on its floor alone: walls down to the ground would touch it beside that
+        parts = {  # it stands on its floor only: walls that reach the ground would add contacts
             "floor": ((outer_x, outer_y, self.floor / 2), (0.0, 0.0, self.floor / 2)),
             "left": ((outer_x, thick, deep), (0.0, half_y + thick, middle)),
             "right": ((outer_x, thick, deep), (0.0, -half_y - thick, middle)),
@@ -62,7 +62,7 @@ class CatchBin(Prop):
 
     @property
     def outer(self) -> tuple[float, float]:
-        """Full length of the bin along x and y, walls included, the handle not [m]."""
+        """Outer lengths of the bin along x and y, walls included, without the handle [m]."""
         return self.width + 2 * self.wall, self.length + 2 * self.wall
 
     @property
@@ -72,7 +72,7 @@ class CatchBin(Prop):
 
     @property
     def handle(self) -> Vec3:
-        """Where the handle is taken hold of, in the bin's axes [m]."""
+        """Grasp point on the handle, in the bin's axes [m]."""
         return np.array([-self.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - GRASP_DEPTH) * UP
 
 

@@ -1,6 +1,6 @@
-"""Chains of dominoes that lead to a slab, and the defects that keep the slab standing: where each tile stands.
+"""Positions of the tiles in chains of dominoes that lead to a slab, and of the defects that keep the slab standing.
 
-x runs along the chain, from the middle of an intact one; y is to its left.
+x runs along the chain, from the middle of an intact chain; y is to its left.
 """
 
 import itertools
@@ -16,28 +16,28 @@ from ..params import check_bounds, param
 from .box import Domino
 
 GAP, DRIFT, DECOY, MISSING = range(4)
-"""Kinds of defect: a tile beside the chain, spaces that grow, a slab that does not count, a tile that is missing. The
-first three are the paper's (App. B, T18)."""
+"""Kinds of defect: a tile beside the chain, spaces that grow, a slab that does not count, a missing tile. The first
+three are the paper's (App. B, T18)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Defect:
-    """Why a chain does not reach the slab that counts. Of the values only those that belong to its kind matter."""
+    """A defect, because of which a chain does not reach the slab that counts. Each kind uses some of the fields."""
 
     kind: int = param(GAP, "0 gap, 1 drift, 2 decoy, 3 missing", GAP, MISSING)
     place: float = param(0.3, "share of the chain", 0.0, 1.0)
-    """Which tile is out of line or missing: 0 is the second tile, 1 the last."""
+    """Place of the tile that is beside the chain or missing: 0 is the second tile, 1 the last."""
     offset: float = param(1.3, "tile widths", 1.02, 2.5)
-    """How far that tile stands beside the chain."""
+    """Distance of that tile from the line of the chain."""
     side: int = param(1, "0 right, 1 left", 0, 1)
     stretch: float = param(1.25, "tile heights", 1.02, 2.0)
-    """The widest space of a drifting chain, the one before its slab."""
+    """Widest space of a drifting chain, the one before its slab."""
 
     def __post_init__(self) -> None:
         check_bounds(self)
 
     def broken(self, count: int) -> int:
-        """Index of the tile that is out of line or missing in a chain of `count`; never the first one."""
+        """Index of the tile that is beside the chain or missing, in a chain of `count` tiles; never the first tile."""
         return 1 + min(int(self.place * (count - 1)), count - 2)
 
 
@@ -46,27 +46,27 @@ class Chain:
     """Tiles in a row with a slab at their end."""
 
     count: int
-    """Tiles, without the slab."""
+    """Number of tiles, without the slab."""
     gap: float
     """Free space between neighbouring faces of an intact chain [m]."""
     starter: Domino
-    """The first tile."""
+    """First tile."""
     tile: Domino
-    """All others."""
+    """Every other tile."""
     slab: Domino
     defect: Defect | None = None
 
     @property
     def end(self) -> str:
-        """What its slab is: a `slab`, or a `decoy` that does not count."""
+        """Kind of its slab: `slab`, or `decoy` for one that does not count."""
         return "decoy" if self.defect and self.defect.kind == DECOY else "slab"
 
     @property
     def gaps(self) -> NDArray[np.float64]:
-        """Free spaces, the one before the slab included [m], shape (count,).
+        """Free spaces between the tiles and before the slab [m], shape (count,).
 
         In a drifting chain each space is larger than the one before by the same factor, and their sum is that of an
-        intact chain, so that first tiles and slabs stand in rows and only the spacing tells.
+        intact chain. So first tiles and slabs of all chains stand in rows, and only the spacing shows the defect.
         """
         if self.defect is None or self.defect.kind != DRIFT:
             return np.full(self.count, self.gap)
@@ -76,9 +76,9 @@ class Chain:
 
     @property
     def feet(self) -> dict[int, Vec3]:
-        """Where the tiles that are there stand, by their index, and as `feet[count]` the slab [m].
+        """Positions of the tiles by their index, and of the slab as `feet[count]` [m]. A missing tile has none.
 
-        The origin is the middle of a chain of equal tiles: a stouter starter grows away from the face that is pushed.
+        The origin is the middle of a chain of equal tiles. If the starter is thicker, its pushed face stays in place.
         """
         thick = np.array([self.starter.thickness, *[self.tile.thickness] * (self.count - 1), self.slab.thickness])
         faces = np.cumsum([-self.count * (self.gap + self.tile.thickness) / 2, *(self.gaps + thick[:-1])])
@@ -93,7 +93,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Lanes:
-    """Parallel chains side by side, the first on the right, whose first tiles stand in one row and slabs in another."""
+    """Parallel chains side by side, the first on the right. First tiles stand in one row, slabs in another."""
 
     chains: tuple[Chain, ...]
     spacing: float
@@ -101,7 +101,7 @@ class Lanes:
 
     @cached_property
     def feet(self) -> dict[str, Vec3]:
-        """Where everything stands, from the middle of the middle lane [m].
+        """Positions of all tiles and slabs, from the middle of the middle lane [m].
 
         `tile_3_0` is the first tile in lane 3, `slab_3` its slab, or `decoy_3`.
         """
@@ -113,11 +113,11 @@ class Lanes:
         return feet
 
     def defects(self, *kinds: int) -> list[Defect]:
-        """The defects of some kinds."""
+        """Defects of the given kinds."""
         return [chain.defect for chain in self.chains if chain.defect and chain.defect.kind in kinds]
 
     def piece(self, name: str) -> Domino:
-        """The tile or slab of that name."""
+        """The tile or slab with a name of `feet`."""
         chain = self.chains[int(name.split("_")[1])]
         if not name.startswith("tile"):
             return chain.slab
@@ -125,9 +125,9 @@ class Lanes:
 
     @property
     def room(self) -> float:
-        """Least free space across the chains between pieces of different ones [m]; negative where they overlap."""
+        """Smallest free space along y between pieces of different chains [m]; negative where they overlap."""
         pairs = [(a, b) for a, b in itertools.combinations(self.feet, 2) if a.split("_")[1] != b.split("_")[1]]
-        return min(abs(self.feet[a][1] - self.feet[b][1]) - self._widths(a, b) / 2 for a, b in pairs)
+        return min(abs(self.feet[a][1] - self.feet[b][1]) - self._sum_of_widths(a, b) / 2 for a, b in pairs)
 
-    def _widths(self, *names: str) -> float:
+    def _sum_of_widths(self, *names: str) -> float:
         return sum(self.piece(name).width for name in names)

@@ -11,27 +11,27 @@ from .box import Box
 from .prop import Rgba, show
 
 REAL_EDGES = (0.0717, 0.1636, 0.2138)
-"""Of the real box [m], measured on the scan of number 003 of the YCB set."""
+"""Edges of the real box [m], measured on the scan of number 003 of the YCB set."""
 REAL_MASS = 0.411
-"""Of the real box [kg]: object list of the YCB set."""
+"""Mass of the real box [kg]: object list of the YCB set."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CrackerBox(Box):
-    """A box that stands on its smallest face, the broad face towards x.
+    """A box that stands on its smallest face, with its broad face towards x.
 
     Paper, App. C: "4 size variants, low-friction surface", without numbers. Ours are 0.75, 0.85, 1.0 and 1.15 times the
-    real box; with varnish on varnish, friction is 0.15 to 0.25.
+    real box. The friction of varnish on varnish is 0.15 to 0.25.
     """
 
     scale: float = param(1.0, "1", 0.75, 1.15)
-    """Of all edges."""
+    """Scale of all edges."""
     friction: float = param(0.20, "1", 0.02, 0.60)
     rgba: Rgba = (0.75, 0.16, 0.14, 1.0)
 
     @property
     def mass(self) -> float:  # type: ignore[override]  # follows from the size, as the filling is always the same
-        """As much of the same filling as fits [kg]."""
+        """Mass of the box, full of the same filling [kg]."""
         return REAL_MASS * self.scale**3
 
     @property
@@ -40,11 +40,11 @@ class CrackerBox(Box):
 
 
 SLOT_DEPTH = 0.8
-"""Depth of the slot that a box lies in, by the thickness of the box."""
+"""Depth of the slot for a lying box, as a share of the thickness of the box."""
 
 
 def slot_for(box: CrackerBox, clearance: float) -> Bin:
-    """A slot in which a box lies on its broad face, long side along y, with `clearance` to every wall [m].
+    """A slot in which the box lies on its broad face, its long side along y, with `clearance` to every wall [m].
 
     The paper says "a horizontal slot fixture" (App. B, T08) with a "tight slot outline" (T09), and gives no numbers.
     """

@@ -1,4 +1,4 @@
-"""Cups with or without a handle: a wall that may widen towards the rim, a floor, a bead along the rim."""
+"""Cups with or without a handle: a wall that may widen towards the rim, a floor, and a bead along the rim."""
 
 import itertools
 import math
@@ -12,26 +12,29 @@ from ..params import param
 from .prop import BOX, PRIORITY, Rgba, show, solid
 from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
-CAPSULE, CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
+CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 BEAD_HEIGHT = 0.012
 """Height of the bead [m]."""
 RIM_HEIGHT = 0.001
-"""Height of the uppermost part of the wall [m], whose end face a cup upside down stands on."""
+"""Height of the uppermost part of the wall [m]. A cup upside down stands on its end face."""
 MIN_HANDLE = 0.020
-"""A handle that stands out less is none [m]."""
-HANDLE_BOTTOM, HANDLE_TOP = 0.26, 0.84
-"""Where the handle's outer faces are, as shares of the height."""
+"""Shortest handle [m]: a cup with a smaller value of `handle` has none."""
+HANDLE_BOTTOM = 0.26
+"""Height of the handle's lower outer face, as a share of the cup's height."""
+HANDLE_TOP = 0.84
+"""Height of the handle's upper outer face, as a share of the cup's height."""
 BEND_PARTS = 4
-"""Straight parts of a quarter of a bend."""
+"""Number of straight parts in a quarter of a bend."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cup(Turned):
-    """A cup that stands on the middle of its floor; the handle is on the side of +x.
+    """A cup whose origin is the middle of its base; the handle is at +x.
 
-    Radii: 86 and 94 mm of width, so that the 80 mm jaw spans it nowhere. The paper gives no lengths (App. C, "handled
-    cup, rigid handle, variable curvature"). 0.050 kg is a cup of melamine with walls of 3 mm.
+    The radii give widths of 86 and 94 mm, so that the 80 mm jaw cannot span the cup. The paper gives no lengths
+    (App. C, "handled cup, rigid handle, variable curvature"). 0.050 kg is a cup of melamine with walls of 3 mm.
     """
 
     height: float = param(0.095, "m", 0.07, 0.14)
@@ -40,26 +43,26 @@ class Cup(Turned):
     rim: float = param(0.047, "m", 0.030, 0.055)
     """Outer radius at the top."""
     wall: float = param(0.003, "m", 0.0015, 0.006)
-    """Its thickness, level."""
+    """Horizontal thickness of the wall."""
     floor: float = param(0.004, "m", 0.002, 0.008)
-    """Height of the floor inside, whose middle is the top of a box."""
+    """Height of the floor inside. Its middle is the top of a box."""
     bead: float = param(0.005, "m", 0.0, 0.008)
-    """Thickness of the last 12 mm of the wall, thicker towards the inside; as thick as the wall where that is more."""
+    """Thickness of the uppermost 12 mm of the wall, at least that of the wall. The additional thickness is inside."""
     handle: float = param(0.0, "m", 0.0, 0.06)
-    """How far it stands out from the wall; below 20 mm, where nothing fits behind it, there is none."""
+    """Distance by which the handle protrudes from the wall. Below 20 mm nothing fits behind it, and there is none."""
     bar: float = param(0.012, "m", 0.008, 0.020)
-    """Thickness of the handle: the jaw presses harder on a thicker one, and the more of its pads holds it."""
+    """Thickness of the handle. On a thicker handle the jaw presses harder, and more of its pads are in contact."""
     curve: float = param(0.0, "1", 0.0, 1.0)
-    """From 0, a handle of three straight bars, to 1, its outer half a half ring."""
+    """Roundness of the handle: 0 gives three straight bars, 1 gives a half ring as its outer half."""
     mass: float = param(0.050, "kg", 0.01, 0.5)
     friction: float = param(0.7, "1", 0.05, 1.5)
-    """Of floor and wall. On the wall it counts against whatever slides there, also against a rougher thing."""
+    """Sliding friction of floor and wall. On the wall it also counts against things that are rougher."""
     rim_friction: float = param(0.25, "1", 0.05, 1.5)
-    """Of the end face of the rim, on which the cup stands upside down."""
+    """Sliding friction of the end face of the rim, on which the cup stands upside down."""
     handle_friction: float = param(0.8, "1", 0.05, 1.5)
-    """Of handle and bead, by which a cup is meant to be held."""
+    """Sliding friction of handle and bead, the grips of the cup."""
     ribbed: bool = False
-    """Whether no suction cup holds on to the wall, for ribs too fine to be modelled; no parameter: a family decides."""
+    """Whether no suction cup can hold the wall, because of ribs that are too fine to model. The family sets it."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
     @property
@@ -86,7 +89,7 @@ class Cup(Turned):
         return parts
 
     def _ring(self, name: str, low: float, high: float, wall: float | None, friction: float, priority: int) -> Section:
-        """What lies between two heights, `wall` thick; None: a disc [m]."""
+        """Section between two heights [m]: a ring of thickness `wall` [m], or a disc for None."""
         a, b = self.outer(low), self.outer(high)
         inner = (0.0, 0.0) if wall is None else (a - wall, b - wall)
         corners = ((inner[0], low), (a, low), (b, high), (inner[1], high))
@@ -100,16 +103,16 @@ class Cup(Turned):
 
     @property
     def grip(self) -> Vec3:
-        """Middle of the handle's upright [m], in the cup's axes."""
-        return np.array([self._reach, 0.0, (HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height])
+        """Middle of the handle's upright bar, in the cup's axes [m]."""
+        return np.array([self._upright_distance, 0.0, (HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height])
 
     @property
-    def _reach(self) -> float:
-        """Distance of the upright's middle line from the cup's axis [m]."""
+    def _upright_distance(self) -> float:
+        """Distance of the upright bar's middle line from the cup's axis [m]."""
         return self.outer((HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height) + self.handle - self.bar / 2
 
     def _bars(self) -> list[tuple[mujoco.mjtGeom, Vec3, Vec3]]:
-        """The handle: kind of geom and both ends of its middle line for each straight part [m]."""
+        """Straight parts of the handle: kind of geom, and both ends of its middle line [m]."""
         if not self.has_handle:
             return []
         low, high = HANDLE_BOTTOM * self.height + self.bar / 2, HANDLE_TOP * self.height - self.bar / 2
@@ -117,10 +120,10 @@ class Cup(Turned):
         parts = []
         path = []
         for z, side in ((low, 1.0), (high, -1.0)):
-            # where the cup is wider, or else the bar's end would reach into the hollow of one with a leaning wall
+            # where the cup is wider; otherwise the end of the bar would reach into a cup with a sloping wall
             widest = max(self.outer(z - self.bar / 2), self.outer(z + self.bar / 2))
             wall = np.array([widest - self.wall / 2, 0.0, z])
-            centre = np.array([self._reach - bend, 0.0, z + side * bend])
+            centre = np.array([self._upright_distance - bend, 0.0, z + side * bend])
             turns = [math.pi / 2 * i / BEND_PARTS for i in range(BEND_PARTS + 1)] if bend >= MIN_DETAIL else [0.0]
             arc = [centre + bend * np.array([math.sin(a), 0.0, -side * math.cos(a)]) for a in turns]
             parts.append((CYLINDER, wall, arc[0]))
@@ -133,7 +136,7 @@ class Cup(Turned):
         return parts
 
     def inertial(self) -> tuple[Vec3, Mat3]:
-        """Centre of mass [m] and inertia about it [kg m^2], of one density; each bar of the handle as a thin rod."""
+        """Centre of mass [m] and inertia about it [kg m^2], at uniform density; bars of the handle are thin rods."""
         bodies = [self.round_body()]
         for kind, start, end in self._bars():
             along, area = end - start, self.bar**2 * (1.0 if kind == BOX else math.pi / 4)
@@ -150,8 +153,9 @@ class Cup(Turned):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         super().fill(body, spec)
-        # On the mesh of the floor a box would stand on one point and rock; MuJoCo gives two boxes four. This one's top
-        # is the floor, and the mesh lies a little lower. It is not shown: underneath, both lie in one plane.
+        # A box on the mesh of the floor would have one point of contact and rock; MuJoCo gives two boxes four points.
+        # The top of this box is the floor, and the mesh lies a little lower. The box is not drawn: the undersides of
+        # both lie in one plane.
         flat, half = (self.outer(self.floor) - self.wall) / math.sqrt(2), (self.floor - FOOT_PROTRUSION) / 2
         size, pos = [flat, flat, half], [0.0, 0.0, self.floor - half]
         solid(body, "floor", size, pos, friction=self.friction, mass=0.0, group=3)

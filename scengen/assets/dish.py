@@ -1,4 +1,4 @@
-"""Shallow dishes: a wide flat foot, and a rim that slopes up a little."""
+"""Shallow dishes: a wide flat foot, and a rim with a small slope."""
 
 import math
 from dataclasses import dataclass
@@ -10,28 +10,28 @@ from .turned import FOOT_PROTRUSION, Section, Turned
 
 @dataclass(frozen=True, kw_only=True)
 class Dish(Turned):
-    """A dish that stands on the middle of its foot.
+    """A dish whose origin is the middle of its foot.
 
          \\__                                __/   rim
             \\______________________________/
                           foot
 
-    Pressed on its rim it turns about the edge of its foot until the rim lies on the ground: by its incline. Thickness:
-    paper, App. C ("3 thicknesses: 2, 3, 5 mm; 4 diameters"), which gives no other length and no mass. Salad, dinner and
-    large dinner plates are 0.20, 0.22 and 0.25 m wide; 0.050 kg is moulded fibre.
+    A dish whose rim is pressed down turns about the edge of its foot by its incline, until the rim lies on the ground.
+    Thickness: paper, App. C ("3 thicknesses: 2, 3, 5 mm; 4 diameters"), which gives no other length and no mass. Salad,
+    dinner and large dinner plates are 0.20, 0.22 and 0.25 m wide; 0.050 kg is moulded fibre.
     """
 
     radius: float = param(0.110, "m", 0.080, 0.130)
-    """Outer one."""
+    """Outer radius."""
     rim: float = param(0.033, "m", 0.020, 0.045)
-    """Width of the sloping part, along the ground."""
+    """Horizontal width of the sloping part."""
     incline: float = param(20.0, "deg", 0.0, 35.0)
-    """Of the rim to the level."""
+    """Slope of the rim."""
     thickness: float = param(0.005, "m", 0.0015, 0.008)
-    """Along the vertical, everywhere."""
+    """Vertical thickness of the whole dish."""
     mass: float = param(0.050, "kg", 0.01, 1.0)
     friction: float = param(0.3, "1", 0.05, 1.5)
-    """Glazed."""
+    """Sliding friction of the glaze."""
     rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
 
     @property
@@ -40,12 +40,12 @@ class Dish(Turned):
 
     @property
     def foot(self) -> float:
-        """Radius of the flat part, on which the dish stands [m]."""
+        """Radius of the flat part on which the dish stands [m]."""
         return self.radius - self.rim
 
     @property
     def slope(self) -> float:
-        """Of the rim to the level [rad]; also the tilt at which the rim, pressed down, lies on the ground."""
+        """Slope of the rim [rad]; also the tilt of the dish when its rim is pressed to the ground."""
         return math.radians(self.incline)
 
     @property
@@ -55,12 +55,12 @@ class Dish(Turned):
 
     @property
     def height(self) -> float:
-        """Of the rim's upper edge above the ground [m]."""
+        """Height of the rim's upper edge above the ground [m]."""
         return self.rise + self.thickness
 
     @property
     def raised(self) -> float:
-        """Height of the rim's lower edge, while the opposite one is pressed to the ground [m]."""
+        """Height of the rim's lower edge while the opposite side is pressed to the ground [m]."""
         return self.rise * math.cos(self.slope) + (self.radius + self.foot) * math.sin(self.slope)
 
     @property

@@ -1,4 +1,4 @@
-"""Three walls that throw a ball back: a U that is open on one side, on a floor of its own."""
+"""Three walls from which a ball bounces back: a U that is open on one side."""
 
 import math
 from dataclasses import dataclass
@@ -13,26 +13,29 @@ from ..physics import contact, reflected
 from .prop import PRIORITY, Prop, Rgba, show, solid
 
 WALL_STIFFNESS = 2e4
-"""Of the walls [1/s^2]: a bounce takes 22 ms, 11 steps of the simulation, and a ball that comes with 0.5 m/s goes
-3.5 mm into the wall. Stiffer walls return shares of the speed that depend on the time step."""
+"""Contact stiffness of the walls per mass [1/s^2]. A bounce takes 22 ms, 11 steps of the simulation, and a ball at
+0.5 m/s goes 3.5 mm into the wall. With stiffer walls the restitution depends on the time step."""
 BOUNCE_TIME = math.pi / math.sqrt(WALL_STIFFNESS)
-"""How long a bounce takes [s]."""
+"""Duration of a bounce [s]."""
 MAX_WAYS = 10
-"""How many ways are foreseen."""
+"""Largest number of straight ways that are predicted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Enclosure(Prop):
-    """A back wall and two side walls, smooth. The origin is the middle of the opening, on the ground; x leads in."""
+    """A back wall and two side walls without friction. The origin is on the ground in the middle of the opening.
+
+    x leads in.
+    """
 
     width: float = param(0.52, "m", 0.1, 0.7)
-    """Between the side walls."""
+    """Distance between the side walls."""
     depth: float = param(0.38, "m", 0.1, 0.7)
-    """From the opening to the back wall."""
+    """Distance from the opening to the back wall."""
     height: float = param(0.050, "m", 0.02, 0.15)
     thickness: float = param(0.020, "m", 0.01, 0.05)
     restitution: float = param(0.84, "1", 0.3, 0.95)
-    """What is left of a ball's speed against a wall. Billiard cushions: 0.6 to 0.9."""
+    """Speed of a ball after a bounce over its speed before, along the normal. Billiard cushions have 0.6 to 0.9."""
     rgba: Rgba = (0.24, 0.42, 0.36, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -49,19 +52,19 @@ class Enclosure(Prop):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Of its outline on the ground [m]; the middle of that is `depth` / 2 behind the origin."""
+        """Lengths of its outline on the ground along x and y [m]. The middle of the outline is at x = `depth` / 2."""
         return self.depth + self.thickness, self.width + 2 * self.thickness
 
     # --- mechanics ------------------------------------------------------------------------
 
     def ways(self, at: Vec3, velocity: Vec3, radius: float, restitution: float | None = None) -> list["Way"]:
-        """The straight ways from here on of a ball that slides without friction; the last one has no end.
+        """The straight ways of a ball that slides without friction, from now on; the last one has no end.
 
         Args:
-            at: where the ball is [m], seen from the enclosure.
-            velocity: of it [m/s], seen so.
-            radius: of the ball [m].
-            restitution: of the walls, if they had another one: 1 for mirror images.
+            at: position of the ball in the axes of the enclosure [m].
+            velocity: velocity of the ball in these axes [m/s].
+            radius: radius of the ball [m].
+            restitution: another restitution of the walls, such as 1 for mirror images.
         """
         found, seconds = [], 0.0
         while len(found) < MAX_WAYS:
@@ -74,7 +77,7 @@ class Enclosure(Prop):
         return found
 
     def _hit(self, at: Vec3, velocity: Vec3, radius: float) -> tuple[Vec3, float] | None:
-        """The inward normal of the wall that is met first, and when [s]."""
+        """Inward normal of the first wall that the ball hits, and time until then [s]."""
         found = []
         if velocity[0] > 0.0:
             found.append((np.array([-1.0, 0.0, 0.0]), (self.depth - radius - at[0]) / velocity[0]))
@@ -88,14 +91,14 @@ class Enclosure(Prop):
 
 
 class Way(NamedTuple):
-    """A straight way of a ball."""
+    """A straight way of a ball between two bounces."""
 
     begins: float
-    """[s]."""
+    """Time at which it begins [s]."""
     at: Vec3
-    """Where it begins [m]."""
+    """Position at which it begins [m]."""
     velocity: Vec3
-    """[m/s]."""
+    """Velocity of the ball on it [m/s]."""
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A wall that crosses the table and has one gap, and a kerb: what stands behind the gap and stops a ball.
+"""A wall across the table with one gap, and a kerb, which stands behind the gap and stops a ball.
 
     _________________        ____________
    |                 |  gap |            |      seen from the front, along x
@@ -15,7 +15,7 @@ from .prop import Prop, Rgba, show, solid
 
 @dataclass(frozen=True, kw_only=True)
 class GapWall(Prop):
-    """The origin is the middle of the gap, on the table; x leads through it."""
+    """A wall with a gap. The origin is the middle of the gap, on the table; x leads through it."""
 
     gap: float = param(0.072, "m", 0.0, 0.15)
     """Width of the gap, along y."""
@@ -24,6 +24,7 @@ class GapWall(Prop):
     left: float = param(0.36, "m", 0.01, 1.0)
     """Length of the part at positive y."""
     right: float = param(0.36, "m", 0.01, 1.0)
+    """Length of the part at negative y."""
     rgba: Rgba = (0.45, 0.50, 0.58, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -34,11 +35,11 @@ class GapWall(Prop):
 
 @dataclass(frozen=True, kw_only=True)
 class Kerb(Prop):
-    """A low bar along y. The origin is the middle of its foot."""
+    """A low bar along y. The origin is the middle of its base."""
 
     length: float = param(0.16, "m", 0.02, 0.80)
     width: float = param(0.010, "m", 0.004, 0.04)
-    """Along x."""
+    """Width along x."""
     height: float = param(0.012, "m", 0.002, 0.04)
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.50, 0.58, 1.0)

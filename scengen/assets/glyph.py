@@ -1,4 +1,4 @@
-"""Capital letters as strokes: scenes refer to no files, and so to no fonts."""
+"""Capital letters as strokes: scenes do not refer to files, so they cannot use fonts."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 from ..geometry import Vec3
 from .prop import Rgba, shown
 
-GRID_WIDTH, GRID_HEIGHT = 4, 6
-"""Extent of the grid on which the strokes are drawn, from its lower left corner (0, 0)."""
+GRID_WIDTH = 4
+"""Last column of the grid on which the strokes are drawn; the lower left corner is (0, 0)."""
+GRID_HEIGHT = 6
+"""Last row of the grid."""
 STROKES = {
     "A": "00 04 26 44 40,03 43",
     "B": "00 06 46 40 00,03 43",
@@ -40,16 +42,16 @@ STROKES = {
     "Y": "06 23 46,23 20",
     "Z": "06 46 00 40",
 }
-"""Polylines of every letter: points as two digits, column and row, from which strokes lead to the next."""
+"""Polylines of every letter, separated by commas. Each point is two digits, column and row."""
 PRINT_THICKNESS = 0.0008
-"""How far a letter stands out of the face on which it is written [m]: flat as print, drawn before the face."""
+"""Height of a letter above the face on which it is written [m]: flat as print, but drawn in front of the face."""
 
 
 def lines(letter: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Both ends of every stroke, in units of the letter's height, from its middle; each of shape (2,).
 
     Raises:
-        ValueError: it is no capital letter.
+        ValueError: it is not a capital letter.
     """
     if letter not in STROKES:
         raise ValueError(f"no strokes for {letter!r}; known: {''.join(STROKES)}")
@@ -63,17 +65,17 @@ def lines(letter: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def write(
     body: mujoco.MjsBody, letter: str, at: ArrayLike, height: float, weight: float, rgba: Rgba, name: str
 ) -> None:
-    """Write a letter flat on a body, upright for someone who looks along its x axis from above.
+    """Write a letter flat on a body. Its upper end points to +x, and its lines run to -y.
 
     Args:
-        at: its middle, on the face, in the body's axes [m].
-        height: of the letter [m].
-        weight: half the width of its strokes [m].
-        name: what the names of its strokes begin with.
+        at: middle of the letter on the face, in the body's axes [m].
+        height: height of the letter [m].
+        weight: half the width of the strokes [m].
+        name: prefix of the names of the strokes.
     """
     middle = np.asarray(at, float)
     for number, (begin, end) in enumerate(lines(letter)):
-        here, there = (middle + height * _lie(point) for point in (begin, end))
+        here, there = (middle + height * _from_page(point) for point in (begin, end))
         along = there - here
         half = float(np.linalg.norm(along)) / 2
         angle = float(np.arctan2(along[1], along[0])) / 2
@@ -81,6 +83,6 @@ def write(
         shown(body, f"{name}_{number}", rgba, size=size, pos=(here + there) / 2, quat=turn)
 
 
-def _lie(point: np.ndarray) -> Vec3:
-    """A point of the page on the ground: up the page is +x, along the line -y."""
+def _from_page(point: np.ndarray) -> Vec3:
+    """A point of the page in the axes of the body: up the page is +x, along a line is -y."""
     return np.array([point[1], -point[0], 0.0])

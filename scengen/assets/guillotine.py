@@ -1,9 +1,9 @@
-"""Rectangles cut into L-shaped pieces, in exact arithmetic, and all ways to put such pieces back.
+"""Rectangles cut into L-shaped pieces, in exact arithmetic, and all ways to reassemble such pieces.
 
 Every cut is a guillotine cut: straight, from edge to edge of the rectangle that it cuts. Two neighbouring rectangles
-joined make an L. Two ways of cutting leave no rectangle over:
+together form an L. Two ways of cutting give such pieces only:
 
-    framed                stairs            `framed` leaves a rectangle to go on with; `stairs` ends it.
+    framed                stairs            `framed` leaves a rectangle to cut further; `stairs` leaves none.
     +-+---------+         +----+----+
     | |         |         |    | 2  |
     |1|  rest   |         | 2  +----+
@@ -11,7 +11,7 @@ joined make an L. Two ways of cutting leave no rectangle over:
     | :   1     |         |  1 :    |
     +-+---------+         +----+----+
 
-Lengths are whole numbers or fractions in any unit: edges close and areas add up exactly, or `closes` says no.
+Lengths are whole numbers or fractions in any unit, so that `closes` can check exactly whether pieces tile a rectangle.
 """
 
 import itertools
@@ -67,7 +67,7 @@ class Rect:
 
 @dataclass(frozen=True)
 class Ell:
-    """An L in the place where it was cut: a rectangle `bounds` without the rectangle `notch` at one of its corners."""
+    """An L where it was cut: the rectangle `bounds` without the rectangle `notch` at one of its corners."""
 
     bounds: Rect
     notch: Rect
@@ -77,7 +77,7 @@ class Ell:
         inside = b.x0 <= n.x0 and n.x1 <= b.x1 and b.y0 <= n.y0 and n.y1 <= b.y1
         corner = (n.x0 == b.x0) != (n.x1 == b.x1) and (n.y0 == b.y0) != (n.y1 == b.y1)
         if not (inside and corner):
-            raise ValueError("no L: the notch must lie at one corner, and be smaller than the rectangle both ways")
+            raise ValueError("not an L; the notch must lie at one corner, and be smaller than the rectangle in x and y")
 
     @property
     def area(self) -> Fraction:
@@ -85,13 +85,13 @@ class Ell:
 
     @property
     def quarter(self) -> int:
-        """Quarter turns, counterclockwise, that bring an L with its notch at the upper right into this position."""
+        """Number of counterclockwise quarter turns that bring an L with its notch at the upper right to this pose."""
         right, upper = self.notch.x1 == self.bounds.x1, self.notch.y1 == self.bounds.y1
         return {(True, True): 0, (False, True): 1, (False, False): 2, (True, False): 3}[right, upper]
 
     @property
     def sides(self) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-        """Width, height, width of the upright arm and height of the lying arm, turned to notch at the upper right."""
+        """Width, height, width of the upright arm and height of the lying arm, with the notch at the upper right."""
         across, along = (self.bounds.width, self.notch.width), (self.bounds.height, self.notch.height)
         if self.quarter % 2:
             across, along = along, across
@@ -118,16 +118,24 @@ class Ell:
 
 
 def framed(rect: Rect, upright: Length, lying: Length) -> tuple[Ell, Rect]:
-    """Cut an L off the left and lower side of `rect`, its arms `upright` wide and `lying` high; the L and the rest."""
+    """Cut an L off the left and lower side of `rect`, with arms `upright` wide and `lying` high.
+
+    Returns:
+        The L and the remaining rectangle.
+    """
     _, right = rect.cut_x(upright)
     _, rest = right.cut_y(lying)
     return Ell(rect, rest), rest
 
 
 def stairs(rect: Rect, step: Length, left: Length, right: Length) -> tuple[Ell, Ell]:
-    """Cut `rect` in two at `step` from the left, these at heights `left` and `right`; the lower L and the upper one."""
+    """Cut `rect` in two at `step` from the left, and these parts at heights `left` and `right`.
+
+    Returns:
+        The lower and the upper L.
+    """
     if left == right:
-        raise ValueError("no stairs: both cuts at the same height leave two rectangles")
+        raise ValueError(f"both cuts are at height {left}, which leaves two rectangles; give two different heights")
     one, two = rect.cut_x(step)
     (_, a_up), (_, b_up) = one.cut_y(left), two.cut_y(right)
     (a_low, _), (b_low, _) = one.cut_y(left), two.cut_y(right)
@@ -141,7 +149,7 @@ def stairs(rect: Rect, step: Length, left: Length, right: Length) -> tuple[Ell, 
 
 
 def mirrored(pieces: Sequence[Ell], rect: Rect) -> tuple[Ell, ...]:
-    """The pieces as seen in a mirror beside `rect`: left and right exchanged."""
+    """Mirror images of the pieces within `rect`: left and right exchanged."""
 
     def flip(r: Rect) -> Rect:
         return Rect(rect.x0 + rect.x1 - r.x1, r.y0, rect.x0 + rect.x1 - r.x0, r.y1)
@@ -150,9 +158,9 @@ def mirrored(pieces: Sequence[Ell], rect: Rect) -> tuple[Ell, ...]:
 
 
 def closes(pieces: Sequence[Ell], rect: Rect) -> bool:
-    """Whether the pieces tile `rect`: areas add up, and every inner edge is run through once in each direction.
+    """Whether the pieces tile `rect`: areas add up, and every inner edge occurs once in each direction.
 
-    Both are exact. Edges are compared as sets of elementary steps between neighbouring coordinates in use.
+    Both checks are exact. Edges are compared as sets of elementary steps between neighbouring coordinates in use.
     """
     if sum((p.area for p in pieces), Fraction(0)) != rect.area:
         return False
@@ -176,14 +184,14 @@ def _steps(outline: Sequence[tuple], marks: Sequence[Fraction]) -> Iterator[tupl
             yield (start, end) if a < b else (end, start)
 
 
-# --- all ways to put the pieces back ------------------------------------------------------------
+# --- all ways to reassemble the pieces ------------------------------------------------------------
 
 
 def solutions(pieces: Sequence[Ell], rect: Rect) -> int:
-    """How many ways there are to tile `rect` with the pieces turned by quarter turns, but not turned over.
+    """Number of ways to tile `rect` with the pieces turned by quarter turns, but not turned over.
 
-    Pieces of the same shape count as the same. In a tiling without gaps every edge lies on a sum of side lengths, so
-    that positions on the common grid of all lengths are all positions there are.
+    Pieces of the same shape count as the same. In a tiling without gaps every edge lies at a sum of side lengths, so
+    that the common grid of all lengths contains all possible positions.
     """
     grid = _grid(pieces, rect)
     columns, rows = int(rect.width * grid), int(rect.height * grid)
@@ -196,20 +204,20 @@ def solutions(pieces: Sequence[Ell], rect: Rect) -> int:
 
 
 def misfit(pieces: Sequence[Ell], rect: Rect) -> tuple[int, Ell]:
-    """A piece, and an L of the same area in whose company the others tile `rect` in no arrangement.
+    """Index of a piece, and an L of the same area with which the other pieces cannot tile `rect` in any arrangement.
 
-    Its mirror image, if that will do; several pieces are their own, or turn the whole tiling over. Sides are whole
-    numbers.
+    The L is the piece's mirror image, if the others cannot tile with that. Some pieces equal their mirror image, and
+    with some the mirror image of the whole tiling exists. Sides are whole numbers.
     """
     for i, piece in enumerate(pieces):
         for other in _same_area(piece):
             if solutions([*pieces[:i], other, *pieces[i + 1 :]], rect) == 0:
                 return i, other
-    raise ValueError("every L of the same area fits; no such rectangle is known")
+    raise ValueError("every L of the same area fits, which no known rectangle allows; give other pieces")
 
 
 def _same_area(piece: Ell) -> Iterator[Ell]:
-    """The mirror image of an L, then every L with sides of whole length, up to two more, and the same area."""
+    """The mirror image of an L, then every L of the same area with whole sides that are up to two longer."""
     yield mirrored([piece], piece.bounds)[0]
     width, height, upright, lying = (int(side) for side in piece.sides)
     for w, h, u, v in itertools.product(range(3, width + 3), range(3, height + 3), range(2, width), range(2, height)):
@@ -219,7 +227,7 @@ def _same_area(piece: Ell) -> Iterator[Ell]:
 
 
 def _grid(pieces: Sequence[Ell], rect: Rect) -> int:
-    """The least number of grid lines per unit of length on which all lengths fall."""
+    """Smallest number of grid lines per unit of length such that all lengths are on the grid."""
     lengths = [rect.width, rect.height, *(side for p in pieces for side in p.sides)]
     return math.lcm(*(length.denominator for length in lengths))
 
@@ -228,7 +236,7 @@ Kind = tuple[int, ...]
 
 
 def _poses(kind: Kind, columns: int, rows: int) -> list[int]:
-    """Every position and quarter turn of an L within the grid, as a set of cells in one number."""
+    """Every position and quarter turn of an L within the grid, each as a bit set of cells."""
     width, height, upright, lying = kind
     cells = {(x, y) for x in range(width) for y in range(height) if x < upright or y < lying}
     shapes = []
@@ -246,7 +254,7 @@ def _poses(kind: Kind, columns: int, rows: int) -> list[int]:
 
 
 def _count(covered: int, full: int, left: Counter[Kind], poses: dict[Kind, list[int]]) -> int:
-    """Exact cover: some piece must cover the first free cell."""
+    """Number of exact covers: one of the pieces must cover the first free cell."""
     if covered == full:
         return 1
     first = ~covered & (covered + 1)

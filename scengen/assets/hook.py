@@ -1,13 +1,13 @@
-"""Hooks to pull with: an L, a J whose bend is a half circle, and a T, all lying flat.
+"""Hooks for pulling: an L, a J whose bend is a half circle, and a T, all lying flat.
 
-The paper ships "J-shape (two variants) and T-shape, parametric handle length and hook radius" (App. C), and uses an
-"L-shaped hook" in T23; it gives no numbers. Ours fit the Panda's jaw, which opens to 80 mm, and a cube of 40 mm.
+The paper has "J-shape (two variants) and T-shape, parametric handle length and hook radius" (App. C), and an "L-shaped
+hook" in T23; it gives no numbers. Ours fit the Panda's jaw, which opens to 80 mm, and a cube of 40 mm.
 
-Every hook is a set of boxes in one plane: bars for what is straight, and for the bend bars that lie tangent to the
-inner circle from outside, so that what the circle lets in the hook lets in. Each bar weighs in proportion to its
-length along the middle line; overlaps at the corners count once.
+Every hook is a set of boxes in one plane. The bars of the bend touch the inner circle from outside, so that everything
+that fits into the circle fits into the hook. The mass of each bar is proportional to its length along the middle line;
+overlaps at the corners count once.
 
-The handle starts at x = -length / 2, where it is held, and ends at x = length / 2; the origin is the middle of its
+The handle starts at x = -length / 2, where a hand holds it, and ends at x = length / 2. The origin is the middle of its
 underside. The tip points to +y, or to -y if the hook is mirrored.
 """
 
@@ -24,16 +24,16 @@ from ..params import param
 from .prop import Prop, Rgba, show, solid
 
 Bar = tuple[NDArray[np.float64], NDArray[np.float64], float]
-"""Two ends of a straight stretch in the plane [m], shape (2,) each, and how far the box goes on beyond both [m]."""
+"""Two ends of a straight part in the plane, shape (2,) each, and length of the box beyond both ends [m]."""
 BEND_PARTS = 16
-"""Bars of a half circle: its outside then overshoots the circle by at most 1 / cos(5.6 deg) - 1 = 0.5 % of the outer
+"""Number of bars in a half circle. Its outside exceeds the circle by at most 1 / cos(5.6 deg) - 1 = 0.5 % of the outer
 radius, 0.46 mm for the widest bend."""
 MIN_SIZE = 1e-6
-"""A barb shorter than this is none [m]: MuJoCo refuses boxes without extent."""
+"""Length below which a barb is left out [m]: MuJoCo refuses boxes without extent."""
 
 
 class Hook(Prop):
-    """What all hooks share: bars of one cross section that lie on z = 0. Subclasses are dataclasses."""
+    """Base class of hooks: bars of one cross section that lie on z = 0. Subclasses are dataclasses."""
 
     length: float
     width: float
@@ -45,32 +45,32 @@ class Hook(Prop):
     @property
     @abc.abstractmethod
     def bars(self) -> list[Bar]:
-        """Its straight stretches, in the plane."""
+        """Its straight parts, in the plane."""
 
     @property
     @abc.abstractmethod
     def inside(self) -> float:
-        """x of the face that pulls, or of the innermost of it [m]."""
+        """x of the pulling face, or of its innermost point [m]."""
 
     @property
     @abc.abstractmethod
     def aside(self) -> float:
-        """How far it stands out beside the handle's face, on the side that its tip points to [m]."""
+        """Distance by which it protrudes beside the handle's face, on the side of the tip [m]."""
 
     @property
     def depth(self) -> float:
-        """How far the handle must be pushed on until the tip has passed what was behind its face [m]."""
+        """Distance that the handle must advance for the tip to pass a thing that touches the pulling face [m]."""
         return 0.0
 
     @property
     def side(self) -> float:
-        """Which way it points along y: 1 or -1."""
+        """Sign of y of the tip: 1 or -1."""
         return 1.0
 
     @property
     @abc.abstractmethod
     def engaging(self) -> float:
-        """Width of what pulls: of the face beside the handle, or of the opening of the bend [m]."""
+        """Width of the pulling face beside the handle, or of the opening of the bend [m]."""
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -98,25 +98,10 @@ class Hook(Prop):
             )
 
 
-@dataclass(frozen=True, kw_only=True)
-class LHook(Hook):
-    """A handle with a straight tip at a right angle to its end."""
+class StraightHook(Hook):
+    """Base class of hooks with a straight tip at a right angle to the end of the handle. Subclasses are dataclasses."""
 
-    length: float = param(0.37, "m", 0.20, 0.50)
-    """Of the handle, the tip's width included."""
-    tip: float = param(0.07, "m", 0.02, 0.12)
-    """How far the tip stands out beside the handle's face."""
-    width: float = param(0.032, "m", 0.010, 0.040)
-    height: float = param(0.025, "m", 0.015, 0.040)
-    mass: float = param(0.10, "kg", 0.02, 0.5)
-    friction: float = param(0.8, "1", 0.05, 1.5)
-    mirrored: int = param(0, "1 = tip to the right", 0, 1)
-    rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
-
-    @property
-    def side(self) -> float:
-        """Which way the tip points along y: 1 or -1."""
-        return -1.0 if self.mirrored else 1.0
+    tip: float
 
     @property
     def inside(self) -> float:
@@ -130,6 +115,26 @@ class LHook(Hook):
     def engaging(self) -> float:
         return self.tip
 
+
+@dataclass(frozen=True, kw_only=True)
+class LHook(StraightHook):
+    """A handle with a straight tip at a right angle to its end, on one side."""
+
+    length: float = param(0.37, "m", 0.20, 0.50)
+    """Length of the handle, the width of the tip included."""
+    tip: float = param(0.07, "m", 0.02, 0.12)
+    """Distance by which the tip protrudes beside the handle's face."""
+    width: float = param(0.032, "m", 0.010, 0.040)
+    height: float = param(0.025, "m", 0.015, 0.040)
+    mass: float = param(0.10, "kg", 0.02, 0.5)
+    friction: float = param(0.8, "1", 0.05, 1.5)
+    mirrored: int = param(0, "1 = tip to the right", 0, 1)
+    rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
+
+    @property
+    def side(self) -> float:
+        return -1.0 if self.mirrored else 1.0
+
     @property
     def bars(self) -> list[Bar]:
         half, middle = self.width / 2, self.length / 2 - self.width / 2
@@ -142,14 +147,14 @@ class LHook(Hook):
 
 @dataclass(frozen=True, kw_only=True)
 class JHook(Hook):
-    """A handle that runs into a half circle. The variants differ in the barb, a straight end that leads back."""
+    """A handle that ends in a half circle. The variants differ in the barb, a straight end that leads back."""
 
     length: float = param(0.30, "m", 0.15, 0.50)
-    """Of the straight handle, up to where the bend begins."""
+    """Length of the straight handle, up to the bend."""
     radius: float = param(0.045, "m", 0.02, 0.10)
-    """Of the middle line of the bend."""
+    """Radius of the middle line of the bend."""
     barb: float = param(0.0, "m", 0.0, 0.08)
-    """How far the end runs back, parallel to the handle."""
+    """Length of the barb, which runs back parallel to the handle."""
     width: float = param(0.016, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.12, "kg", 0.02, 0.5)
@@ -159,7 +164,6 @@ class JHook(Hook):
 
     @property
     def side(self) -> float:
-        """Which way the bend goes along y: 1 or -1."""
         return -1.0 if self.mirrored else 1.0
 
     @property
@@ -187,7 +191,7 @@ class JHook(Hook):
         return straight + self._bend() + barb
 
     def _bend(self) -> list[Bar]:
-        """Bars whose inner faces touch the inner circle in the middle, and whose outer corners meet."""
+        """Bars whose inner faces touch the inner circle in their middle, and whose outer corners meet."""
         step = math.pi / BEND_PARTS
         centre = _point(self.length / 2, self.side * self.radius)
         bars: list[Bar] = []
@@ -205,34 +209,22 @@ class JHook(Hook):
 ROUND_J = JHook()
 """First variant: the bend alone."""
 BARBED_J = JHook(barb=0.05, rgba=(0.15, 0.55, 0.55, 1.0))
-"""Second variant: the end leads back along the handle, so that nothing slips out sideways."""
+"""Second variant: the end leads back along the handle, so that things cannot slip out sideways."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class THook(Hook):
-    """A handle with a crossbar at its end: it pulls on either side."""
+class THook(StraightHook):
+    """A handle with a crossbar at its end, which pulls on either side."""
 
     length: float = param(0.34, "m", 0.20, 0.50)
-    """Of the handle, the crossbar's width included."""
+    """Length of the handle, the width of the crossbar included."""
     tip: float = param(0.06, "m", 0.02, 0.12)
-    """How far the crossbar stands out beside each face of the handle."""
+    """Distance by which the crossbar protrudes beside each face of the handle."""
     width: float = param(0.020, "m", 0.010, 0.040)
     height: float = param(0.025, "m", 0.015, 0.040)
     mass: float = param(0.14, "kg", 0.02, 0.5)
     friction: float = param(0.8, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.35, 0.65, 1.0)
-
-    @property
-    def inside(self) -> float:
-        return self.length / 2 - self.width
-
-    @property
-    def aside(self) -> float:
-        return self.tip
-
-    @property
-    def engaging(self) -> float:
-        return self.tip
 
     @property
     def bars(self) -> list[Bar]:

@@ -1,4 +1,4 @@
-"""Incline: a slab on a hinge at its lower edge, which a servo tilts; what lies on it slides down over that edge.
+"""Incline: a slab on a hinge at its lower edge, which a servo tilts. Things on it slide down over that edge.
 
               ___---
         ___---              seen from the side; the lower edge, the lip, is towards the robot
@@ -16,47 +16,65 @@ from ..geometry import UP, Mat3, Vec3, about_y, quat
 from ..params import param
 from .prop import Prop, Rgba, servo, show, shown, solid
 
-POST_WIDTH, POST_GAP = 0.016, 0.004
-"""Width of the posts, and room between them and the slab [m]."""
+POST_WIDTH = 0.016
+"""Width of the posts [m]."""
+POST_GAP = 0.004
+"""Gap between the posts and the slab [m]."""
 SLAB_THICKNESS = 0.010
-"""Of the slab [m]."""
-STIFFNESS, DAMPING, ARMATURE = 1000.0, 20.0, 0.05
-"""Of the servo [N m/rad], of the hinge [N m s/rad], and of the servo's rotor [kg m^2]: 20 N at the far end turn it by
-0.2 degrees, and it follows its goal 20 ms late."""
+"""Thickness of the slab [m]."""
+STIFFNESS = 1000.0
+"""Stiffness of the servo [N m/rad]: 20 N at the far end turn it by 0.2 degrees."""
+DAMPING = 20.0
+"""Damping of the hinge [N m s/rad]: with this stiffness the slab follows its goal 20 ms late."""
+ARMATURE = 0.05
+"""Inertia of the servo's rotor [kg m^2]."""
 SLAB_FRICTION = 0.05
-"""Friction of the slab, less than of anything that lies on it: of two frictions MuJoCo takes the larger one."""
+"""Sliding friction of the slab, less than that of all things on it: MuJoCo takes the larger of two frictions."""
 FRAME_COLOUR: Rgba = (0.35, 0.37, 0.40, 1.0)
+"""Colour of posts and axle."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Incline(Prop):
-    """Its hinge `hinge` reads 0 at the least angle, where it starts.
+    """A slab between two posts. Its joint `hinge` reads 0 at the smallest angle, where it starts.
 
     Angles: paper, App. B, T15 ("an incline tilts from 10 to 55 deg"); it gives nothing else.
     """
 
     length: float = param(0.18, "m", 0.10, 0.30)
-    """Along the slope."""
+    """Length along the slope."""
     width: float = param(0.40, "m", 0.10, 0.60)
-    """Along the lip."""
+    """Width along the lip."""
     lip: float = param(0.125, "m", 0.05, 0.20)
     """Height of the lip."""
     least: float = param(10.0, "deg", 0.0, 20.0)
+    """Smallest angle of the slab."""
     most: float = param(55.0, "deg", 30.0, 70.0)
+    """Largest angle of the slab."""
     mass: float = param(0.5, "kg", 0.1, 2.0)
     rgba: Rgba = (0.36, 0.50, 0.66, 1.0)
 
     @property
     def turns(self) -> float:
-        """By how much the hinge turns [rad]."""
+        """Range of the hinge [rad]."""
         return math.radians(self.most - self.least)
 
     def axes(self, turned: float = 0.0) -> Mat3:
-        """Up the slope, along the lip, out of the slab, when the hinge has turned so far [rad]."""
+        """Axes of the slab, as columns: up the slope, along the lip, out of the slab.
+
+        Args:
+            turned: angle of the hinge [rad].
+        """
         return about_y(-math.radians(self.least) - turned)
 
     def on_slab(self, away: float, along: float, turned: float = 0.0) -> Vec3:
-        """The point of the slab's face [m] so far up from the lip and along it [m], in the axes of the incline."""
+        """A point on the slab's face, in the axes of the incline [m].
+
+        Args:
+            away: distance from the lip, up the slope [m].
+            along: position along the lip [m].
+            turned: angle of the hinge [rad].
+        """
         return self.lip * UP + self.axes(turned) @ np.array([away, along, 0.0])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -88,10 +106,10 @@ class Incline(Prop):
 
 
 def driven(scene: mujoco.MjSpec, name: str) -> str:
-    """Give an incline of a scene its servo.
+    """Add the servo of an incline to a scene.
 
     Returns:
-        The name by which events drive it.
+        Name of the joint that events drive.
     """
     hinge = f"{name}/hinge"
     servo(scene, hinge, STIFFNESS)

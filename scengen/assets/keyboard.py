@@ -1,4 +1,4 @@
-"""A keyboard with the letters of a QWERTY layout: each cap is a body of its own, so that contacts tell them apart."""
+"""A keyboard with the letters of a QWERTY layout. Each cap is a separate body, so that contacts identify the key."""
 
 from dataclasses import dataclass
 
@@ -11,46 +11,53 @@ from .glyph import write
 from .prop import Prop, Rgba, show, solid
 
 ROWS = ("QWERTYUIOP", "ASDFGHJKL", "ZXCVBNM")
-"""From the far row to the near one."""
+"""Letters of each row, from the far row to the near one."""
 LETTERS = "".join(ROWS)
+"""All letters."""
 STAGGER = 0.5
-"""By how much each row is shifted against the one behind it, as a share of the pitch."""
+"""Shift of each row against the row behind it, as a share of the pitch."""
 PLATE_THICKNESS = 0.004
 """Thickness of the plate that carries the caps [m]."""
 CAP_MASS = 0.01
 """Mass of a cap [kg]."""
-PRINT_SIZE, STROKE_HALF_WIDTH = 0.55, 0.0007
-"""Height of the letters as a share of a cap, and half the width of their strokes [m]."""
+PRINT_SIZE = 0.55
+"""Height of the letters, as a share of the edge of a cap."""
+STROKE_HALF_WIDTH = 0.0007
+"""Half the width of the strokes of the letters [m]."""
 LETTER_COLOUR: Rgba = (0.62, 0.62, 0.62, 1.0)
 """Colour of the letters."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Keyboard(Prop):
-    """The keyboard for someone who looks along +x: Q is far to the left, at +y. The origin is the middle of the plate.
+    """A keyboard that reads along +x: Q is far and left, at +x and +y. The origin is the middle of the plate's base.
 
-    Paper, App. C: "virtual QWERTY keyboard with per-key contact triggers". It gives no lengths: closed finger tips, 21
-    mm wide and 26 mm long, keep 12 mm from the neighbours of a cap that they press in its middle.
+    Paper, App. C: "virtual QWERTY keyboard with per-key contact triggers". It gives no lengths. Closed finger tips, 21
+    mm wide and 26 mm long, that press the middle of a cap are 12 mm away from the neighbouring caps.
     """
 
     pitch: float = param(0.040, "m", 0.030, 0.050)
-    """From cap to cap along a row, and from row to row."""
+    """Distance between neighbouring caps of a row, and between neighbouring rows."""
     cap: float = param(0.030, "m", 0.015, 0.030)
     """Edge of a cap."""
     height: float = param(0.012, "m", 0.006, 0.030)
-    """Of the caps' upper faces above the ground."""
+    """Height of the caps' upper faces above the ground."""
     friction: float = param(0.6, "1", 0.05, 1.5)
     mass: float = param(0.3, "kg", 0.1, 2.0)
-    """Of the plate; typewriter keyboards without their caps weigh 0.3 to 1.2 kg."""
+    """Mass of the plate. Typewriter keyboards without their caps weigh 0.3 to 1.2 kg."""
     rgba: Rgba = (0.86, 0.86, 0.84, 1.0)
 
     @property
     def size(self) -> Vec3:
-        """Edges of the plate along x and y, and height of the whole [m]."""
+        """Edges of the plate along x and y, and total height [m]."""
         return np.array([len(ROWS) * self.pitch, (len(ROWS[0]) + 0.5) * self.pitch, self.height])
 
     def at(self, letter: str) -> Vec3:
-        """Middle of a cap's upper face, in the keyboard's axes [m]. Raises ValueError for what is no capital letter."""
+        """Middle of a cap's upper face, in the keyboard's axes [m].
+
+        Raises:
+            ValueError: it is not a capital letter.
+        """
         if len(letter) != 1 or letter not in LETTERS:
             raise ValueError(f"no key named {letter!r}; known: {LETTERS}")
         row = next(i for i, letters in enumerate(ROWS) if letter in letters)
@@ -58,7 +65,7 @@ class Keyboard(Prop):
         return np.array([(1 - row) * self.pitch, -along * self.pitch, self.height])
 
     def under(self, spot: Vec3) -> str | None:
-        """The letter of the cap over which a place is, in the keyboard's axes [m]; None: between caps."""
+        """Letter of the cap below a point, which is in the keyboard's axes [m]; None between caps."""
         over = [letter for letter in LETTERS if np.all(np.abs(spot[:2] - self.at(letter)[:2]) <= self.cap / 2)]
         return over[0] if over else None
 

@@ -1,4 +1,4 @@
-"""A body of convex pieces, and how it is written in a manifest."""
+"""A body of convex pieces, and its representation as plain data in a manifest."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -13,15 +13,17 @@ from .prop import Prop, Rgba, shown, solid
 from .turned import FOOT_RADIUS
 
 Points = NDArray[np.float64]
-"""Shape (n, 3) [m]."""
+"""Points, shape (n, 3) [m]."""
 
 DIGITS = 7
-"""Decimals of a length in a manifest [m]; what is simulated is always read from such numbers."""
+"""Number of decimals of a length in a manifest [m]. Simulations always use the rounded lengths."""
 MAX_NUMBERS = 100_000
-"""Numbers in an array of a manifest, at most."""
+"""Largest number of entries in an array of a manifest."""
 ARRAY_SHAPES = {"feet": (-1, 3), "vertices": (-1, 3), "com": (3,), "inertia": (3, 3)}
+"""Shapes of the arrays in a manifest; -1 stands for any length."""
 
-MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
+MESH = mujoco.mjtGeom.mjGEOM_MESH
+SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 PIECE_COLOURS: tuple[Rgba, ...] = (
     (0.90, 0.62, 0.00, 1.0),
     (0.34, 0.71, 0.91, 1.0),
@@ -31,31 +33,34 @@ PIECE_COLOURS: tuple[Rgba, ...] = (
     (0.84, 0.37, 0.00, 1.0),
     (0.80, 0.47, 0.65, 1.0),
 )
-"""Colours that neighbouring pieces are told apart by (Okabe and Ito)."""
+"""Colours of the pieces, which make neighbouring pieces distinguishable (Okabe and Ito)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeshProp(Prop):
-    """A body of convex pieces, with the mesh that they stand for to be looked at. It stands on z = 0.
+    """A body of convex pieces for collisions, and the original mesh for pictures. It stands on z = 0.
 
-    Points are in axes that are parallel to the mesh file's; the origin is below the centre of mass.
+    The axes of all points are parallel to those of the mesh file. The origin is below the centre of mass.
     """
 
     corners: tuple[Points, ...]
     """Vertices of each piece."""
     feet: Points
-    """Centres of the spheres that it stands on."""
+    """Centres of the spheres on which it stands."""
     vertices: Points
+    """Vertices of the mesh that pictures show [m]."""
     faces: NDArray[np.int64]
-    """What is shown: vertices [m], and triangles, shape (n, 3)."""
+    """Triangles of the mesh that pictures show, as indices of vertices, shape (n, 3)."""
     mass: float
+    """Mass [kg]."""
     com: Vec3
+    """Centre of mass [m]."""
     inertia: Mat3
-    """About the centre of mass [kg m^2]."""
+    """Inertia about the centre of mass [kg m^2]."""
     friction: float = 0.6
     rgba: Rgba = (0.72, 0.66, 0.55, 1.0)
     bare: bool = False
-    """Whether its pieces are shown instead of the mesh."""
+    """Whether pictures show the pieces instead of the mesh."""
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         body.explicitinertial, body.mass, body.ipos = True, self.mass, self.com
@@ -81,7 +86,7 @@ class MeshProp(Prop):
         shown(body, "look", self.rgba, type=MESH).meshname = "look"
 
     def written(self) -> dict[str, Any]:
-        """The body as plain data, in which inertias keep all their digits."""
+        """The body as plain data. Lengths are rounded to `DIGITS`; masses and inertias keep all digits."""
         return {
             "corners": [np.round(points, DIGITS).tolist() for points in self.corners],
             "faces": self.faces.tolist(),
@@ -91,10 +96,10 @@ class MeshProp(Prop):
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Self:
-        """The body that `written` gave.
+        """The body of which `written` gave the data.
 
         Raises:
-            ValueError: that is none.
+            ValueError: the data do not describe a body.
         """
         known = {field.name for field in fields(cls)} - {"rgba", "bare"}
         if not isinstance(data, Mapping) or set(data) != known:
@@ -103,7 +108,7 @@ class MeshProp(Prop):
         arrays: dict[str, Any] = {name: _numbers(name, data[name], shape) for name, shape in ARRAY_SHAPES.items()}
         faces = _numbers("faces", data["faces"], (-1, 3)).astype(np.int64)
         if not corners or not len(faces) or faces.min() < 0 or faces.max() >= len(arrays["vertices"]):
-            raise ValueError("its pieces or triangles are missing, or refer to nothing")
+            raise ValueError("its pieces or triangles are missing, or refer to vertices that do not exist")
         mass, friction = (float(_numbers(name, data[name], ())) for name in ("mass", "friction"))
         return cls(corners=corners, faces=faces, mass=mass, friction=friction, **arrays)
 
@@ -115,5 +120,5 @@ def _numbers(name: str, told: Any, shape: tuple[int, ...]) -> NDArray[np.float64
         return found
     fits = found.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, found.shape, strict=True))
     if not fits or not shape or found.size > MAX_NUMBERS or not np.isfinite(found).all():
-        raise ValueError(f"its {name} are no finite numbers of that shape")
+        raise ValueError(f"its {name} must be finite numbers of shape {shape}")
     return found

@@ -1,4 +1,4 @@
-"""A square mark on the table: the place where something is to go. Nothing collides with it."""
+"""A square mark on the table, the goal of a placement. It has no collisions."""
 
 import math
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ from ..params import param
 from .prop import Prop, Rgba, show, shown
 
 SHEET_THICKNESS = 0.001
-"""Thickness of each of the two sheets [m]: enough to be drawn before the table."""
+"""Thickness of each of the two sheets [m]: enough to be drawn in front of the table."""
 TURNED_OVER = quat("x", math.pi)
-"""Orientation (wxyz) in which the lower side of a patch is up."""
+"""Orientation of a patch with its lower side up (wxyz)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Patch(Prop):
-    """Two sheets back to back: what lies on the table is seen, and what is turned down is hidden inside it.
+    """Two sheets back to back: the upper one lies on the table and is visible, the lower one is hidden in the table.
 
-    An event that is to change how a patch looks turns it over. Which side is up belongs to the state then, and every
-    renderer shows it.
+    An event changes the colour of a patch by turning it over. So the colour is part of the state, and every renderer
+    shows it.
     """
 
     size: float = param(0.14, "m", 0.02, 0.4)

@@ -1,4 +1,4 @@
-"""Peg: a square bar that stands on one end, and the plinth under it."""
+"""Peg: a square bar that stands on one end, and the plinth below it."""
 
 import math
 from dataclasses import dataclass
@@ -13,8 +13,11 @@ from .prop import Rgba, show
 
 @dataclass(frozen=True, kw_only=True)
 class Peg(Box):
-    """Stands along z. The paper gives no lengths and no mass: this one is of beech that has been bored out,
-    1100 kg/m^3 at the nominal numbers, and its width leaves the jaw 26 mm of air on either side."""
+    """A peg along z; the origin is the middle of its base.
+
+    The paper gives no lengths and no mass. The nominal density is 1100 kg/m^3: beech, bored out and filled. The width
+    leaves 26 mm of the jaw on either side.
+    """
 
     width: float = param(0.024, "m", 0.012, 0.04)
     length: float = param(0.120, "m", 0.06, 0.20)
@@ -28,13 +31,13 @@ class Peg(Box):
 
     @property
     def tipping_angle(self) -> float:
-        """Tilt at which the centre of mass passes over an edge of the foot [rad]."""
+        """Tilt at which the centre of mass passes over an edge of the base [rad]."""
         return math.atan2(self.width, self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plinth(Box):
-    """What a peg stands on, so that a level hand can take it near its foot: a square block, screwed down."""
+    """A square block, fixed to the table, under a peg, so that a level hand can grip the peg near its base."""
 
     width: float = param(0.030, "m", 0.01, 0.10)
     height: float = param(0.030, "m", 0.005, 0.10)

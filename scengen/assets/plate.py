@@ -1,4 +1,4 @@
-"""Plates with a raised rim: a flat foot, a wall that slopes upwards, and a level lip."""
+"""Plates with a raised rim: a flat foot, a wall that slopes upwards, and a horizontal lip."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
 @dataclass(frozen=True, kw_only=True)
 class Plate(Turned):
-    """A plate that stands on the middle of its foot. Without `rise` it is a disc.
+    """A plate whose origin is the middle of its foot. Without `rise` it is a disc.
 
               ______                            ______   lip
                     \\__                    __//
@@ -22,17 +22,17 @@ class Plate(Turned):
     """
 
     radius: float = param(0.110, "m", 0.080, 0.135)
-    """Outer one."""
+    """Outer radius."""
     foot: float = param(0.050, "m", 0.025, 0.052)
-    """Radius of the flat part, on which the plate stands."""
+    """Radius of the flat part on which the plate stands."""
     lip: float = param(0.022, "m", 0.0, 0.025)
-    """Width of the level part at the rim."""
+    """Width of the horizontal part at the rim."""
     rise: float = param(0.030, "m", 0.0, 0.040)
     """Height of the lip's underside above the ground."""
     thickness: float = param(0.005, "m", 0.0015, 0.008)
-    """Along the vertical, everywhere."""
+    """Vertical thickness of the whole plate."""
     hole: float = param(0.0, "m", 0.0, 0.020)
-    """Radius of a round hole in the middle of the foot; 0: none."""
+    """Radius of a round hole in the middle of the foot; 0 for no hole."""
     mass: float = param(0.050, "kg", 0.01, 1.0)
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
@@ -43,12 +43,12 @@ class Plate(Turned):
 
     @property
     def height(self) -> float:
-        """Of the lip's upper side above the ground [m]."""
+        """Height of the lip's upper side above the ground [m]."""
         return self.rise + self.thickness
 
     @property
     def pressed_tilt(self) -> float:
-        """Tilt at which the lip, pressed down, touches the ground [rad]; the plate turns about its foot's edge."""
+        """Tilt of the plate when its lip is pressed to the ground [rad]. It turns about the edge of its foot."""
         return math.atan2(self.rise, self.radius - self.foot)
 
     @property
@@ -61,7 +61,7 @@ class Plate(Turned):
         return [self._strip(*end) for end in ends]
 
     def _strip(self, name: str, inner: float, start: float, outer: float, stop: float) -> Section:
-        """What lies between two radii, its underside from height `start` to `stop` [m]."""
+        """Section between two radii, whose underside rises from height `start` to `stop` [m]."""
         t = self.thickness
         return Section(
             name,

@@ -1,4 +1,4 @@
-"""Props and the table: the base of every asset, the one way to make something solid, and the one way to place it."""
+"""Props and the table: base class of all assets, and functions that add solid geoms and place assets in a scene."""
 
 import abc
 from collections.abc import Sequence
@@ -15,15 +15,15 @@ from ..robots.suction import LEAKY
 TABLE_TOP = 0.8
 """Height of the table top [m]: robosuite's TableArena, `table_offset`."""
 TABLE_HALF = 0.4
-"""The table reaches from -0.4 to 0.4 m in x and y: robosuite's TableArena, `table_full_size`."""
+"""Half the edge of the table top, which reaches from -0.4 to 0.4 m in x and y [m]: robosuite's TableArena,
+`table_full_size`."""
 
 STIFF = (0.005, 1.0)
-"""Contact time constant [s] and damping ratio of every prop. At MuJoCo's default of 0.02 s an 80 mm tile 3 mm
-thick falls over by itself, and tiles sink 9 mm into each other in a cascade; at 0.005 s neither happens."""
+"""Contact time constant [s] and damping ratio of every prop. At MuJoCo's default of 0.02 s a tile 80 mm high and 3 mm
+thick falls over by itself, and tiles sink 9 mm into each other in a cascade. At 0.005 s neither happens."""
 PRIORITY = 1
 """Contact priority of every prop, above the table's and the robot's 0. Without it MuJoCo takes the larger friction
 of a pair and mixes the stiffnesses, so that a prop's own friction and `STIFF` would have no effect on the table."""
-
 
 BOX = mujoco.mjtGeom.mjGEOM_BOX
 Rgba = tuple[float, float, float, float]
@@ -31,16 +31,16 @@ Rgba = tuple[float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Prop(abc.ABC):
-    """Base of every asset: a frozen dataclass of parameters that can fill one body with geoms.
+    """Base class of every asset: a frozen dataclass of parameters that fills one body with geoms.
 
-    The origin of the body is where the asset stands on the ground, unless its docstring says otherwise.
+    The origin of the body is the point where the asset stands on the ground, unless its docstring says otherwise.
     """
 
     def __post_init__(self) -> None:
         check_bounds(self)
 
     def spec(self) -> mujoco.MjSpec:
-        """A spec with one top-level body called "body"."""
+        """A spec with one top-level body named "body"."""
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
         self.fill(spec.worldbody.add_body(name="body"), spec)
@@ -48,7 +48,7 @@ class Prop(abc.ABC):
 
     @abc.abstractmethod
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        """Add geoms, joints and parts to `body`; what does not belong to a body, meshes for instance, to `spec`."""
+        """Add geoms, joints and child bodies to `body`, and meshes to `spec`."""
 
 
 def solid(
@@ -69,14 +69,15 @@ def solid(
     group: int = 0,
     leaky: bool = False,
 ) -> mujoco.MjsGeom:
-    """Add a geom that things collide with: stiff, with a sliding friction of its own against whatever touches it.
+    """Add a geom that collides: stiff, with its own sliding friction against everything that touches it.
 
     Args:
-        size: as MuJoCo counts it, half lengths for boxes [m].
-        friction: sliding; torsion and rolling are MuJoCo's defaults.
-        mass: of the geom [kg]; else its density [kg/m^3], else MuJoCo's 1000.
-        condim: 4, so that a face resists turning on the spot; 3 where that costs time for nothing.
-        leaky: no suction cup holds on to it, see `robots.suction.LEAKY`.
+        size: size in MuJoCo's convention, half lengths for boxes [m].
+        friction: sliding friction; torsional and rolling friction are MuJoCo's defaults.
+        mass: mass of the geom [kg]. Without it `density` counts.
+        density: density of the geom [kg/m^3], by default MuJoCo's 1000.
+        condim: 4, so that a face resists turning on the spot; 3 where that has no effect and only costs time.
+        leaky: whether no suction cup can hold the geom, see `robots.suction.LEAKY`.
     """
     geom = body.add_geom(name=name, type=type)
     full = np.zeros(3)
@@ -104,7 +105,7 @@ def shown(
     pos: ArrayLike = (0.0, 0.0, 0.0),
     quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
 ) -> mujoco.MjsGeom:
-    """Add a geom that is only looked at: it collides with nothing and weighs nothing."""
+    """Add a visual geom, without collisions and without mass."""
     geom = body.add_geom(name=name, type=type, group=1, contype=0, conaffinity=0, mass=0)
     geom.size, geom.pos, geom.quat = np.asarray(size, float), np.asarray(pos, float), np.asarray(quat, float)
     geom.rgba = np.array(rgba, np.float32)
@@ -114,10 +115,10 @@ def shown(
 def table() -> mujoco.MjSpec:
     """A floor and robosuite's table, with the physics options that every scene carries.
 
-    The options are robosuite's own (models/assets/base.xml: elliptic cone, impratio 20, air, Newton's method) with a
-    time step of 2 ms. With impratio 20 conjugate gradients meet their limit of 100 iterations in some steps of most
-    tasks, and cost a fifth more over the certificates of 35 tasks (MuJoCo 3.5.0: 241 and 200 CPU seconds). Two families
-    have them nevertheless, and say why.
+    The options are robosuite's (models/assets/base.xml: elliptic cone, impratio 20, air, Newton's method) with a time
+    step of 2 ms. With impratio 20 the conjugate gradient solver reaches its limit of 100 iterations in some steps of
+    most tasks, and takes a fifth more time over the certificates of 35 tasks (MuJoCo 3.5.0: 241 and 200 CPU seconds).
+    Two families use it nevertheless; their files give the reason.
     """
     scene = mujoco.MjSpec()
     option = scene.option
@@ -129,7 +130,7 @@ def table() -> mujoco.MjSpec:
     option.density, option.viscosity = 1.2, 2e-5
     scene.compiler.degree = False
     scene.compiler.autolimits = True
-    _look(scene)
+    _add_visuals(scene)
     world = scene.worldbody
     world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[3, 3, 0.125], rgba=[0.55, 0.58, 0.62, 1])
     body = world.add_body(name="table", pos=[0, 0, TABLE_TOP - 0.025])
@@ -143,8 +144,8 @@ def table() -> mujoco.MjSpec:
     return scene
 
 
-def _look(scene: mujoco.MjSpec) -> None:
-    """Sky, lights and the cameras of robosuite's TableArena, for pictures only."""
+def _add_visuals(scene: mujoco.MjSpec) -> None:
+    """Add sky, light and the cameras of robosuite's TableArena, which only pictures use."""
     sky = scene.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64)
     sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
     sky.rgb1, sky.rgb2 = np.array([0.9, 0.9, 1.0]), np.array([0.45, 0.52, 0.62])
@@ -176,11 +177,12 @@ def place(
     free: bool = True,
     turn: ArrayLike | None = None,
 ) -> None:
-    """Put `asset` on the scene as body `name`, its origin at `pos` [m].
+    """Add `asset` to the scene as body `name`, with its origin at `pos` [m].
 
     Args:
-        yaw: about the vertical [rad].
-        turn: orientation instead of that (wxyz).
+        yaw: rotation about the vertical [rad].
+        free: whether the body gets a free joint, named `<name>_free`; else it is fixed.
+        turn: orientation (wxyz), in place of `yaw`.
     """
     orientation = quat("z", yaw) if turn is None else np.asarray(turn).tolist()
     frame = scene.worldbody.add_frame(pos=np.asarray(pos).tolist(), quat=orientation)
@@ -191,20 +193,20 @@ def place(
 
 
 def servo(scene: mujoco.MjSpec, joint: str, stiffness: float) -> None:
-    """Give a joint of the scene a servo that events drive (`World.drive`): a spring whose rest position they set.
+    """Give a joint of the scene a servo: a spring whose rest position events set (`World.drive`).
 
-    Its damping belongs to the joint, which MuJoCo treats implicitly; that of an actuator is explicit, and unstable
-    where damping * time step exceeds the inertia.
+    Set the damping on the joint. MuJoCo integrates the damping of joints implicitly; the damping of an actuator is
+    explicit, and unstable where damping * time step exceeds the inertia.
 
     Args:
-        stiffness: of the spring [N m/rad, or N/m].
+        stiffness: stiffness of the spring [N m/rad, or N/m].
     """
     drive = scene.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     drive.set_to_position(kp=stiffness)
 
 
 def show(asset: Prop) -> None:
-    """Open MuJoCo's viewer on one asset standing on the table."""
+    """Open MuJoCo's viewer with one asset on the table."""
     import mujoco.viewer
 
     scene = table()

@@ -1,7 +1,7 @@
-"""A rack with two covered storeys, open on one side: what stands in it can be taken through that side alone.
+"""A rack with two covered storeys, open on one side: things in it can be reached through that side only.
 
  __________
-|  _____   |      seen from the open side, which looks along -y; both ends, the back and the roof are closed
+|  _____   |      seen from the open side, which faces -y; both ends, the back and the roof are closed
 | |     |  |
 | |_[]__|  |      storey 1
 | |_____|  |      storey 0
@@ -18,56 +18,57 @@ from ..params import param
 from .prop import Prop, Rgba, show, solid
 
 STOREYS = 2
+"""Number of storeys."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TierRack(Prop):
-    """Two storeys of equal height on a plinth. The origin is the middle of the foot.
+    """Two storeys of equal height on a plinth. The origin is the middle of the base.
 
-    The paper gives no sizes (App. B, T03). Ours admit the Panda's hand, whose palm is 63 mm high and 208 mm wide when
-    the fingers close along x.
+    The paper gives no sizes (App. B, T03). The Panda's hand fits in, whose palm is 63 mm high and 208 mm wide when the
+    fingers close along x.
     """
 
     width: float = param(0.36, "m", 0.10, 0.50)
-    """Of the space inside, along x."""
+    """Inner width along x."""
     depth: float = param(0.16, "m", 0.08, 0.25)
-    """Of the space inside, along y."""
+    """Inner depth along y."""
     height: float = param(0.105, "m", 0.06, 0.20)
-    """Of the space inside a storey."""
+    """Inner height of a storey."""
     plinth: float = param(0.045, "m", 0.005, 0.15)
-    """Height of what the rack stands on."""
+    """Height of the plinth below the rack."""
     board: float = param(0.010, "m", 0.004, 0.02)
     """Thickness of floors, roof and walls."""
     closed: bool = False
-    """Whether the open side is closed: the same rack without its way in."""
+    """Whether the open side is closed: the same rack without an entrance."""
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: Rgba = (0.60, 0.48, 0.36, 1.0)
 
     @property
     def outer(self) -> tuple[float, float]:
-        """Full length along x and y, walls included [m]."""
+        """Outer lengths along x and y, walls included [m]."""
         return self.width + 2 * self.board, self.depth + self.board
 
     @property
     def mouth(self) -> float:
-        """Where the open side is along y [m]."""
+        """Position of the open side along y [m]."""
         return -self.outer[1] / 2
 
     @property
     def top(self) -> float:
-        """Height of the roof's upper side above the foot [m]."""
+        """Height of the roof's upper side above the ground [m]."""
         return self.floor(STOREYS)
 
     def floor(self, storey: int) -> float:
-        """Height of a storey's floor above the foot [m]."""
+        """Height of a storey's floor above the ground [m]."""
         return self.plinth + self.board + storey * (self.height + self.board)
 
     def inside(self, storey: int, along: float, depth: float) -> Vec3:
-        """A place on the floor of a storey [m].
+        """A point on the floor of a storey, in the axes of the rack [m].
 
         Args:
-            along: from the middle, along x.
-            depth: behind the open side.
+            along: distance from the middle along x [m].
+            depth: distance behind the open side [m].
         """
         return np.array([along, self.mouth + depth, self.floor(storey)])
 

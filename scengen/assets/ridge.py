@@ -1,4 +1,4 @@
-"""A narrow ridge with a level top on a plate: what lies across it stays if its centre of mass is over the top."""
+"""A narrow ridge with a flat top on a plate: a thing across it stays if its centre of mass is over the top."""
 
 from dataclasses import dataclass
 
@@ -10,18 +10,18 @@ from .prop import Prop, Rgba, show, solid
 PLATE_THICKNESS = 0.010
 """Thickness of the plate [m]."""
 PLATE_MARGIN = 0.010
-"""How far the plate reaches beyond the ends of the ridge [m]."""
+"""Length of the plate beyond each end of the ridge [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ridge(Prop):
-    """Runs along x; the origin is the middle of its foot. The ridge is a body of its own, so that goals can name it."""
+    """A ridge along x. The origin is the middle of the base. The ridge is a body of its own, which goals can name."""
 
     width: float = param(0.012, "m", 0.003, 0.04)
-    """Of the level top, along y."""
+    """Width of the flat top, along y."""
     length: float = param(0.10, "m", 0.04, 0.20)
     height: float = param(0.06, "m", 0.02, 0.15)
-    """Of the top above the foot."""
+    """Height of the top above the ground."""
     plate: float = param(0.10, "m", 0.04, 0.20)
     """Width of the plate, along y."""
     rgba: Rgba = (0.45, 0.47, 0.50, 1.0)

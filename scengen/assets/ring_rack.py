@@ -1,4 +1,4 @@
-"""A rack for one round thing: a ring on a plinth, as deep as the thing is to stand in it."""
+"""A rack for one round thing: a ring on a plinth, as high as the part of the thing that stands in it."""
 
 import math
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from ..params import param
 from .prop import Prop, Rgba, show, solid
 
 RING_BOARDS = 24
-"""Straight boards that stand for the ring. They touch it from outside: it is nowhere narrower than nominal."""
+"""Number of straight boards that form the ring. They touch it from outside, so it is nowhere narrower than nominal."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RingRack(Prop):
-    """What stands in it comes out upwards alone. The origin is the middle of the foot.
+    """A ring that a thing can leave upwards only. The origin is the middle of the base.
 
     |_    _|
     | |__| |    The floor is the top of the plinth.
@@ -24,11 +24,11 @@ class RingRack(Prop):
     """
 
     radius: float = param(0.079, "m", 0.03, 0.12)
-    """Of the ring inside."""
+    """Inner radius of the ring."""
     height: float = param(0.035, "m", 0.005, 0.08)
-    """Of the ring above the floor."""
+    """Height of the ring above the floor."""
     plinth: float = param(0.020, "m", 0.005, 0.20)
-    """Height of the floor above the foot."""
+    """Height of the floor above the ground."""
     board: float = param(0.008, "m", 0.004, 0.02)
     """Thickness of the ring."""
     friction: float = param(0.4, "1", 0.05, 1.5)
@@ -36,12 +36,12 @@ class RingRack(Prop):
 
     @property
     def outer(self) -> float:
-        """Radius of the circle around all of it [m]."""
+        """Radius of the circle around the whole rack [m]."""
         return (self.radius + self.board) / math.cos(math.pi / RING_BOARDS)
 
     @property
     def top(self) -> float:
-        """Height of the ring's upper edge above the foot [m]."""
+        """Height of the ring's upper edge above the ground [m]."""
         return self.plinth + self.height
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:

@@ -1,10 +1,10 @@
-"""Rod: a square tube with a heavy slug somewhere inside, which from outside nobody sees.
+"""Rod: a square tube with a heavy slug inside, which is not visible from outside.
 
         ____________________________________
-       |                        [#]         |      x across, y along the rod, the origin under its middle
+       |                        [#]         |      x across, y along the rod, the origin below its middle
        |____________________________________|
 
-It balances on an edge under its centre of mass, which lies SLUG_SHARE times as far from the middle as the slug does.
+It balances on an edge below its centre of mass, which is SLUG_SHARE times as far from the middle as the slug.
 """
 
 from dataclasses import dataclass
@@ -18,21 +18,21 @@ from .box import Box
 from .prop import Rgba, show
 
 SLUG_SHARE = 2 / 3
-"""Share of the mass that is in the slug. At 0.15 kg it is 9 cm^3 of lead, a cube of 21 mm: it fits the tube."""
+"""Share of the mass that is in the slug. At 0.15 kg that is 9 cm^3 of lead, a cube of 21 mm, which fits the tube."""
 SLUG_EDGE = 0.020
 """Edge of the slug [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rod(Box):
-    """Lies along y. Width for the jaw of 80 mm; the paper gives no lengths and no mass."""
+    """A rod along y. The 80 mm jaw spans its width; the paper gives no lengths and no mass."""
 
     length: float = param(0.36, "m", 0.20, 0.60)
     width: float = param(0.024, "m", 0.015, 0.06)
-    """And height: the section is a square."""
+    """Width and height: the cross section is a square."""
     mass: float = param(0.15, "kg", 0.05, 0.5, hidden=True)
     com: float = param(0.0, "m", -0.12, 0.12, hidden=True)
-    """How far from the middle the centre of mass is, along y."""
+    """Position of the centre of mass along y, from the middle."""
     friction: float = param(0.9, "1", 0.05, 1.5)
     rgba: Rgba = (0.86, 0.62, 0.20, 1.0)
 
@@ -42,7 +42,7 @@ class Rod(Box):
 
     @property
     def slug(self) -> float:
-        """How far from the middle the slug is [m]."""
+        """Position of the slug along y, from the middle [m]."""
         return self.com / SLUG_SHARE
 
     @property
@@ -55,7 +55,7 @@ class Rod(Box):
         return np.array([turned, (2 * tube * across + 2 * slug * SLUG_EDGE**2) / 12, turned])
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        """One box to eye and touch; how its mass is spread is told to the body and not by its parts."""
+        """Add one box for pictures and contacts. The body, not its geom, defines mass and inertia."""
         super().fill(body, spec)
         body.explicitinertial = True
         body.mass, body.inertia = self.mass, self.inertia

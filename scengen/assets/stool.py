@@ -1,4 +1,4 @@
-"""A low stool: a plate on four legs, screwed to whatever it stands on."""
+"""A low stool: a plate on four legs, fixed to the table."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from .prop import Prop, Rgba, show, solid
 PLATE_THICKNESS = 0.010
 """Thickness of the plate and of the legs [m]."""
 BEECH_DENSITY = 700.0
-"""Density [kg/m^3]."""
+"""Density of beech [kg/m^3]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stool(Prop):
-    """x is the long axis; the origin is the centre of its foot. The paper gives no lengths ("a narrow stool")."""
+    """A stool. x is the long axis, the origin the centre of the base. The paper gives no lengths ("a narrow stool")."""
 
     length: float = param(0.078, "m", 0.03, 0.25)
     width: float = param(0.040, "m", 0.03, 0.25)

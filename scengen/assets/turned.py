@@ -6,14 +6,14 @@
         |___/ _/
         |____/            { (x, y, z): (x, z) in the section, |y| <= x tan(pi / SECTORS) }.
         +---------- r
-                      They are cut out by planes alone, so that each is the hull of its corners. A section that reaches
-                      the axis is not cut: turned, it is convex as it is.
+                      Only planes cut them, so that each wedge is the convex hull of its corners. A section that
+                      reaches the axis is not cut: its solid of revolution is already convex.
 
-Flat faces stand for round walls and touch them from outside, in the middle of each sector: nothing hollow is narrower
-than nominal, and nothing stands out by more than 1 / cos(pi / SECTORS) - 1 = 0.9 % of its radius. All sectors share the
+Flat faces replace round walls and touch them from outside, in the middle of each sector. So no cavity is narrower than
+nominal, and no surface protrudes by more than 1 / cos(pi / SECTORS) - 1 = 0.9 % of its radius. All sectors share the
 mesh of one wedge. Mass and inertia are those of the round solid.
 
-Such a solid stands on a ring of small spheres, its feet: MuJoCo gives two convex geoms one point of contact, and a disc
+Such a solid stands on a ring of small spheres, its feet. MuJoCo gives two convex geoms one point of contact, and a disc
 on one point rocks.
 """
 
@@ -30,16 +30,19 @@ from ..geometry import UP, Mat3, Vec3, heading, quat
 from .prop import PRIORITY, Prop, Rgba, solid
 
 SECTORS = 24
-"""Wedges in a full turn."""
+"""Number of wedges in a full turn."""
 FOOT_COUNT = 8
+"""Number of feet."""
 FOOT_RADIUS = 0.001
-"""Radius of a foot [m], or half the thickness of a thinner floor."""
+"""Largest radius of a foot [m]. Under a thin floor it is half the thickness of the floor."""
 FOOT_PROTRUSION = 0.0002
-"""How far feet stand out of the underside [m]. At a tilt of 0.2 rad the underside's edge takes over from them."""
+"""Height of the underside above the lowest points of the feet [m]. At a tilt of 0.2 rad the edge of the underside bears
+the load instead of the feet."""
 MIN_DETAIL = 1e-4
-"""Details that are smaller are left out [m]."""
+"""Size below which a detail is left out [m]."""
 
-MESH, SPHERE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SPHERE
+MESH = mujoco.mjtGeom.mjGEOM_MESH
+SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 @dataclass(frozen=True)
@@ -48,22 +51,23 @@ class Section:
 
     name: str
     corners: tuple[tuple[float, float], ...]
-    """Radius and height of each [m], counterclockwise with the radius to the right and the height upwards."""
+    """Radius and height of each corner [m], counterclockwise with the radius to the right and the height upwards."""
     friction: float | None = None
-    """Sliding friction of its surface; None: the whole solid's."""
+    """Sliding friction of the surface. Default: that of the whole solid."""
     priority: int = PRIORITY
-    """Of its contacts; see `prop.PRIORITY`."""
+    """Priority of the contacts, see `prop.PRIORITY`."""
     leaky: bool = False
-    """Whether no suction cup holds on to it."""
+    """Whether no suction cup can hold the surface."""
 
     @property
     def reaches_axis(self) -> bool:
         return min(radius for radius, _ in self.corners) == 0.0
 
     def moments(self) -> NDArray[np.float64]:
-        """Integrals of r, r z, r z^2 and r^3 over the polygon [m^3, m^4, m^5, m^5]: a fan of triangles, each exact.
+        """Integrals of r, r z, r z^2 and r^3 over the polygon [m^3, m^4, m^5, m^5].
 
-        The rule of four points is exact for polynomials of degree 3 (Strang and Fix).
+        The polygon is a fan of triangles. On each the rule of four points is exact for polynomials of degree 3 (Strang
+        and Fix).
         """
         points = np.array(self.corners)
         rule = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
@@ -76,7 +80,7 @@ class Section:
         return total
 
     def wedge(self) -> NDArray[np.float64]:
-        """Corners of the wedge around the x axis, or of the whole turned section if it reaches the axis, (n, 3) [m]."""
+        """Corners of the wedge around the x axis, or of the whole solid if the section reaches the axis, (n, 3) [m]."""
         half = math.pi / SECTORS
         angles = half * (2 * np.arange(SECTORS) + 1) if self.reaches_axis else np.array([-half, half])
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=1) / math.cos(half)
@@ -84,7 +88,7 @@ class Section:
 
 
 class Turned(Prop):
-    """What all solids of revolution share. Subclasses are dataclasses that name the lengths of their profile."""
+    """Base class of solids of revolution. Subclasses are dataclasses whose fields are the lengths of the profile."""
 
     mass: float
     friction: float
@@ -93,7 +97,7 @@ class Turned(Prop):
     @property
     @abc.abstractmethod
     def sections(self) -> list[Section]:
-        """The profile. Sections touch; where they overlapped mass would count twice."""
+        """Sections of the profile. They touch and do not overlap: overlapping parts would count twice in the mass."""
 
     @property
     @abc.abstractmethod
@@ -101,14 +105,14 @@ class Turned(Prop):
         """Radius of the flat underside, at height `FOOT_PROTRUSION`, and thickness of the floor above it [m]."""
 
     def round_body(self) -> tuple[float, Vec3, Mat3]:
-        """Volume [m^3] and centre [m] of the round body, and the inertia about it at a density of 1 [m^5]."""
+        """Volume [m^3] and centre [m] of the round solid, and its inertia about the centre at a density of 1 [m^5]."""
         total = np.sum([section.moments() for section in self.sections], axis=0)
         volume, first, second, cubed = 2 * math.pi * total
         across = cubed / 2 + second - first**2 / volume
         return volume, np.array([0.0, 0.0, first / volume]), np.diag([across, across, cubed])
 
     def inertial(self) -> tuple[Vec3, Mat3]:
-        """Centre of mass [m] and inertia about it [kg m^2], of one density."""
+        """Centre of mass [m] and inertia about it [kg m^2], at uniform density."""
         volume, centre, inertia = self.round_body()
         return centre, self.mass / volume * inertia
 
@@ -123,15 +127,15 @@ class Turned(Prop):
         body.explicitinertial, body.mass, body.ipos = True, self.mass, com
         body.fullinertia = np.array([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
         for section in self.sections:
-            self._turn(section, body, spec)
+            self._add_wedges(section, body, spec)
         edge, floor = self.stance
         radius = min(FOOT_RADIUS, floor / 2)
         for i in range(FOOT_COUNT):
             pos = (edge - radius) * heading(360.0 * i / FOOT_COUNT) + radius * UP
             solid(body, f"foot_{i}", [radius], pos, type=SPHERE, friction=self.friction, mass=0.0, group=3)
 
-    def _turn(self, section: Section, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        """Add the wedges of a section; they share one mesh."""
+    def _add_wedges(self, section: Section, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
+        """Add the wedges of a section, which share one mesh."""
         spec.add_mesh(name=section.name, uservert=section.wedge().ravel().tolist())
         friction = self.friction if section.friction is None else section.friction
         for i in range(1 if section.reaches_axis else SECTORS):

@@ -1,9 +1,9 @@
 """Sixteen objects of the YCB Object and Model Set as simple solids with their real dimensions and masses.
 
-Masses are those of the set's object list (B. Calli et al., "The YCB object and model set", 2015). Dimensions are
-measured on its scans where `Item.scanned` says so, else taken from that list. Friction is not published: it is ours, by
-material. A proxy is no scan: it has the size, the weight and the balance of the thing, and the few faces that a hand or
-a table meets. `mesh_of` finds the scan of an object in a folder of them, and `Ycb.scans` puts it in the proxy's place.
+Masses are those of the set's object list (B. Calli et al., "The YCB object and model set", 2015). If `Item.scanned` is
+true, dimensions were measured on the scan, else they are those of that list. Friction is not published; ours is an
+estimate by material. The solids are proxies: they have the size, mass and balance of an object, and the few faces that
+a hand or a table touches. `mesh_of` finds the scan of an object in a folder, and `Ycb.scans` replaces the proxy by it.
 """
 
 import math
@@ -25,7 +25,8 @@ from .plate import Plate
 from .prop import Prop, Rgba, show, solid
 from .turned import FOOT_COUNT, FOOT_PROTRUSION, FOOT_RADIUS
 
-CAPSULE, CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
+CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
 SEAM_HEIGHT = 0.004
@@ -34,7 +35,7 @@ SEAM_HEIGHT = 0.004
 
 @dataclass(frozen=True, kw_only=True)
 class Carton(Box):
-    """A box of any size, evenly filled."""
+    """A box of any size with uniform density."""
 
     length: float = param(0.072, "m", 0.02, 0.25)
     width: float = param(0.164, "m", 0.02, 0.25)
@@ -50,41 +51,39 @@ class Carton(Box):
 
 @dataclass(frozen=True, kw_only=True)
 class Can(Prop):
-    """A full can, which stands on the middle of its foot, on a ring of feet, and lies on its two seams.
+    """A full can, which stands on a ring of feet and lies on its two seams. The origin is the middle of the base.
 
-    MuJoCo gives a cylinder on a flat face one contact, on which it would rock and wander; two seams give it two.
+    MuJoCo gives a lying cylinder one contact, on which it would rock and wander; two seams give it two.
     """
 
     radius: float = param(0.0339, "m", 0.015, 0.06)
-    """Of the seams; the wall between them is 0.2 mm narrower."""
+    """Radius of the seams. That of the wall between them is 0.2 mm smaller."""
     height: float = param(0.1019, "m", 0.02, 0.20)
     mass: float = param(0.349, "kg", 0.02, 1.0)
     friction: float = param(0.35, "1", 0.05, 1.5)
     rolling: float = param(0.01, "1", 0.0, 0.05)
-    """Resistance to rolling, as a share of the load: of steel with a paper label on wood."""
+    """Rolling resistance, as a share of the load: steel with a paper label on wood."""
     rgba: Rgba = (0.78, 0.16, 0.14, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         squares = 3 * self.radius**2 + self.height**2
         weigh(body, self.mass, [0.0, 0.0, self.height / 2], np.array([squares, squares, 6 * self.radius**2]) / 12)
-        wall = [
-            self.radius - FOOT_PROTRUSION,
-            self.height / 2 - 2 * FOOT_PROTRUSION,
-        ]  # no face of it is one with a seam's
-        self._round("wall", body, wall, self.height / 2)
+        # the ends of the wall and of the seams do not coincide
+        wall = [self.radius - FOOT_PROTRUSION, self.height / 2 - 2 * FOOT_PROTRUSION]
+        self._add_cylinder("wall", body, wall, self.height / 2)
         for end, middle, low in (
             ("foot", SEAM_HEIGHT / 2 + FOOT_PROTRUSION, FOOT_RADIUS),
             ("top", -SEAM_HEIGHT / 2 - FOOT_PROTRUSION, -FOOT_RADIUS),
         ):
             above = 0.0 if end == "foot" else self.height
-            self._round(f"{end}_seam", body, [self.radius, SEAM_HEIGHT / 2], above + middle)
+            self._add_cylinder(f"{end}_seam", body, [self.radius, SEAM_HEIGHT / 2], above + middle)
             for i in range(FOOT_COUNT):
                 spot = (self.radius - FOOT_RADIUS - FOOT_PROTRUSION) * heading(360.0 * i / FOOT_COUNT) + (
                     above + low
                 ) * UP
                 solid(body, f"{end}_{i}", [FOOT_RADIUS], spot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
 
-    def _round(self, name: str, body: mujoco.MjsBody, size: list[float], height: float) -> None:
+    def _add_cylinder(self, name: str, body: mujoco.MjsBody, size: list[float], height: float) -> None:
         part = solid(
             body, name, size, [0, 0, height], type=CYLINDER, mass=0.0, friction=self.friction, rgba=self.rgba, condim=6
         )
@@ -93,7 +92,7 @@ class Can(Prop):
 
 @dataclass(frozen=True, kw_only=True)
 class Tin(Prop):
-    """A full tin with an oblong foot whose corners are round."""
+    """A full tin with an oblong base and round corners."""
 
     length: float = param(0.052, "m", 0.03, 0.10)
     width: float = param(0.097, "m", 0.03, 0.15)
@@ -106,7 +105,7 @@ class Tin(Prop):
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         r, x, y, up = self.corner, self.length / 2, self.width / 2, self.height / 2
-        across, along = self._spread(x, y), self._spread(y, x)
+        across, along = self._mean_square(x, y), self._mean_square(y, x)
         tall = self.height**2 / 12
         weigh(body, self.mass, [0.0, 0.0, up], np.array([along + tall, across + tall, along + across]))
         parts = [("middle", [x, y - r, up], [0, 0])]
@@ -114,17 +113,15 @@ class Tin(Prop):
         for name, size, (px, py) in parts:
             solid(body, name, size, [px, py, up], mass=0.0, friction=self.friction, rgba=self.rgba)
         for i, (a, b) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
-            name, size = (
-                f"corner_{i}",
-                [r, up - FOOT_PROTRUSION],
-            )  # its round end keeps off the table: flat faces stand better
+            # the cylinders do not touch the table: flat faces stand better
+            name, size = f"corner_{i}", [r, up - FOOT_PROTRUSION]
             spot = [a * (x - r), b * (y - r), up]
             solid(body, name, size, spot, type=CYLINDER, mass=0.0, friction=self.friction, rgba=self.rgba)
 
-    def _spread(self, x: float, y: float) -> float:
-        """Mean of x^2 over the foot, half of which is `x` by `y` [m^2]: two rectangles across, four quarters of a disc.
+    def _mean_square(self, x: float, y: float) -> float:
+        """Mean of x^2 over the base, which is 2 `x` by 2 `y` [m^2]: two rectangles across, four quarters of a disc.
 
-        A quarter of a disc has its centroid at 4 r / (3 pi), and pi r^4 / 16 about its straight sides.
+        A quarter of a disc has its centroid at 4 r / (3 pi), and the moment pi r^4 / 16 about its straight sides.
         """
         r, area = self.corner, 4 * x * y - (4 - math.pi) * self.corner**2
         quarter, centroid = math.pi * r**2 / 4, 4 * r / (3 * math.pi)
@@ -134,13 +131,13 @@ class Tin(Prop):
 
 
 def weigh(body: mujoco.MjsBody, mass: float, com: list[float], spread: Vec3) -> None:
-    """Give a body its mass [kg], its centre of mass [m] and its inertia per mass about the axes through that [m^2]."""
+    """Set the mass [kg], centre of mass [m], and inertia about it per mass [m^2] of a body."""
     body.explicitinertial, body.mass, body.ipos, body.inertia = True, mass, np.array(com), mass * spread
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bottle(Prop):
-    """A full bottle: an oblong body, shoulders, and a round cap."""
+    """A full bottle: an oblong body, shoulders and a round cap."""
 
     length: float = param(0.056, "m", 0.03, 0.08)
     width: float = param(0.096, "m", 0.05, 0.12)
@@ -150,7 +147,7 @@ class Bottle(Prop):
     rgba: Rgba = (0.92, 0.78, 0.12, 1.0)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
-        """Shares of the height and width as measured: the body ends at 0.73, the shoulders at 0.82."""
+        """Add the three parts. As measured, the body ends at 0.73 of the height, the shoulders at 0.82."""
         top, neck, h = 0.73 * self.height, 0.82 * self.height, self.height
         cap = 0.37 * self.length
         lower = [self.length / 2, self.width / 2, top / 2]
@@ -179,7 +176,7 @@ class Banana(Prop):
     """A banana that lies flat: capsules along an arc in the plane of the table, and a stem."""
 
     span: float = param(0.160, "m", 0.10, 0.20)
-    """Between the middles of both ends."""
+    """Distance between the middles of both ends."""
     bend: float = param(0.150, "m", 0.12, 0.40)
     """Radius of the arc."""
     radius: float = param(0.018, "m", 0.010, 0.025)
@@ -226,7 +223,7 @@ class DinnerPlate(Plate):
 
 @dataclass(frozen=True, kw_only=True)
 class RestingBall(Ball):
-    """A ball whose origin is where it touches the ground."""
+    """A ball whose origin is its point of contact with the ground."""
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         super().fill(body, spec)
@@ -238,11 +235,13 @@ class Item:
     """One object of the set."""
 
     number: int
-    """In the set."""
+    """Number in the set."""
     name: str
+    """Name in the set."""
     prop: Prop
+    """Proxy of the object."""
     width: float | None
-    """What a jaw has to span [m], where that is least; None: more than the Panda's jaw can, or nothing but a rim."""
+    """Smallest width that a jaw must span [m]. None if the Panda's jaw cannot span it, or only a rim can be gripped."""
     scanned: bool
     """Whether its dimensions were measured on the scan."""
 
@@ -253,19 +252,17 @@ class Item:
 
 
 def _carton(x: float, y: float, z: float, mass: float, friction: float, rgba: Rgba) -> Carton:
+    """A carton, with lengths in millimetres."""
     return Carton(length=x / 1000, width=y / 1000, height=z / 1000, mass=mass, friction=friction, rgba=rgba)
 
 
 def _can(radius: float, height: float, mass: float) -> Can:
+    """A can, with lengths in millimetres."""
     return Can(radius=radius / 1000, height=height / 1000, mass=mass)
 
 
-BROWN, RED, BLUE, WHITE = (
-    (0.55, 0.33, 0.18, 1.0),
-    (0.75, 0.16, 0.14, 1.0),
-    (0.20, 0.35, 0.65, 1.0),
-    (0.90, 0.9, 0.9, 1.0),
-)
+BROWN = (0.55, 0.33, 0.18, 1.0)
+RED = (0.75, 0.16, 0.14, 1.0)
 TENNIS_BALL_RADIUS = 0.03235
 """Radius of a tennis ball [m]."""
 ITEMS = (
@@ -318,44 +315,44 @@ ITEMS = (
 
 @dataclass(frozen=True)
 class Scan:
-    """The solid of a scanned object, as it stands or lies."""
+    """Solid of a scanned object, as it stands or lies."""
 
     sha256: str
-    """Of the solid, as a manifest holds it."""
+    """Hash of the solid's data in a manifest."""
     prop: Prop
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ycb(Prop):
-    """One of `ITEMS`, which stands or lies where its docstring says."""
+    """One of `ITEMS`, standing or lying, with the origin of its prop."""
 
     item: int = param(0, "index", 0, len(ITEMS) - 1)
     low: int = param(0, "1", 0, 1)
-    """1: a carton lies on its narrow side, where that is lower than it stands; all else stands as it does."""
+    """1 for a carton that lies on its narrow side, if that is lower than standing. Other objects ignore it."""
 
     scans: Mapping[str, Scan] = field(default_factory=dict, compare=False, repr=False)
-    """By `called`: solids made of scans. Where there are any, no proxy is used."""
+    """Solids made of scans, by `called`. If there are any, no proxy is used."""
 
     @property
     def called(self) -> str:
-        """What the object is called in `scans`: by its folder in the set, and by how it lies."""
+        """Key of the object in `scans`: its folder in the set, with `/low` for a lying carton."""
         return f"{self.row.folder}/low" if self.lies else self.row.folder
 
     @property
     def scan(self) -> Scan | None:
-        """The scan in the proxy's place, or None.
+        """Scan that replaces the proxy, or None.
 
         Raises:
             BadConfig: there are scans, but none of this object.
         """
         if self.scans and self.called not in self.scans:
             known = ", ".join(self.scans)
-            raise BadConfig(f"there is no scan of {self.called}; known: {known}; give ycb=FOLDER one that has it")
+            raise BadConfig(f"there is no scan of {self.called}; known: {known}; name a folder with its scan in ycb=")
         return self.scans.get(self.called)
 
     @property
     def row(self) -> Item:
-        """What is known about the object."""
+        """Entry of the object in `ITEMS`."""
         return ITEMS[self.item]
 
     @property
@@ -366,7 +363,7 @@ class Ycb(Prop):
 
     @property
     def prop(self) -> Prop:
-        """The proxy, as it stands or lies."""
+        """Proxy of the object, standing or lying."""
         prop = self.row.prop
         if self.lies and isinstance(prop, Carton):
             return replace(prop, width=prop.height, height=prop.width)
@@ -374,12 +371,12 @@ class Ycb(Prop):
 
     @property
     def told(self) -> dict[str, float]:
-        """A feature of scenarios with a scan in the place of the proxy; none of others."""
+        """Features for scenarios: `scanned` if a scan replaces the proxy, else none."""
         return {"scanned": 1.0} if self.scan else {}
 
     @property
     def mass(self) -> float:
-        """[kg]"""
+        """Mass [kg]."""
         return float(self.spec().compile().body_mass.sum())
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
@@ -387,24 +384,24 @@ class Ycb(Prop):
 
 
 def by_name() -> dict[str, Ycb]:
-    """Every object by what it is called in `Ycb.scans`."""
+    """Every object by its key in `Ycb.scans`."""
     every = (Ycb(item=item, low=low) for low in (0, 1) for item in range(len(ITEMS)))
     return {thing.called: thing for thing in every}
 
 
 SCAN_FILES = ("google_16k/textured.obj", "textured.obj", "google_16k/nontextured.stl", "google_16k/nontextured.ply")
-"""Where the scan of an object lies in its folder, best first."""
+"""Files in an object's folder that may hold its scan, best first."""
 
 
 def mesh_of(folder: Path | str, item: Item) -> Path:
-    """The scan of an object in a folder that holds the set, or a part of it.
+    """File of an object's scan in a folder that holds the set, or a part of it.
 
     Raises:
-        BadConfig: it is not there.
+        BadConfig: there is no such folder or scan.
     """
     place = Path(folder)
     if not place.is_dir():
-        raise BadConfig(f"ycb = {cut(str(folder))} is no folder; name the one that holds {item.folder}")
+        raise BadConfig(f"ycb = {cut(str(folder))} is not a folder; name the one that holds {item.folder}")
     for name in SCAN_FILES:
         if (place / item.folder / name).is_file():
             return place / item.folder / name

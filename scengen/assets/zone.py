@@ -1,4 +1,4 @@
-"""A square zone on the table with one, two or three bars beside it. Nothing collides with it."""
+"""A square zone on the table with one, two or three bars beside it. It has no collisions."""
 
 from dataclasses import dataclass
 
@@ -8,23 +8,24 @@ from ..params import param
 from .prop import Prop, Rgba, show, shown
 
 SHEET_THICKNESS = 0.001
-"""Thickness [m]: enough to be drawn before the table."""
+"""Thickness of the zone [m]: enough to be drawn in front of the table."""
 BAR_SIZE = (0.006, 0.024)
-"""Width and length of a bar [m]; they stand as far apart as they are wide."""
+"""Width and length of a bar [m]. The gaps between bars are as wide as the bars."""
 BAR_DISTANCE = 0.020
-"""From the edge of the zone to the middle of the bars [m]."""
+"""Distance from the edge of the zone to the middle of the bars [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Zone(Prop):
-    """The origin is its middle; the bars stand beyond it along x, away from the robot."""
+    """A zone. The origin is its middle; the bars are beyond it along x, away from the robot."""
 
     size: float = param(0.10, "m", 0.04, 0.20)
     """Length of a side."""
     label: int = 1
-    """How many bars; no parameter: the family decides what a zone is for."""
+    """Number of bars. The family sets it, as it decides the purpose of a zone."""
     rgba: Rgba = (0.86, 0.88, 0.92, 1.0)
     ink: Rgba = (0.12, 0.14, 0.20, 1.0)
+    """Colour of the bars."""
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half = self.size / 2

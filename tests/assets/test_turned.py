@@ -204,12 +204,12 @@ def test_underneath_two_faces_of_a_cup_that_are_seen_do_not_lie_in_one_plane():
 @settings(max_examples=25, deadline=None)
 def test_a_ball_may_lie_anywhere_against_the_inner_sphere_of_a_bowl(bowl, turn, tilt):
     radius = 0.010
-    low, high = (bowl.inner * math.cos(a) for a in (bowl._first, bowl._first + 5 * bowl._step))
+    low, high = (bowl.inner * math.cos(a) for a in (bowl._foot_angle, bowl._foot_angle + 5 * bowl._band_angle))
     up = low + tilt * (high - low)
     away = bowl.inner - radius
     out = np.array([math.cos(turn), math.sin(turn)]) * math.sqrt(1 - (up / bowl.inner) ** 2)
     spot = np.array([*(away * out), bowl.centre - away * up / bowl.inner])
-    bead = bowl._corner(bowl.outer - bowl.bead, bowl._first + 6 * bowl._step)
+    bead = bowl._corner(bowl.outer - bowl.bead, bowl._foot_angle + 6 * bowl._band_angle)
     off_bead = math.hypot(math.hypot(*spot[:2]) - bead[0], spot[2] - bead[1])
     if spot[2] - radius > bowl.floor and off_bead > radius + 0.001:
         assert probed(bowl, [spot], radius - 1e-5) == 0
@@ -239,7 +239,7 @@ def test_a_straight_cup_has_the_inertia_of_a_tube_and_a_disc(mass, radius, heigh
 def test_a_bowl_has_nearly_the_mass_in_its_shell_that_two_spheres_enclose(bowl):
     """Zone of a sphere between two angles: 2 pi (R^3 - r^3) / 3 times the difference of the cosines."""
     shell = [s.moments()[0] for s in bowl.sections if s.name.startswith("shell")]
-    first, last = bowl._first, bowl._first + 6 * bowl._step
+    first, last = bowl._foot_angle, bowl._foot_angle + 6 * bowl._band_angle
     zone = (bowl.outer**3 - bowl.inner**3) / 3 * (math.cos(first) - math.cos(last))
     assert 0.8 * zone < sum(shell) < zone
 

@@ -183,7 +183,7 @@ class TestScans:
             mesh_of(tmp_path, ITEMS[9])
         with pytest.raises(BadConfig, match="024_bowl holds no scan; expected one of google_16k/textured.obj"):
             mesh_of(tmp_path, ITEMS[10])
-        with pytest.raises(BadConfig, match="ycb = .*nowhere is no folder; name the one that holds 029_plate"):
+        with pytest.raises(BadConfig, match="ycb = .*nowhere is not a folder; name the one that holds 029_plate"):
             mesh_of(tmp_path / "nowhere", ITEMS[12])
 
     def test_folders_are_named_as_in_the_set(self):

@@ -121,7 +121,7 @@ def test_a_pool_with_scans_stands_alone(folder, tmp_path, capsys):
     [
         (["task=pick_place_ycb"], "no folder 005_tomato_soup_can"),
         (["task=domino_single"], "task domino_single has no YCB object; name one that has, or leave ycb= out"),
-        (["task=pick_place_ycb", ONE, "ycb=nowhere"], "ycb = nowhere is no folder"),
+        (["task=pick_place_ycb", ONE, "ycb=nowhere"], "ycb = nowhere is not a folder"),
     ],
 )
 def test_what_is_not_there_is_said_in_one_line(folder, arguments, says, capsys):
