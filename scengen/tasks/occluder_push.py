@@ -7,23 +7,23 @@
 
                      [patch]
 
-Bottleneck: what is under a lid shows only once the lid is off, and nothing else tells the cubes apart. Another cube
-that is let go on the patch loses the episode, so that one has to look before anything is brought there.
+Bottleneck: the colour of a cube is visible only once its lid is off, and nothing else tells the cubes apart. Releasing
+another cube on the patch loses the episode, so the robot must look before it brings a cube there.
 
-A lid is twice as wide as the jaw opens and lies 25 mm above the table, flat: there is nothing on it to take hold of. It
-is pushed off its cube. The open jaw does that best: one finger on either side pushes the lid straight, and the cube
-passes between the two. The cube stays where it is: friction under it carries cube and lid, friction on top of it the
-lid alone, and scenarios whose lids are so rough that this is not enough are refuted.
+A lid is twice as wide as the jaw opens and lies flat, 25 mm above the table: it has nothing to grasp. It is pushed off
+its cube. The open jaw does that best: one finger on either side pushes the lid straight, and the cube passes between
+the two. The cube stays in place: friction under it carries cube and lid, friction on top of it the lid alone. Scenarios
+whose lids are too rough for this are refuted.
 
 Decisions where the paper (App. B, T26) is silent:
 
-* Hidden means: no camera of the table sees any of a cube. That is exact, not sampled: a flat lid hides a cube
-  if its foot, projected from the camera onto the lid's underside, lies within the lid.
-* Wrong is another cube that stands on the patch and is not held. The paper has no rule; without one a policy could
-  bring cube after cube until one of them counts.
-* Chance: training has three places for the red cube; who always looks under the same lid only is right in a third.
-* The paper's axis stacks two or three lids more on the target. Here every cube gets as many: a single pile would name
-  the target.
+* Hidden means: no camera of the table sees any part of a cube. That is exact, not sampled: a flat lid hides a cube if
+  its foot, projected from the camera onto the lid's underside, lies within the lid.
+* Another cube is wrong if it stands on the patch and is not held. The paper has no such rule; without one, a policy
+  could bring cube after cube until one of them counts.
+* Chance: training has three places for the red cube; a policy that always uncovers the same one is right in a third.
+* The paper's axis stacks two or three lids more on the target. Here every cube gets as many, because a single pile
+  would mark the target.
 """
 
 import functools
@@ -47,35 +47,31 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, STEADY, closing_along, go_to, push, retreat
 
-COUNT = 3
+CUBE_COUNT = 3
 RED: Rgba = (0.82, 0.20, 0.15, 1.0)
-OTHERS: tuple[tuple[Rgba, Rgba], ...] = (
+OTHER_COLOURS: tuple[tuple[Rgba, Rgba], ...] = (
     ((0.20, 0.36, 0.66, 1.0), (0.92, 0.78, 0.20, 1.0)),
     ((0.93, 0.48, 0.12, 1.0), (0.80, 0.24, 0.52, 1.0)),
 )
 """Colours of the other cubes, by `likeness`: blue and yellow, orange and magenta."""
-STANDS = 0.01
-"""Speed below which a cube stands [m/s]."""
-TOLERANCE = 1e-10
-"""Solver tolerance: at MuJoCo's 1e-8 of the scene's inertia, mostly the arm's, cubes of 30 g under lids never rest."""
-LOW = TIP_BELOW + 0.010
-"""Height of the grip site over the table while it pushes [m]: the tips are below the lid, the palm is 50 mm up."""
-GENTLE = 0.10
-"""How fast a lid is pushed [m/s]."""
-BEHIND, BEYOND = 0.02, 0.032
-"""How far behind a lid the hand comes down, and how far past the cube's middle it pushes [m]: there the lid's edge is 3
-cm past the cube, and the fingers come down beside the cube without touching the lid."""
-PRESSED = 2.5
-"""How long a hand that comes down on something tries [s]; down to the table it takes 1.6 s."""
-AIR = 0.008
-"""Least space between what is pushed and what stands beside its way [m]."""
-OVER = 0.08
-"""How far the hand goes up from the table between two pushes, and how far a cube is lifted [m]: piles stay below."""
+PUSH_HEIGHT = TIP_BELOW + 0.010
+"""Height of the grip site above the table during a push [m]: the tips are below the lid, the palm is 50 mm up."""
+PUSH_SPEED = 0.10
+"""Speed at which a lid is pushed [m/s]."""
+APPROACH_DISTANCE = 0.02
+"""Distance behind a lid at which the hand comes down [m]."""
+PUSH_DISTANCE = 0.032
+"""Distance past the cube's middle to which the hand pushes [m]: there the lid's edge is 3 cm past the cube, and the
+fingers come down beside the cube without touching the lid."""
+MIN_CLEARANCE = 0.008
+"""Least clearance between a pushed body and the bodies beside its way [m]."""
+CARRY_HEIGHT = 0.08
+"""Height above the table to which the hand moves between two pushes, and to which a cube is lifted [m]: above piles."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """Where a cube stands, and how it and its lids are turned."""
+    """Place of a cube, and yaw of the cube and its lids."""
 
     x: float = param(-0.01, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
@@ -91,11 +87,11 @@ class OccluderPush(Scenario):
 
     HOLD = 0.3
 
-    red: int = param(1, "0 left, 1 middle, 2 right", 0, COUNT - 1, hidden=True)
+    red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True)
     likeness: int = param(0, "0 = blue and yellow, 1 = orange and magenta", 0, 1)
-    """What colours the other two have."""
+    """Colours of the other two cubes."""
     lids: int = param(1, "lids", 1, 5)
-    """On every cube."""
+    """Number of lids on each cube."""
     left: Spot = Spot(y=0.235)
     middle: Spot = Spot(x=0.08)
     right: Spot = Spot(y=-0.235)
@@ -109,9 +105,10 @@ class OccluderPush(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
-        scene.option.tolerance = TOLERANCE
+        # at MuJoCo's 1e-8 of the scene's inertia, mostly the arm's, cubes of 30 g under lids never rest
+        scene.option.tolerance = 1e-10
         place(scene, self.patch, "patch", self.goal, free=False)
-        others = iter(OTHERS[self.likeness])
+        others = iter(OTHER_COLOURS[self.likeness])
         for i, (cube, spot) in enumerate(zip(self.cubes, self.spots, strict=True)):
             yaw = math.radians(spot.yaw)
             coloured = replace(self.cube, rgba=RED if i == self.red else next(others))
@@ -125,7 +122,7 @@ class OccluderPush(Scenario):
 
     def success(self, world: World) -> bool:
         red = self.cubes[self.reddest(world)]
-        return self.on_patch(world, red) and rests_on(world, red, "table") and still(world, red, STANDS)
+        return self.on_patch(world, red) and rests_on(world, red, "table") and still(world, red, 0.01)
 
     def failure(self, world: World) -> str | None:
         red = self.cubes[self.reddest(world)]
@@ -136,10 +133,10 @@ class OccluderPush(Scenario):
         return "the red cube fell off the table" if fallen(world, red) else None
 
     def reddest(self, world: World) -> int:
-        """Which cube is the red one, by its colour in the scene."""
+        """Index of the red cube, by its colour in the scene."""
         model = world.model
         colours = [model.geom_rgba[model.body_geomadr[world.body(cube)]] for cube in self.cubes]
-        return min(range(COUNT), key=lambda i: float(np.abs(colours[i] - RED).sum()))
+        return min(range(CUBE_COUNT), key=lambda i: float(np.abs(colours[i] - RED).sum()))
 
     def on_patch(self, world: World, cube: str) -> bool:
         return over(world, cube, self.goal, self.patch.size / 2)
@@ -147,128 +144,130 @@ class OccluderPush(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Push lids off, one cube after the other, until the red one shows; bring that to the patch."""
-        for i in range(COUNT):
+        """Push the lids off one cube after the other until the red one is visible; bring it to the patch."""
+        for i in range(CUBE_COUNT):
             yield from self.uncover(world, i)
             if i == self.reddest(world):
                 yield from self.deliver(world, i)
                 return
 
     def uncover(self, world: World, i: int) -> Plan:
-        """Come down behind the lids with the open jaw and push them off, with the cube passing between the fingers."""
-        arm, way, cube = world.arm, self.ways[i], world.com(self.cubes[i])
-        behind = self.behind(i) + LOW * UP
-        rot = closing_along(arm, np.cross(UP, way))
-        yield from go_to(arm, behind + OVER * UP, rot, COARSE, OPEN)
-        yield from go_to(arm, behind, rot, STEADY, OPEN)
-        yield from push(arm, GENTLE * way, lambda: float((arm.hand - cube) @ way) >= BEYOND, OPEN, give_up=6.0)
-        yield from retreat(arm, OVER)
+        """Come down behind the lids with the open jaw and push them off; the cube passes between the fingers."""
+        arm, along, cube = world.arm, self.directions[i], world.com(self.cubes[i])
+        start = self.push_start(i) + PUSH_HEIGHT * UP
+        rot = closing_along(arm, np.cross(UP, along))
+        yield from go_to(arm, start + CARRY_HEIGHT * UP, rot, COARSE, OPEN)
+        yield from go_to(arm, start, rot, STEADY, OPEN)
+        past = lambda: float((arm.hand - cube) @ along) >= PUSH_DISTANCE  # noqa: E731
+        yield from push(arm, PUSH_SPEED * along, past, OPEN, give_up=6.0)
+        yield from retreat(arm, CARRY_HEIGHT)
 
     def deliver(self, world: World, i: int) -> Plan:
         """Take a cube and put it down on the patch."""
         half = self.cube.edge / 2
         at = self.foot(i) * [1.0, 1.0, 0.0] + (TABLE_TOP + max(half, TIP_BELOW + 0.005)) * UP
         at[:2] = world.com(self.cubes[i])[:2]
-        yield from pick(world.arm, at, np.cross(UP, self.ways[i]), above=OVER, lift=OVER)
-        yield from put(world.arm, self.cubes[i], self.goal + half * UP, on="table", hover=OVER)
+        yield from pick(world.arm, at, np.cross(UP, self.directions[i]), above=CARRY_HEIGHT, lift=CARRY_HEIGHT)
+        yield from put(world.arm, self.cubes[i], self.goal + half * UP, on="table", hover=CARRY_HEIGHT)
         yield from retreat(world.arm)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        other = (self.red + 1) % COUNT
+        other = (self.red + 1) % CUBE_COUNT
         return {
             "reach_through_the_lid": Shortcut(self._reach_through, to_rest=True),
             "pick_the_lid_up": Shortcut(self._pick_lid, to_rest=True),
             "shove_hard": Shortcut(self._shove),
-            "take_another": Shortcut(lambda world: self._answer(world, other)),
+            "take_another": Shortcut(lambda world: self._look_under(world, other)),
         }
 
     def _reach_through(self, world: World) -> Plan:
-        """Come down where the red cube is, as if nothing covered it, close, bring what is held to the patch."""
-        yield from self._clutch(world, self.foot(self.red), np.cross(UP, self.ways[self.red]))
+        """Come down on the red cube as if nothing covered it, close, move to the patch."""
+        yield from self._grasp_and_deliver(world, self.foot(self.red), np.cross(UP, self.directions[self.red]))
 
     def _pick_lid(self, world: World) -> Plan:
-        """Take hold of the red cube's lid at its edge and bring it to the patch."""
-        way = self.ways[self.red]
-        yield from self._clutch(world, self.foot(self.red) - self.lid.width / 2 * way, way)
+        """Grasp the red cube's lid at its edge and bring it to the patch."""
+        along = self.directions[self.red]
+        yield from self._grasp_and_deliver(world, self.foot(self.red) - self.lid.width / 2 * along, along)
 
     def _shove(self, world: World) -> Plan:
-        """Push lid and cube as fast as the arm goes, with closed fingers; then take the cube where it was."""
-        arm, way, foot = world.arm, self.ways[self.red], self.foot(self.red)
-        behind = self.behind(self.red) + LOW * UP
-        yield from poke(arm, behind, 0.3 * way, lambda: float((arm.hand - foot) @ way) >= 0.05, above=OVER)
-        yield from self._clutch(world, foot, np.cross(UP, way))
+        """Push lid and cube with closed fingers at full speed; then grasp the cube where it was."""
+        arm, along, foot = world.arm, self.directions[self.red], self.foot(self.red)
+        start = self.push_start(self.red) + PUSH_HEIGHT * UP
+        yield from poke(arm, start, 0.3 * along, lambda: float((arm.hand - foot) @ along) >= 0.05, above=CARRY_HEIGHT)
+        yield from self._grasp_and_deliver(world, foot, np.cross(UP, along))
 
-    def _clutch(self, world: World, spot: Vec3, closing: Vec3) -> Plan:
-        """Come down on a spot with the open jaw, press as long as something is in the way, close, take that along."""
+    def _grasp_and_deliver(self, world: World, spot: Vec3, closing: Vec3) -> Plan:
+        """Come down on a place with the open jaw, close, move to the patch and let go."""
         arm = world.arm
-        yield from go_to(arm, spot + (LOW + 2 * OVER) * UP, closing_along(arm, closing), COARSE, OPEN)
-        end = world.time + PRESSED
-        yield from push(arm, -GENTLE * UP, lambda: arm.hand[2] <= TABLE_TOP + LOW or world.time >= end)
+        yield from go_to(arm, spot + (PUSH_HEIGHT + 2 * CARRY_HEIGHT) * UP, closing_along(arm, closing), COARSE, OPEN)
+        end = world.time + 2.5  # the way down to the table takes 1.6 s; a blocked hand presses until then
+        yield from push(arm, -PUSH_SPEED * UP, lambda: arm.hand[2] <= TABLE_TOP + PUSH_HEIGHT or world.time >= end)
         yield from grasp(arm)
-        yield from retreat(arm, OVER)
-        yield from go_to(arm, self.goal + (LOW + OVER) * UP, pace=COARSE)
+        yield from retreat(arm, CARRY_HEIGHT)
+        yield from go_to(arm, self.goal + (PUSH_HEIGHT + CARRY_HEIGHT) * UP, pace=COARSE)
         yield from release(arm)
 
-    def _answer(self, world: World, i: int) -> Plan:
-        """Look under one lid only, and take what is there."""
+    def _look_under(self, world: World, i: int) -> Plan:
+        """Uncover one cube only and deliver it."""
         yield from self.uncover(world, i)
         yield from self.deliver(world, i)
 
     def answer(self) -> Answer:
-        """Under which lid the red cube is. One try: another cube on the patch is the end."""
-        numbers = tuple(float(i) for i in range(COUNT))
+        """Place of the red cube. One try: another cube on the patch ends the episode."""
+        numbers = tuple(float(i) for i in range(CUBE_COUNT))
         return Answer(
             numbers,
-            lambda world, number: self._answer(world, round(number)),
+            lambda world, number: self._look_under(world, round(number)),
             lambda number: round(number) == self.red,
             tries=1,
         )
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """The same scene to the eye, with the red cube under the next lid."""
-        return {"red_elsewhere": replace(self, red=(self.red + 1) % COUNT).build()}
+        """The scene looks the same, with the red cube under the next lid."""
+        return {"red_elsewhere": replace(self, red=(self.red + 1) % CUBE_COUNT).build()}
 
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        edge, most = self.cube.edge, OPEN_GAP - 2 * AIR
+        edge, most = self.cube.edge, OPEN_GAP - 2 * MIN_CLEARANCE
         yield require(edge <= most, "the open jaw does not pass by a cube", edge=edge, most=most)
-        yield require(self.shade > 0.0, "a camera sees part of a cube", shade=self.shade)
+        yield require(self.hiding_margin > 0.0, "a camera sees part of a cube", shade=self.hiding_margin)
         fingers = self.lid.width - SPAN
         yield require(fingers >= 0.0, "the fingers of the open jaw pass by a lid", overlap=fingers)
         load, under = self.lids * self.lid.mass, self.cube.friction
         drag, hold = max(self.lid.friction, under) * load, under * (load + self.cube.mass)
         yield require(drag < hold, "a cube goes along with its lids", drag=drag, hold=hold)
-        yield on_table("a lid or the patch", [*self.outlines, self.square])
-        apart = min(gap(one, other) for one, other in combinations([*self.outlines, self.square], 2))
-        yield require(apart >= AIR, "lids or the patch lie too near to each other", apart=apart)
-        yield require(len(self.ways) == COUNT, "there is no room to push the lids off", ways=len(self.ways))
-        starts = [self.behind(i) for i in range(COUNT)]
-        ends = [self.foot(i) + BEYOND * way for i, way in enumerate(self.ways)]
-        yield within_reach("a cube or the patch", *(at + LOW * UP for at in (*starts, *ends, self.goal)))
+        yield on_table("a lid or the patch", [*self.lid_outlines, self.patch_outline])
+        apart = min(gap(one, other) for one, other in combinations([*self.lid_outlines, self.patch_outline], 2))
+        yield require(apart >= MIN_CLEARANCE, "lids or the patch lie too near to each other", apart=apart)
+        ways = len(self.directions)
+        yield require(ways == CUBE_COUNT, "there is no room to push the lids off", ways=ways)
+        starts = [self.push_start(i) for i in range(CUBE_COUNT)]
+        ends = [self.foot(i) + PUSH_DISTANCE * along for i, along in enumerate(self.directions)]
+        yield within_reach("a cube or the patch", *(at + PUSH_HEIGHT * UP for at in (*starts, *ends, self.goal)))
 
     def features(self) -> Mapping[str, float]:
-        """How high lids lie and how far they stand out [m], their drag over g [kg], the way most askew [rad]."""
+        """Height of the pile and overhang of the lids [m], their drag over g [kg], and turn of the pushes [rad]."""
         return {
             "pile": self.lids * self.lid.thickness,
             "overhang": (self.lid.width - self.cube.edge) / 2,
             "drag": self.lids * self.lid.mass * self.lid.friction,
-            "most_turned_way": max((abs(math.atan2(way[1], way[0])) for way in self.ways), default=0.0),
+            "most_turned_way": max((abs(math.atan2(along[1], along[0])) for along in self.directions), default=0.0),
         }
 
     # --- geometry -------------------------------------------------------------------------
 
     @property
     def spots(self) -> tuple[Spot, ...]:
-        """From left to right."""
+        """Places of the cubes, from left to right."""
         return self.left, self.middle, self.right
 
     @property
     def cubes(self) -> tuple[str, ...]:
-        """Names, from left to right: they say nothing about colours."""
-        return tuple(f"cube_{i}" for i in range(COUNT))
+        """Names of the cubes, from left to right, independent of their colours."""
+        return tuple(f"cube_{i}" for i in range(CUBE_COUNT))
 
     @property
     def goal(self) -> Vec3:
@@ -276,66 +275,67 @@ class OccluderPush(Scenario):
         return np.array([self.patch_x, self.patch_y, TABLE_TOP])
 
     def foot(self, i: int) -> Vec3:
-        """Where the middle of a cube's foot stands [m]."""
+        """Initial position of the middle of a cube's foot [m]."""
         return np.array([self.spots[i].x, self.spots[i].y, TABLE_TOP])
 
     @property
-    def outlines(self) -> list[Outline]:
-        """Of the lids at the start [m]."""
+    def lid_outlines(self) -> list[Outline]:
+        """Outlines of the lids at the start [m]."""
         return [corners([s.x, s.y], math.radians(s.yaw), [self.lid.width] * 2) for s in self.spots]
 
     @property
-    def square(self) -> Outline:
+    def patch_outline(self) -> Outline:
         """Outline of the patch [m]."""
         return corners(self.goal, 0.0, [self.patch.size] * 2)
 
     @property
-    def shade(self) -> float:
-        """How far inside the lids' edges the sight of a cube's foot from any camera at least ends [m]."""
+    def hiding_margin(self) -> float:
+        """Least distance from a lid's edge at which a camera's line of sight to a cube's foot meets the lid [m]."""
         least = math.inf
-        for (_, eye, _), (i, spot) in product(CAMERAS, enumerate(self.spots)):
+        for (_, camera, _), (i, spot) in product(CAMERAS, enumerate(self.spots)):
             foot, turn = self.foot(i), about_z(math.radians(spot.yaw))
-            share = self.cube.edge / (eye[2] - TABLE_TOP)  # of the way from the foot to the eye, up to the lid
+            share = self.cube.edge / (camera[2] - TABLE_TOP)  # of the line from the foot to the camera, up to the lid
             for corner in corners(foot, math.radians(spot.yaw), self.cube.size):
-                seen = (1 - share) * corner + share * np.array(eye[:2])
+                seen = (1 - share) * corner + share * np.array(camera[:2])
                 inside = self.lid.width / 2 - np.abs(turn.T[:2, :2] @ (seen - foot[:2])).max()
                 least = min(least, float(inside))
         return least
 
     @property
-    def ways(self) -> tuple[Vec3, ...]:
-        """Into which direction each lid is pushed: of its four sides' normals the first that leave room for all three.
+    def directions(self) -> tuple[Vec3, ...]:
+        """Direction in which each lid is pushed: the first normals of their sides with clearance for all three.
 
-        Straight ahead is tried first, then to the left, to the right and back.
+        Straight ahead is tried first, then to the left, to the right and back. Empty if there are none.
         """
-        return self._free_ways or ()
+        return self._free_directions or ()
 
     @functools.cached_property
-    def _free_ways(self) -> tuple[Vec3, ...] | None:
+    def _free_directions(self) -> tuple[Vec3, ...] | None:
         free: list[list[tuple[Vec3, Outline]]] = []
         for i, spot in enumerate(self.spots):
             normals = [about_z(math.radians(spot.yaw + turn))[:, 0] for turn in (0.0, 90.0, -90.0, 180.0)]
             swept = [(normal, self.swept(i, normal)) for normal in normals]
-            free.append([(way, area) for way, area in swept if area is not None])
+            free.append([(along, area) for along, area in swept if area is not None])
         apart = (
-            tuple(way for way, _ in choice)
+            tuple(along for along, _ in choice)
             for choice in product(*free)
-            if all(gap(one, other) >= AIR for (_, one), (_, other) in combinations(choice, 2))
+            if all(gap(one, other) >= MIN_CLEARANCE for (_, one), (_, other) in combinations(choice, 2))
         )
         return next(apart, None)
 
-    def behind(self, i: int) -> Vec3:
-        """Where on the table the hand begins to push [m]."""
-        return self.foot(i) - (self.lid.width / 2 + BEHIND) * self.ways[i]
+    def push_start(self, i: int) -> Vec3:
+        """Place on the table where the push begins [m]."""
+        return self.foot(i) - (self.lid.width / 2 + APPROACH_DISTANCE) * self.directions[i]
 
-    def swept(self, i: int, way: Vec3) -> Outline | None:
-        """What hand and lid pass over when it is pushed along `way` [m]; None if that is not free."""
-        start, end = self.lid.width / 2 + BEHIND + FINGER_ACROSS, BEYOND + FINGER_ACROSS + self.lid.width
-        yaw = math.atan2(way[1], way[0])
+    def swept(self, i: int, along: Vec3) -> Outline | None:
+        """Area over which hand and lid pass in a push along a direction [m]; None if it is not free."""
+        start = self.lid.width / 2 + APPROACH_DISTANCE + FINGER_ACROSS
+        end = PUSH_DISTANCE + FINGER_ACROSS + self.lid.width
+        yaw = math.atan2(along[1], along[0])
         middle = self.foot(i)
         area = corners(middle, yaw, [start + end, self.lid.width], [(end - start) / 2, 0.0])
         pushed = corners(middle, yaw, [end, self.lid.width], [end / 2, 0.0])
-        rest = middle + (end - self.lid.width / 2) * way
-        others = [outline for k, outline in enumerate(self.outlines) if k != i]
-        clear = all(gap(area, other) >= AIR for other in others) and gap(pushed, self.square) >= AIR
+        rest = middle + (end - self.lid.width / 2) * along
+        gaps = [gap(area, outline) for k, outline in enumerate(self.lid_outlines) if k != i]
+        clear = min([*gaps, gap(pushed, self.patch_outline)]) >= MIN_CLEARANCE
         return area if clear and on_table("a lid", rest, margin=0.02) is None else None

@@ -1,23 +1,25 @@
-"""T29 pick-place-ycb: put a thing on a green square that jumps away when it comes near.
+"""T29 pick-place-ycb: put an object on a green square that jumps away when the object comes near.
 
-      thing                        seen from above; the square lies at 0 when the thing is lifted, jumps to 1
-       ()  - - ->  [0]             when it is nearly there, then to 2, and there it is locked
+      thing                        seen from above; the square lies at 0 when the object is lifted, jumps to 1
+       ()  - - ->  [0]             when the object is near, then to 2, and there it is locked
                     .
                     . - - - [1]
            [2] - - - - - -'
 
-Bottleneck: the goal is where it is now, not where it was. Whoever goes through with the plan made at the start puts
-the thing down on bare table; how often the square jumps, and where to, is not known beforehand.
+Bottleneck: the goal moves. A policy that completes the plan made at the start puts the object down on bare table. How
+often the square jumps, and where to, is not known in advance.
 
 Decisions, where the paper (App. B, T29) says "when the lifted object approaches the patch, the patch teleports to a new
 location; after 1-3 relocations, the patch locks in place":
 
-* The square jumps when a thing that has been lifted once is within a distance of its middle, at whatever height: who
-  puts it down early and shoves it home gains nothing. The square never jumps to a place as near to the thing again.
-* It jumps a given way, to a place on the field in front of the robot, where all places can be reached.
-* Locked means that it lies with its dark side up; only then does it count. Nothing else shows it.
-* The objects are proxies, solids of their size, mass and balance (`assets.ycb`), or scans where `ycb=FOLDER` is given.
-  Cartons lie on their narrow side, as a jaw must take them; the master chef can of the paper's list is too wide for it.
+* The square jumps when an object that has been lifted once is within a distance of its middle, at any height: putting
+  the object down early and pushing it to the square gains nothing. The square never jumps to a place as near to the
+  object.
+* It jumps a given distance, to a place on the field in front of the robot, where all places can be reached.
+* Locked means that its dark side is up; only then does it count. Nothing else shows it.
+* The objects are proxies, solids of their size, mass and balance (`assets.ycb`), or the scans if `ycb=FOLDER` is given.
+  Cartons lie on their narrow side, as a jaw must grasp them; the master chef can of the paper's list is too wide for
+  it.
 """
 
 import functools
@@ -41,34 +43,33 @@ from ..skills.grip import take
 from ..skills.jaw import carry, put, release
 from ..skills.motion import Condition, Pace, retreat
 
-LIFTED = 0.03
-"""How far the thing's centre of mass must have been above where it stood [m]."""
-RAISED = 0.07
-"""How high the oracle carries it [m]; a thing lost there falls on the face that it stood on."""
-CALM = 0.02
-"""Speed below which a thing counts as at rest [m/s]."""
-BRISK = Pace(0.2, 0.01)
-"""How fast the oracle carries."""
+MIN_LIFT = 0.03
+"""Height of the object's centre of mass above its stand from which the object counts as lifted [m]."""
+CARRY_HEIGHT = 0.07
+"""Height at which the oracle carries the object [m]; an object lost there falls on the face on which it stood."""
+CARRY_PACE = Pace(0.2, 0.01)
+"""Pace at which the oracle carries."""
 FIELD = np.array([[-0.22, 0.05], [-0.32, 0.32]])
-"""Where the middle of the square can be, in x and y [m]: 0.34 to 0.69 from the robot's first axis, where a hand that
-points down comes without leaning or folding up."""
-APART = 0.03
-"""By how much farther than `near` the thing is from the square after any jump [m]."""
+"""Range of the middle of the square, in x and y [m]: 0.34 to 0.69 from the robot's first axis, where a hand that points
+down comes without leaning or folding up."""
+JUMP_MARGIN = 0.03
+"""Distance, in excess of `near`, of the object from the square after any jump [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Jump:
-    """Where the square goes."""
+    """Distance and direction of a jump of the square."""
 
     way: float = param(0.24, "m", 0.05, 0.60, hidden=True)
-    """How far."""
+    """Distance of the jump."""
     share: float = param(0.5, "1", 0.0, 0.999, hidden=True)
-    """Which way: of all whole degrees that end on the field, counted from x to the left, how many are skipped."""
+    """Direction of the jump: the directions in whole degrees that end on the field are counted from x to the left, and
+    this share of them is skipped."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PickPlaceYcb(Scenario):
-    """A thing on the table, and a green square that has still to jump a few times."""
+    """An object on the table, and a green square that is going to jump a few times."""
 
     HOLD = 0.5
     NO_ABLATIONS = "the scene holds nothing that helps; a square that stays would leave less to do"
@@ -76,11 +77,11 @@ class PickPlaceYcb(Scenario):
     x: float = param(-0.05, "m", -0.4, 0.4)
     y: float = param(0.15, "m", -0.4, 0.4)
     yaw: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
-    """Of the thing; at 90 the narrow side of every box and tin lies along y."""
+    """Yaw of the object; at 90 the narrow side of every box and tin lies along y."""
     goal_x: float = param(-0.05, "m", -0.4, 0.4)
     goal_y: float = param(-0.15, "m", -0.4, 0.4)
     near: float = param(0.075, "m", 0.01, 0.25, hidden=True)
-    """Distance of the thing from the middle of the square at which that jumps, seen from above."""
+    """Distance of the object from the middle of the square at which the square jumps, seen from above."""
     jumps: int = param(2, "jumps", 0, 5, hidden=True)
     jump_0: Jump = Jump()
     jump_1: Jump = Jump()
@@ -99,7 +100,7 @@ class PickPlaceYcb(Scenario):
         place(scene, self.patch, "patch", self.spots[0], free=False)
         scene.body("patch").mocap = True
         if not self.jumps:
-            scene.body("patch").quat = TURNED_OVER
+            scene.body("patch").quat = np.array(TURNED_OVER)
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -108,17 +109,17 @@ class PickPlaceYcb(Scenario):
         if not world.memory["lifted"] or world.memory["jumps"] < self.jumps:
             return False
         placed = over(world, "thing", world.pos("patch"), self.patch.size / 2) and rests_on(world, "thing", "table")
-        return placed and still(world, "thing", CALM)
+        return placed and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
         return "the thing fell off the table" if fallen(world, "thing") else None
 
     def events(self, world: World) -> None:
-        """Notice that the thing is lifted, and let the square jump away from it."""
+        """Notice that the object is lifted, and let the square jump away from it."""
         memory, at = world.memory, world.com("thing")
         if world.touching("thing", "table"):
             memory["stood"] = at[2]
-        elif at[2] - memory["stood"] >= LIFTED and held(world, "thing"):
+        elif at[2] - memory["stood"] >= MIN_LIFT and held(world, "thing"):
             memory["lifted"] = 1.0
         jumps = int(memory["jumps"])
         if memory["lifted"] and jumps < self.jumps and math.dist(at[:2], self.spots[jumps][:2]) <= self.near:
@@ -126,26 +127,26 @@ class PickPlaceYcb(Scenario):
             world.move("patch", self.spots[jumps + 1], TURNED_OVER if jumps + 1 == self.jumps else (1, 0, 0, 0))
 
     def pending(self, world: World) -> bool:
-        """Never: the square moves only where the thing is brought near."""
+        """Never: the square moves only when the object is brought near."""
         return False
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Pick up, follow the square until it is locked, put down on it."""
-        yield from take(world.arm, "thing", lift=RAISED)
+        """Pick the object up, follow the square until it is locked, put the object down on it."""
+        yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         while world.memory["jumps"] < self.jumps:
-            was = world.pos("patch")
-            yield from self.bring(world, was, ends=lambda was=was: math.dist(world.pos("patch"), was) > 0.0)
+            spot = world.pos("patch")
+            yield from self.bring(world, spot, ends=lambda spot=spot: math.dist(world.pos("patch"), spot) > 0.0)
         yield from self.set_down(world, world.pos("patch"))
 
-    def bring(self, world: World, spot: Vec3, height: float = RAISED, ends: Condition = lambda: False) -> Plan:
-        """Carry the thing over a place on the table, at a height above where it stood [m]."""
+    def bring(self, world: World, spot: Vec3, height: float = CARRY_HEIGHT, ends: Condition = lambda: False) -> Plan:
+        """Carry the object above a place on the table, at a height above where it stood [m]."""
         level = np.array([spot[0], spot[1], world.memory["stood"] + height])
-        yield from carry(world.arm, "thing", level, pace=BRISK, ends=ends)
+        yield from carry(world.arm, "thing", level, pace=CARRY_PACE, ends=ends)
 
     def set_down(self, world: World, spot: Vec3) -> Plan:
-        """Put the thing down at a place on the table [m], let go, go up."""
+        """Put the object down at a place on the table [m], let go, move up."""
         yield from self.bring(world, spot)
         yield from put(world.arm, "thing", [spot[0], spot[1], world.memory["stood"]], "table", hover=0.03)
         yield from retreat(world.arm, 0.06)
@@ -153,7 +154,7 @@ class PickPlaceYcb(Scenario):
     # --- shortcuts ------------------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """Where the square jumps once only, its second place is right."""
+        """Plans that do not follow the square; if it jumps only once, following it once is right."""
         found = {
             "put_it_where_the_square_was": Shortcut(self._first_plan, to_rest=True),
             "drag_it_there": Shortcut(self._drag, to_rest=True),
@@ -164,32 +165,32 @@ class PickPlaceYcb(Scenario):
         return found | one if self.jumps > 1 else found
 
     def _first_plan(self, world: World) -> Plan:
-        """Carry it to where the square was at the start."""
-        yield from take(world.arm, "thing", lift=RAISED)
+        """Carry the object to the initial place of the square."""
+        yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         yield from self.set_down(world, self.spots[0])
 
     def _follow_once(self, world: World) -> Plan:
-        """Go on to where the square has jumped to, and no farther."""
-        yield from take(world.arm, "thing", lift=RAISED)
+        """Carry the object to the square's second place, and no farther."""
+        yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         yield from self.bring(world, self.spots[0])
         yield from self.set_down(world, self.spots[1])
 
     def _drag(self, world: World) -> Plan:
-        """Draw it over the table to the square, which does not move for what has never been lifted."""
+        """Drag the object over the table to the square, which does not jump before the object is lifted."""
         yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, self.spots[0], height=0.0)
         yield from release(world.arm)
         yield from retreat(world.arm, 0.06)
 
     def _drag_and_lift(self, world: World) -> Plan:
-        """Draw it there, then make up for the lift."""
+        """Drag the object to the square, then lift it and put it down."""
         yield from self._drag(world)
-        yield from take(world.arm, "thing", lift=RAISED)
+        yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         yield from self.set_down(world, self.spots[0])
 
     def _short(self, world: World) -> Plan:
-        """Put it down as near to the square as that allows, and wait for it to stay."""
-        yield from take(world.arm, "thing", lift=RAISED)
+        """Put the object down 2 cm outside of the distance at which the square jumps."""
+        yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         back = self.start - self.spots[0]
         yield from self.set_down(world, self.spots[0] + (self.near + 0.02) * back / np.linalg.norm(back))
 
@@ -202,7 +203,7 @@ class PickPlaceYcb(Scenario):
         yield require(missing == 0, "the square has nowhere to jump to", jumps=self.jumps, missing=missing)
         inside = (FIELD[:, 0] <= spots[0][:2]) & (spots[0][:2] <= FIELD[:, 1])
         yield require(bool(inside.all()), "the square lies beyond the field", x=self.goal_x, y=self.goal_y)
-        least = 2 * self.near + APART
+        least = 2 * self.near + JUMP_MARGIN
         shortest = min((jump.way for jump in self.planned), default=least)
         yield require(shortest >= least, "the square jumps into the thing", way=shortest, least=least)
         away = math.dist(self.start, spots[0])
@@ -211,7 +212,7 @@ class PickPlaceYcb(Scenario):
         yield within_reach("the thing", self.start + 0.2 * UP)
 
     def features(self) -> Mapping[str, float]:
-        """How often and how far the square jumps [m], at what distance (in sizes of the square), and the mass [kg]."""
+        """Number and longest distance of jumps [m], distance `near` in sizes of the square, size [m], mass [kg]."""
         return {
             "number_of_jumps": float(self.jumps),
             "longest_jump": max((jump.way for jump in self.planned), default=0.0),
@@ -229,17 +230,17 @@ class PickPlaceYcb(Scenario):
 
     @property
     def start(self) -> Vec3:
-        """Where the thing stands [m]."""
+        """Initial position of the object's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
     def planned(self) -> tuple[Jump, ...]:
-        """The jumps that happen, in their order."""
+        """Jumps that happen, in their order."""
         return (self.jump_0, self.jump_1, self.jump_2, self.jump_3, self.jump_4)[: self.jumps]
 
     @functools.cached_property
     def spots(self) -> list[Vec3]:
-        """Where the square lies at the start and after each jump [m], as far as there are places for it."""
+        """Places of the square at the start and after each jump [m]; fewer if the field has no place for a jump."""
         found = [np.array([self.goal_x, self.goal_y, TABLE_TOP])]
         for jump in self.planned:
             ends = found[-1] + jump.way * np.array([heading(float(angle)) for angle in range(360)])

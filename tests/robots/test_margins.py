@@ -87,7 +87,7 @@ def test_the_square_lies_only_where_a_hand_that_points_down_comes():
     assert (ends.min(), ends.max()) == (pytest.approx(0.34, abs=0.005), pytest.approx(0.69, abs=0.005))
     for x in field[0]:
         for y in (*field[1], 0.0):
-            assert miss([x, y, TAKEN_AT + pick_place_ycb.RAISED], facing_down(), 0.05) < 1e-3, (x, y)
+            assert miss([x, y, TAKEN_AT + pick_place_ycb.CARRY_HEIGHT], facing_down(), 0.05) < 1e-3, (x, y)
 
 
 @pytest.mark.parametrize("side", [-1, 1])

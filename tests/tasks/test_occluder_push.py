@@ -23,7 +23,7 @@ from scengen.attack.priors import fit
 from scengen.geometry import UP
 from scengen.params import parameters
 from scengen.sim.world import IDLE, ROBOT
-from scengen.tasks.occluder_push import COUNT, OTHERS, RED, OccluderPush, Spot
+from scengen.tasks.occluder_push import CUBE_COUNT, OTHER_COLOURS, RED, OccluderPush, Spot
 
 TASK = load_task("occluder_push")
 SCENE = OccluderPush(red=0)
@@ -69,8 +69,8 @@ def test_no_camera_sees_any_corner_of_a_cube_at_the_start():
 @pytest.mark.parametrize(("more", "hidden"), [(-0.001, False), (0.001, True)])
 def test_the_shade_says_to_the_millimetre_when_a_lid_is_too_small_to_hide_a_cube(more, hidden):
     s = OccluderPush(left=Spot(y=0.235, yaw=10.0), right=Spot(y=-0.235, yaw=-5.0))
-    s = replace(s, lid=Lid(width=s.lid.width - 2 * s.shade + 2 * more))
-    assert s.shade == pytest.approx(more)
+    s = replace(s, lid=Lid(width=s.lid.width - 2 * s.hiding_margin + 2 * more))
+    assert s.hiding_margin == pytest.approx(more)
     assert (s.infeasible() is None) == hidden
     w = load(TASK, s)
     mujoco.mj_camlight(w.model, w.data)
@@ -89,11 +89,11 @@ def test_scenes_that_differ_in_where_the_red_cube_is_differ_in_colours_of_cubes_
 
 
 def test_no_colour_of_another_cube_is_nearer_to_red_than_red():
-    for likeness in range(len(OTHERS)):
-        for red in range(COUNT):
+    for likeness in range(len(OTHER_COLOURS)):
+        for red in range(CUBE_COUNT):
             s = OccluderPush(red=red, likeness=likeness)
             assert s.reddest(load(TASK, s)) == red
-    assert min(math.dist(RED[:3], colour[:3]) for colour in OTHERS[1]) > 0.2
+    assert min(math.dist(RED[:3], colour[:3]) for colour in OTHER_COLOURS[1]) > 0.2
 
 
 # --- pushing lids off ---------------------------------------------------------------------
@@ -149,7 +149,7 @@ def test_a_memorised_motion_serves_no_other_lids_and_no_other_patch(split):
 
 
 def test_the_red_cube_on_the_patch_is_the_goal_and_another_one_is_the_end():
-    for red in range(COUNT):
+    for red in range(CUBE_COUNT):
         w = ready(replace(SCENE, red=red), cube_0=SCENE.goal)
         assert SCENE.success(w) == (red == 0)
         assert SCENE.failure(w) == (None if red == 0 else WRONG)
@@ -184,7 +184,7 @@ class Bare(OccluderPush):
 
     def build(self):
         scene = super().build()
-        for i in range(COUNT):
+        for i in range(CUBE_COUNT):
             scene.delete(scene.body(f"lid_{i}_0"))
         return scene
 

@@ -20,7 +20,7 @@ from controls import (
 from scengen import load_task
 from scengen.assets.ycb import Ycb
 from scengen.episode import Episode
-from scengen.tasks.pick_place_ycb import APART, FIELD, LIFTED, Jump, PickPlaceYcb
+from scengen.tasks.pick_place_ycb import FIELD, JUMP_MARGIN, MIN_LIFT, Jump, PickPlaceYcb
 
 TASK = load_task("pick_place_ycb")
 NOMINAL = PickPlaceYcb()
@@ -91,7 +91,7 @@ def test_it_jumps_the_way_that_is_given_to_places_on_the_field_and_never_near_th
             ways = np.linalg.norm(np.diff(spots, axis=0), axis=1)
             assert ways == pytest.approx([jump.way for jump in scenario.planned])
             assert (FIELD[:, 0] <= spots[:, :2]).all() and (spots[:, :2] <= FIELD[:, 1]).all()
-            assert (ways - scenario.near >= scenario.near + APART - 1e-12).all()
+            assert (ways - scenario.near >= scenario.near + JUMP_MARGIN - 1e-12).all()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.999])
@@ -173,7 +173,7 @@ def test_a_lift_is_three_centimetres(height, counts):
     world = load(TASK, NOMINAL)
     with world.events():
         world.memory["stood"] = world.com("thing")[2]
-    world.data.joint("thing_free").qpos[2] += LIFTED + height
+    world.data.joint("thing_free").qpos[2] += MIN_LIFT + height
     world.restore(world.state())
     row = world.body("thing")
     world.loop.touching[row, -1] = world.loop.touching[-1, row] = 1  # the robot has the last row

@@ -26,7 +26,15 @@ from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW
 from scengen.sim.world import ROBOT
 from scengen.skills.grip import extent
 from scengen.skills.motion import go_to
-from scengen.tasks.slip_recovery import FLOWN, LIFTED, LOST, LOWERED, SLID, Slip, SlipRecovery
+from scengen.tasks.slip_recovery import (
+    FALL_TIME,
+    FLIGHT_DISTANCE,
+    MAX_SLIDE,
+    MIN_CARRY_HEIGHT,
+    MIN_LIFT,
+    Slip,
+    SlipRecovery,
+)
 
 TASK = load_task("slip_recovery")
 NOMINAL = SlipRecovery()
@@ -62,14 +70,14 @@ def test_it_slips_once_where_the_parameters_say(history):
     counts = [slips for _, slips, *_ in history]
     assert sorted(set(counts)) == [0.0, 1.0]
     at = counts.index(1.0)
-    raised = next(i for i, row in enumerate(history) if row[2][2] - history[0][2][2] >= LIFTED)
+    raised = next(i for i, row in enumerate(history) if row[2][2] - history[0][2][2] >= MIN_LIFT)
     come = math.dist(history[at][2][:2], history[raised][2][:2])
     assert come == pytest.approx(NOMINAL.distance(0), abs=0.006)  # two periods at 0.2 m/s, and one of raising
 
 
 def test_what_slips_falls_freely_and_is_below_the_finger_tips_before_the_shortest_slip_ends(history):
     at = next(i for i, row in enumerate(history) if row[1] == 1.0)
-    lost = history[at + round(LOST / Loop.PERIOD)]
+    lost = history[at + round(FALL_TIME / Loop.PERIOD)]
     assert not lost[3] and lost[4] > 0.0
     times = np.array([row[0] for row in history[at + 4 : at + 9]])
     heights = np.array([row[2][2] for row in history[at + 4 : at + 9]])
@@ -77,13 +85,13 @@ def test_what_slips_falls_freely_and_is_below_the_finger_tips_before_the_shortes
 
 
 def test_carried_means_higher_than_a_jaw_can_hold_a_thing_under_its_top():
-    assert LIFTED > LOWERED > PALM_ABOVE + TIP_BELOW
+    assert MIN_LIFT > MIN_CARRY_HEIGHT > PALM_ABOVE + TIP_BELOW
 
 
 def test_the_thing_flies_on_as_far_as_guesses_reckon(history):
     at = next(i for i, row in enumerate(history) if row[1] == 1.0)
     flown = math.dist(history[at + 40][2][:2], history[at][2][:2])
-    assert flown == pytest.approx(FLOWN, abs=0.006)
+    assert flown == pytest.approx(FLIGHT_DISTANCE, abs=0.006)
 
 
 @pytest.mark.parametrize("slips", [0, 2, 3])
@@ -109,7 +117,7 @@ def test_a_memorised_motion_serves_no_other_slip_place_or_pose(split):
 @pytest.mark.parametrize("off", [0.0, -0.05, 0.05])
 def test_a_blind_guess_serves_who_guesses_right(off):
     answer = NOMINAL.answer()
-    guess = NOMINAL.distance(0) + FLOWN + off
+    guess = NOMINAL.distance(0) + FLIGHT_DISTANCE + off
     assert answer.right(guess) == (off == 0.0)
     assert play(TASK, NOMINAL, lambda world: answer.act(world, guess)).solved == (off == 0.0)
 
@@ -152,7 +160,7 @@ def test_what_is_slid_is_lost(name):
     world = load(TASK, NOMINAL)
     ended = play_shortcut(TASK, NOMINAL, name, world)
     assert ended.outcome == "failure" and "slid" in ended.reason
-    assert SLID < world.memory["slid"] < SLID + 0.01
+    assert MAX_SLIDE < world.memory["slid"] < MAX_SLIDE + 0.01
 
 
 def nudge(scenario, world):
