@@ -1,7 +1,7 @@
 """Composition of settings by Hydra: the files in conf/ with the overrides of a command line, as plain data.
 
-Hydra's errors become one line each, with the nearest name or a remedy. Tasks are composed and loaded here too; settings
-of commands are checked in `scengen.commands.settings`.
+Tasks are composed and loaded here, too. Each of Hydra's errors becomes one line with the nearest name or a remedy.
+`scengen.commands.settings` turns the composed data of a command into checked settings.
 """
 
 import itertools
@@ -30,25 +30,27 @@ from .task_files import ORIGINS, category, conf_dir, groups, packages, search_pa
 from .typed import typed
 from .validate.settings import CertifySettings
 
+# --- tasks ------------------------------------------------------------------------------------
+
 
 def load_task(name: str, search: Sequence[str] = ()) -> Task:
-    """The task of that name.
+    """Load a task by its name.
 
     Args:
-        name: of its file, a plain word: it never leads out of the folders of tasks.
+        name: name of its file without `.yaml`. Paths are refused: a name from a pool must not leave the task folders.
         search: further overrides, such as folders of other packages (`search_path`) or `task.horizon=20`.
 
     Raises:
         UnknownName: there is no such file.
     """
-    if name not in (known := tasks(search_path(search))):  # a name from a pool must not leave the folders of task files
+    if name not in (known := tasks(search_path(search))):
         raise UnknownName("task", name, known)
-    return _loaded(name, search) if search else _installed(name, packages())
+    return _loaded(name, search) if search else _loaded_once(name, packages())
 
 
 @cache
-def _installed(name: str, others: tuple[str, ...]) -> Task:
-    """A task as its file stands; read once, as the code of its family is.
+def _loaded_once(name: str, others: tuple[str, ...]) -> Task:
+    """A task as its file defines it. It is read once, like the code of its family.
 
     Args:
         others: folders of other packages that offer tasks.
@@ -56,252 +58,34 @@ def _installed(name: str, others: tuple[str, ...]) -> Task:
     return _loaded(name, ())
 
 
-def _loaded(name: str, search: Sequence[str]) -> Task:
-    plain, choices = composed("one_task", [f"task={name}", *search])
+def _loaded(name: str, overrides: Sequence[str]) -> Task:
+    plain, choices = composed("one_task", [f"task={name}", *overrides])
     return load(choices["task"], plain["task"])
 
 
-def certify_levels(found: Task) -> dict[str, CertifySettings]:
-    """The settings that stand behind each name of a level, such as `quick`, for a task: without a command line."""
+# --- settings of certificates -----------------------------------------------------------------
+
+
+def certify_levels(task: Task) -> dict[str, CertifySettings]:
+    """Settings of the certificates of a task at each level of conf/certify, such as `quick`, by name of the level."""
     names = sorted(path.stem for path in (conf_dir() / "certify").glob("*.yaml"))
-    return {name: typed("certify", CertifySettings, settled({}, found, name)) for name in names}
+    return {name: typed("certify", CertifySettings, certify_node({}, task, name)) for name in names}
 
 
-def chosen_task(verb: str, overrides: Sequence[str]) -> str | None:
-    """Name of the task that a command line chooses, for a command that may go without; None if it does not.
+def certify_node(node: Mapping[str, Any], task: Task, level: str) -> dict[str, Any]:
+    """Settings of certificates as plain data: the file of the level, then those of the task, then the command line.
 
-    Raises:
-        ScengenError: one line that says what is wrong.
+    Args:
+        node: the composed settings, in which those of the task are not merged yet.
+        level: name of a file in conf/certify.
     """
-    return composed(verb, overrides)[1].get("task")
-
-
-@dataclass(frozen=True)
-class Combination:
-    """One of the command lines that a sweep stands for."""
-
-    overrides: tuple[str, ...]
-    swept: Mapping[str, str]
-    """The settings that name several values, and the one that each has here; empty where nothing is swept."""
-
-    def __str__(self) -> str:
-        return " ".join(f"{key}={value}" for key, value in self.swept.items())
-
-
-def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
-    """What a command line stands for in which settings name several values: `n=1,2`, or Hydra's choice, range, glob.
-
-    Raises:
-        ScengenError: one line that says what is wrong.
-    """
-    overrides = [_spelled_out(text) for text in overrides]
-    with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
-        parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
-        try:
-            choices = [_values(parser, _listed(text)) for text in overrides]
-        except HydraException as error:
-            raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
-    if (count := math.prod(len(values) for _, values in choices)) > MOST_COMBINATIONS:
-        raise BadConfig(f"{count} combinations of settings; give at most {MOST_COMBINATIONS} at once")
-    found = []
-    for picked in itertools.product(*(values for _, values in choices)):
-        swept = {key: v for (key, values), v in zip(choices, picked, strict=True) if key and len(values) > 1}
-        line = (f"{key}={value}" if key else value for (key, _), value in zip(choices, picked, strict=True))
-        found.append(Combination(tuple(line), swept))
-    return found
-
-
-MOST_COMBINATIONS = 1000
-"""How many runs one command line may ask for."""
-
-
-def _values(parser: OverridesParser, text: str) -> tuple[str, list[str]]:
-    """Key and values of an override that names several; else nothing, and the override as it is."""
-    override = _parsed(text, parser)
-    if override is None or not override.is_sweep_override():
-        return "", [text]
-    values = list(itertools.islice(override.sweep_string_iterator(), MOST_COMBINATIONS + 1))
-    if not values:
-        raise BadConfig(f"{cut(repr(text))} names no value; give at least one")
-    return override.get_key_element(), values
-
-
-def _spelled_out(text: str) -> str:
-    """`task=all`, a category as in `task=P3`, or a list in which such words stand, as a list of tasks."""
-    key, _, value = text.partition("=")
-    words = value.split(",")
-    if key != "task" or not any(re.fullmatch(f"{ALL}|P[1-9]|M", word) for word in words):
-        return text
-    known = tasks()
-    named = {word: known if word == ALL else [t for t in known if category(t) == word] for word in words}
-    return f"task={','.join(dict.fromkeys(t for word, found in named.items() for t in found or [word]))}"
-
-
-ALL = "all"
-"""Stands for all tasks."""
-
-
-def shown(verb: str, overrides: Sequence[str]) -> str:
-    """The composed configuration of a command as YAML: `--cfg job`.
-
-    Raises:
-        ScengenError: one line that says what is wrong.
-    """
-    plain, choices = composed(verb, overrides)
-    if {"certify", "task"} <= choices.keys():
-        plain["certify"] = settled(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
-    lines = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
-    told = {"sort_keys": False, "allow_unicode": True, "width": 120}
-    return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **told) for key, flow in lines.items())
-
-
-def show_origin(verb: str, overrides: Sequence[str], what: str) -> None:
-    """Print what Hydra tells of where a configuration comes from: `--info defaults`, for instance.
-
-    Raises:
-        ScengenError: one line that says what is wrong.
-    """
-    if what not in ORIGINS:
-        raise UnknownName("information of --info", what, ORIGINS)
-    composed(verb, overrides)
-    with _logging_kept(), initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
-        asked = [_listed(o) for o in overrides]
-        asked = _with_packages(asked) if groups(verb) else asked
-        GlobalHydra.instance().hydra.show_info(what, file(verb), asked)  # type: ignore[union-attr]
-
-
-@contextmanager
-def _logging_kept() -> Iterator[None]:
-    """Hydra prints through the root logger, which it sets up for that and leaves so."""
-    root_logger = logging.getLogger()
-    handlers, level = list(root_logger.handlers), root_logger.level
-    try:
-        yield
-    finally:
-        root_logger.handlers[:] = handlers
-        root_logger.setLevel(level)
-
-
-def _with_packages(overrides: Sequence[str]) -> list[str]:
-    """Overrides in which Hydra also searches installed packages, behind the folders that they name themselves."""
-    named, others = search_path(overrides), [o for o in overrides if not o.startswith("hydra.searchpath=")]
-    if not packages():
-        return [*named, *others]
-    given = [override.value() for text in named if (override := _parsed(text))]
-    folders = [folder for each in given for folder in (each if isinstance(each, list) else [each])]
-    return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
-
-
-def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
-    """The whole configuration as plain data, and which file was chosen in each group."""
-    with initialize_config_dir(str(root(verb)), version_base="1.3", job_name="scengen"):
-        try:
-            asked = [_listed(o) for o in overrides]
-            for override in asked:
-                _check_override(verb, override)
-            asked = _with_packages(asked) if groups(verb) else asked
-            node = compose(file(verb), overrides=asked, return_hydra_config=True)
-            choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
-            OmegaConf.set_struct(node, False)
-            del node["hydra"]
-            plain = OmegaConf.to_container(node, resolve=True)
-            return plain, choices  # type: ignore[return-value]
-        except (HydraException, OmegaConfBaseException) as error:
-            raise _explain(verb, overrides, error) from None
-        except yaml.YAMLError as error:
-            raise BadConfig(f"a configuration file is no YAML: {_first_lines(str(error))}; correct it") from None
-        except (ValueError, TypeError, AssertionError, RecursionError) as error:  # Hydra checks little of what it gets
-            raise BadConfig(f"{_first_lines(str(error))}; see scengen {verb} --help") from None
-
-
-def root(verb: str) -> Path:
-    """The folder in which Hydra finds the file of a command, and the groups from which it chooses files.
-
-    One that chooses none sees none: Hydra would take its setting `task` for a choice among the files of conf/task.
-    """
-    return conf_dir() if groups(verb) else conf_dir() / "command"
-
-
-def file(verb: str) -> str:
-    """The file of a command, as it is called in its `_root`."""
-    return f"command/{verb}" if groups(verb) else verb
-
-
-DEEPEST = 20
-"""How deeply lists and groups may be nested in an override: more than any file of conf/ needs."""
-
-
-def _check_override(verb: str, text: str) -> None:
-    """Refuse what Hydra takes for something that scengen does not do, or what it cannot digest.
-
-    Raises:
-        BadConfig: one line with the remedy.
-    """
-    told = cut(repr(text))
-    if _depth(text) > DEEPEST:
-        raise BadConfig(f"{told} is nested too deeply; quote it if the brackets are part of a name")
-    override = _parsed(text)
-    if override is None or not override.key_or_group:
-        raise BadConfig(f"{told} is no override; expected key=value, quoted if the value holds spaces or commas")
-    key = override.key_or_group
-    if override.package is not None:
-        raise BadConfig(f"{told}: settings have no package after @; see scengen {verb} --help")
-    if override.is_sweep_override():
-        raise BadConfig(f"{told} names several values; give one, or quote what is meant as a word: {key}='...'")
-    if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{told}: of Hydra's own settings give none but hydra.searchpath=[file:///folder]")
-    if override.is_delete() and "." not in key:
-        raise BadConfig(f"{told}: {key} cannot be deleted; leave it out for its default, or give another value")
-    if key == "hydra.searchpath":
-        folders = override.value()
-        for folder in folders if isinstance(folders, list) else [folders]:
-            if not re.match(r"(file|pkg)://.", str(folder)):
-                raise BadConfig(f"{told}: give a folder of configuration as file:///folder or pkg://package")
-    if key in ("task", "certify") and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
-        names = groups(verb)
-        if key in names:
-            raise BadConfig(f"{told}: expected the name of a file of conf/{key} without .yaml; see scengen tasks")
-    if key in ("task", "certify") and override.value() is None:
-        raise BadConfig(f"{told}: leave it out, or name a file of conf/{key}")
-
-
-def _parsed(text: str, parser: OverridesParser | None = None) -> Override | None:
-    try:
-        return (parser or OverridesParser.create()).parse_overrides([text])[0]
-    except (HydraException, RecursionError, ValueError, TypeError):  # numbers of 5000 digits are a ValueError
-        return None
-
-
-def _depth(text: str) -> int:
-    """How deeply brackets are nested, quoted ones included."""
-    deepest = depth = 0
-    for letter in text:
-        depth += (letter in "[{(") - (letter in "]})")
-        deepest = max(deepest, depth)
-    return deepest
-
-
-def _listed(override: str) -> str:
-    """`keep=refuted,unknown`, `pool=a,b` and the like mean lists here, not sweeps; `keep` always is one.
-
-    What `id` gives is a word: `12e4` begins an id and is no number.
-    """
-    key, _, value = override.partition("=")
-    if key == "id" and value != "null" and re.fullmatch(r"[\w@+/]+", value, re.ASCII):
-        return f"id='{value}'"
-    many = key == "keep" or (key in ("pool", "cameras", "mujoco") and "," in value and value[:1] not in ("'", '"'))
-    return f"{key}=[{value}]" if many and not value.startswith("[") else override
-
-
-def settled(node: Mapping[str, Any], task: Task, choice: str) -> dict[str, Any]:
-    """The chosen file of conf/certify, then the task's own settings, then the command line: the later one wins."""
-    base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{choice}.yaml"))  # type: ignore[assignment]
-    asked = OmegaConf.create(_difference(node, base))
-    special = OmegaConf.create(dict(task.certify))
-    return OmegaConf.to_container(OmegaConf.merge(base, special, asked))  # type: ignore[return-value]
+    base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{level}.yaml"))  # type: ignore[assignment]
+    overrides = OmegaConf.create(_difference(node, base))
+    return OmegaConf.to_container(OmegaConf.merge(base, OmegaConf.create(dict(task.certify)), overrides))  # type: ignore[return-value]
 
 
 def _difference(node: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of a mapping that differ from those of another one."""
     different = {}
     for key, value in node.items():
         if isinstance(value, Mapping) and isinstance(base.get(key), Mapping):
@@ -311,28 +95,270 @@ def _difference(node: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, A
     return different
 
 
-def _explain(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig | UnknownName:
-    """One line with the nearest name, from Hydra's error."""
+# --- composition ------------------------------------------------------------------------------
+
+
+def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Compose the configuration of a command.
+
+    Returns:
+        The whole configuration as plain data, and the name of the file that was chosen in each group.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
+        try:
+            prepared = [_with_list(text) for text in overrides]
+            for text in prepared:
+                _check_override(verb, text)
+            prepared = _with_packages(prepared) if groups(verb) else prepared
+            node = compose(config_name(verb), overrides=prepared, return_hydra_config=True)
+            choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
+            OmegaConf.set_struct(node, False)
+            del node["hydra"]
+            return OmegaConf.to_container(node, resolve=True), choices  # type: ignore[return-value]
+        except (HydraException, OmegaConfBaseException) as error:
+            raise _explained(verb, overrides, error) from None
+        except yaml.YAMLError as error:
+            raise BadConfig(f"a configuration file is not valid YAML: {_one_line(str(error))}; correct it") from None
+        except (ValueError, TypeError, AssertionError, RecursionError) as error:  # Hydra checks little of its input
+            raise BadConfig(f"{_one_line(str(error))}; see scengen {verb} --help") from None
+
+
+def chosen_task(verb: str, overrides: Sequence[str]) -> str | None:
+    """Name of the task that a command line chooses, for a command with an optional task; None if it chooses none.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    return composed(verb, overrides)[1].get("task")
+
+
+def config_dir(verb: str) -> Path:
+    """The folder in which Hydra finds the file of a command and the groups from which it chooses files.
+
+    A command without groups sees none: Hydra would take its setting `task` for a choice among the files of conf/task.
+    """
+    return conf_dir() if groups(verb) else conf_dir() / "command"
+
+
+def config_name(verb: str) -> str:
+    """Name of the file of a command in its `config_dir`."""
+    return f"command/{verb}" if groups(verb) else verb
+
+
+def as_yaml(verb: str, overrides: Sequence[str]) -> str:
+    """The composed configuration of a command as YAML: `--cfg job`.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    plain, choices = composed(verb, overrides)
+    if {"certify", "task"} <= choices.keys():
+        plain["certify"] = certify_node(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
+    flows = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
+    style = {"sort_keys": False, "allow_unicode": True, "width": 120}
+    return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **style) for key, flow in flows.items())
+
+
+def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
+    """Print where a configuration comes from, as Hydra does for `--info defaults`, for instance.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    if topic not in ORIGINS:
+        raise UnknownName("information of --info", topic, ORIGINS)
+    composed(verb, overrides)
+    with _logging_restored(), initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
+        prepared = [_with_list(text) for text in overrides]
+        prepared = _with_packages(prepared) if groups(verb) else prepared
+        GlobalHydra.instance().hydra.show_info(topic, config_name(verb), prepared)  # type: ignore[union-attr]
+
+
+@contextmanager
+def _logging_restored() -> Iterator[None]:
+    """Restore the root logger, which Hydra sets up for its output."""
+    root = logging.getLogger()
+    handlers, level = list(root.handlers), root.level
+    try:
+        yield
+    finally:
+        root.handlers[:] = handlers
+        root.setLevel(level)
+
+
+# --- overrides --------------------------------------------------------------------------------
+
+MAX_DEPTH = 20
+"""Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
+LISTS = ("pool", "cameras", "mujoco")
+"""Settings for which several values are a list and not a sweep. `keep` is always a list."""
+
+
+def _with_list(text: str) -> str:
+    """An override with brackets around the values of a setting that is a list, such as `keep=refuted,unknown`.
+
+    The value of `id` is quoted: `12e4` is the beginning of an id and not a number.
+    """
+    key, _, value = text.partition("=")
+    if key == "id" and value != "null" and re.fullmatch(r"[\w@+/]+", value, re.ASCII):
+        return f"id='{value}'"
+    is_list = key == "keep" or (key in LISTS and "," in value and value[:1] not in ("'", '"'))
+    return f"{key}=[{value}]" if is_list and not value.startswith("[") else text
+
+
+def _with_packages(overrides: Sequence[str]) -> list[str]:
+    """Overrides that make Hydra search installed packages, too, after the folders that the overrides name."""
+    named, others = search_path(overrides), [text for text in overrides if not text.startswith("hydra.searchpath=")]
+    if not packages():
+        return [*named, *others]
+    values = [override.value() for text in named if (override := _parsed(text))]
+    folders = [folder for value in values for folder in (value if isinstance(value, list) else [value])]
+    return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
+
+
+def _check_override(verb: str, text: str) -> None:
+    """Refuse overrides that scengen does not support, or that Hydra cannot process.
+
+    Raises:
+        BadConfig: one line with the remedy.
+    """
+    quoted = cut(repr(text))
+    if _depth(text) > MAX_DEPTH:
+        raise BadConfig(f"{quoted} is nested too deeply; quote it if the brackets are part of a name")
+    override = _parsed(text)
+    if override is None or not override.key_or_group:
+        raise BadConfig(f"{quoted} is not an override; expected key=value, quoted if the value holds spaces or commas")
+    key = override.key_or_group
+    if override.package is not None:
+        raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
+    if override.is_sweep_override():
+        raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas: {key}='...'")
+    if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
+        raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
+    if override.is_delete() and "." not in key:
+        raise BadConfig(f"{quoted}: {key} cannot be deleted; leave it out for its default, or give another value")
+    if key == "hydra.searchpath":
+        folders = override.value()
+        for folder in folders if isinstance(folders, list) else [folders]:
+            if not re.match(r"(file|pkg)://.", str(folder)):
+                raise BadConfig(f"{quoted}: give a folder of configuration as file:///folder or pkg://package")
+    if key in ("task", "certify") and key in groups(verb) and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
+        raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; see scengen tasks")
+    if key in ("task", "certify") and override.value() is None:
+        raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _parsed(text: str, parser: OverridesParser | None = None) -> Override | None:
+    """An override as Hydra reads it; None if Hydra cannot."""
+    try:
+        return (parser or OverridesParser.create()).parse_overrides([text])[0]
+    except (HydraException, RecursionError, ValueError, TypeError):  # numbers of 5000 digits are a ValueError
+        return None
+
+
+def _depth(text: str) -> int:
+    """Depth to which brackets are nested, quoted ones included."""
+    deepest = depth = 0
+    for letter in text:
+        depth += (letter in "[{(") - (letter in "]})")
+        deepest = max(deepest, depth)
+    return deepest
+
+
+# --- sweeps -----------------------------------------------------------------------------------
+
+MAX_COMBINATIONS = 1000
+"""Largest number of runs in one command line."""
+ALL = "all"
+"""Word for all tasks in `task=all`."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One of the command lines of a sweep."""
+
+    overrides: tuple[str, ...]
+    """Overrides with one value each."""
+    swept: Mapping[str, str]
+    """The settings with multiple values, and their value in this combination; empty without a sweep."""
+
+    def __str__(self) -> str:
+        return " ".join(f"{key}={value}" for key, value in self.swept.items())
+
+
+def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
+    """All combinations of a command line with multiple values: `n=1,2`, or Hydra's choice, range and glob.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    overrides = [_with_task_names(text) for text in overrides]
+    with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
+        parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
+        try:
+            choices = [_swept_values(parser, _with_list(text)) for text in overrides]
+        except HydraException as error:
+            raise BadConfig(f"{_one_line(str(error))}; see scengen {verb} --help") from None
+    if (count := math.prod(len(values) for _, values in choices)) > MAX_COMBINATIONS:
+        raise BadConfig(f"{count} combinations of settings; give at most {MAX_COMBINATIONS} at once")
+    found = []
+    for picked in itertools.product(*(values for _, values in choices)):
+        swept = {key: v for (key, values), v in zip(choices, picked, strict=True) if key and len(values) > 1}
+        line = (f"{key}={value}" if key else value for (key, _), value in zip(choices, picked, strict=True))
+        found.append(Combination(tuple(line), swept))
+    return found
+
+
+def _swept_values(parser: OverridesParser, text: str) -> tuple[str, list[str]]:
+    """Key and values of an override with multiple values; an empty key and the override itself otherwise."""
+    override = _parsed(text, parser)
+    if override is None or not override.is_sweep_override():
+        return "", [text]
+    values = list(itertools.islice(override.sweep_string_iterator(), MAX_COMBINATIONS + 1))
+    if not values:
+        raise BadConfig(f"{cut(repr(text))} has no value; give at least one")
+    return override.get_key_element(), values
+
+
+def _with_task_names(text: str) -> str:
+    """An override of the task with the names of tasks instead of `all` and of categories, as in `task=P3,packing`."""
+    key, _, value = text.partition("=")
+    words = value.split(",")
+    if key != "task" or not any(re.fullmatch(f"{ALL}|P[1-9]|M", word) for word in words):
+        return text
+    known = tasks()
+    named = {word: known if word == ALL else [t for t in known if category(t) == word] for word in words}
+    return f"task={','.join(dict.fromkeys(t for word, found in named.items() for t in found or [word]))}"
+
+
+# --- errors -----------------------------------------------------------------------------------
+
+
+def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConfig | UnknownName:
+    """Hydra's error as one line, with the nearest name."""
     text = str(error)
     if match := re.search(r"Could not find '(\w+)/([^']*)'", text):
         group, name = match.groups()
         return UnknownName(group, name, re.findall(r"^\s+(\S+)$", text, re.M))
     if match := re.search(r"You must specify '(\w+)'", text):
         known = ", ".join(re.findall(r"^\s+(\S+)$", text, re.M))
-        return BadConfig(f"which {match[1]}? say {match[1]}=NAME; known: {known}")
+        return BadConfig(f"{verb} needs {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
-        return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_first_lines(text)}; see scengen {verb} --help")
+        return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
     if isinstance(error, OmegaConfBaseException):
-        what = f"{error.full_key}: " if error.full_key else ""
-        return BadConfig(f"{what}{_first_lines(text.splitlines()[0])}; give the value itself")
-    return BadConfig(f"{_first_lines(text)}; see scengen {verb} --help")
+        key = f"{error.full_key}: " if error.full_key else ""
+        return BadConfig(f"{key}{_one_line(text.splitlines()[0])}; give the value itself")
+    return BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
 
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
-    """Name the key at which the path of an override leaves the configuration."""
+    """The error for the first key in the path of an override that the configuration does not have."""
     files = _with_packages([o for o in overrides if re.match(r"(task|certify|executor|hydra\.searchpath)=", o)])
     try:
-        node: Any = compose(file(verb), overrides=files if groups(verb) else [])
+        node: Any = compose(config_name(verb), overrides=files if groups(verb) else [])
     except HydraException:
         return None
     seen: list[str] = []
@@ -342,9 +368,9 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
         if part not in node:
             known = {*map(str, node), *([] if seen else groups(verb))}
             if seen == ["executor"] and not known:
-                return BadConfig(f"{path} is a setting of executor=ray; say that as well")
+                return BadConfig(f"{path} is a setting of executor=ray; give that, too")
             unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
-            if seen[:2] == ["task", "id"]:  # what a task file does not list stays at its nominal value: it can be added
+            if seen[:2] == ["task", "id"]:  # a parameter that the task file does not list is nominal: it can be added
                 return BadConfig(f"{unknown}; +{path}=... adds one")
             return unknown
         seen.append(part)
@@ -352,5 +378,5 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     return None
 
 
-def _first_lines(text: str) -> str:
+def _one_line(text: str) -> str:
     return " ".join(text.split())[:300]

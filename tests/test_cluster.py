@@ -46,7 +46,7 @@ def node_of(item):
     [
         (("executor=ry",), "no executor named 'ry' (did you mean 'ray'?); known: local, ray"),
         (("executor=ray", "executor.adress=auto"), "no key in executor named 'adress' (did you mean 'address'?)"),
-        (("executor.address=auto",), "executor.address is a setting of executor=ray; say that as well"),
+        (("executor.address=auto",), "executor.address is a setting of executor=ray; give that, too"),
         (("executor=ray", "executor.address=there"), "it must be auto, local, HOST:PORT or ray://HOST:PORT"),
         (("executor=ray", "executor.address=127.0.0.1:1"), "nobody answers there ([Errno 111] Connection refused)"),
         (("executor=ray", "executor.address=ray://localhost:1"), "nobody answers there"),

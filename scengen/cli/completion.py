@@ -84,9 +84,9 @@ def _settings(verb: str, words: Sequence[str], word: str) -> list[str]:
     groups = task_files.groups(verb)
     if "task" in groups and not _task(words):
         words = [*words, f"task={task_files.tasks()[0]}"]  # its keys are those of all tasks, but for the parameters
-    with initialize_config_dir(str(compose.root(verb)), version_base="1.3", job_name="scengen"):
+    with initialize_config_dir(str(compose.config_dir(verb)), version_base="1.3", job_name="scengen"):
         plugin = DefaultCompletionPlugin(GlobalHydra.instance().config_loader())
-        found = plugin._query(compose.file(verb), " ".join([*words, word]))
+        found = plugin._query(compose.config_name(verb), " ".join([*words, word]))
     return [text for text in found if _offered(text, groups)]
 
 

@@ -189,9 +189,9 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     if others := [word for word in words if word.startswith("-")]:
         raise BadConfig(f"{cut(repr(others[0]))} cannot be combined with {option}; give one of them")
     if SHOW_OPTIONS[option] == "--info":
-        compose.show_origin(verb, words, what)
+        compose.print_origin(verb, words, what)
     elif what == "job":
-        out.print(compose.shown(verb, words), end="", soft_wrap=True)
+        out.print(compose.as_yaml(verb, words), end="", soft_wrap=True)
     else:
         raise BadConfig(f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command")
     return OK

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from ..compose import composed, settled
+from ..compose import certify_node, composed
 from ..errors import BadConfig, cut
 from ..samplers.task import Task, load
 from ..task_files import groups
@@ -36,7 +36,7 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
     plain, choices = composed(verb, overrides)
     settings = typed("", kind, _settings(verb, plain))
     found = load(choices["task"], plain["task"])
-    certify_settings = typed("certify", CertifySettings, settled(plain["certify"], found, choices["certify"]))
+    certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], found, choices["certify"]))
     certify_settings.check()
     return settings, found, certify_settings
 

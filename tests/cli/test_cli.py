@@ -16,6 +16,8 @@ from helpers import REFERENCE
 from pools import QUICKLY, make
 
 from scengen import cli, list_tasks, load_task, task_files
+from scengen.cli.completion import completions
+from scengen.cli.verbs import RENAMED
 from scengen.commands.settings import read
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
@@ -52,7 +54,7 @@ GENERATE = ("generate", "task=domino_single")
     ("argv", "says"),
     [
         (("generat",), "no command named 'generat' (did you mean 'generate'?)"),
-        (("generate",), "which task? say task=NAME; known: "),
+        (("generate",), "generate needs task=NAME; known: "),
         (("generate", "task=domino_singel"), "no task named 'domino_singel' (did you mean 'domino_single'?)"),
         ((*GENERATE, "split=diagnal"), "did you mean 'diagonal'"),
         ((*GENERATE, "split=diagonal+diagonal"), "two of its axes move heading"),
@@ -71,7 +73,7 @@ GENERATE = ("generate", "task=domino_single")
         ((*GENERATE, "certify.robust.runs=few"), "certify.robust.runs = 'few'; it must be a whole number"),
         ((*GENERATE, "keep=good"), "keep = good; it must be refuted, unknown, or both"),
         ((*GENERATE, "task.horizon=-1"), "it must be a positive number of seconds"),
-        ((*GENERATE, "split=a=b"), "'split=a=b' is no override"),
+        ((*GENERATE, "split=a=b"), "'split=a=b' is not an override"),
         ((*GENERATE, "--workers=2"), "'--workers=2' is not an option"),
         (("verify",), "verify needs either pool="),
         (("verify", "pool=nowhere"), "no pool at nowhere"),
@@ -86,6 +88,19 @@ def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
     status, err = said(capsys, *argv)
     assert status == 2 and says in err
     assert err.startswith("scengen: ") and err.count("\n") == 1 and "Traceback" not in err
+
+
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, new):
+    run = []
+    monkeypatch.setattr(
+        import_module(f"scengen.commands.{new}"), "command", lambda arguments: run.append(arguments) or 0
+    )
+    status, err = said(capsys, old, "pool=here")
+    assert status == 0 and run == [["pool=here"]]
+    assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.3\n"
+    assert cli.run(("--help",)) == 0 and f"  {old} " not in capsys.readouterr().out
+    assert old not in cli.VERBS and old not in completions(f"scengen {old}", cli.VERBS)
 
 
 @pytest.mark.parametrize("argv", [(), ("--help",), ("--version",), ("tasks",)])

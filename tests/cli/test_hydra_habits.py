@@ -49,7 +49,7 @@ def test_lists_and_hydras_own_words_are_combined():
         ((DOMINO, "seed=1,1"), "2 of the combinations would be written to"),
         ((DOMINO, "seed=range(0,100000)"), "combinations of settings; give at most 1000 at once"),
         ((DOMINO, "task.id.x=interval(0,1)"), "Can only enumerate"),
-        (("task=glob(none_*)",), "names no value; give at least one"),
+        (("task=glob(none_*)",), "has no value; give at least one"),
     ],
 )
 def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(capsys, tmp_path, asked, says):
@@ -87,7 +87,7 @@ def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_
 
 def test_other_commands_say_that_they_take_one_value(capsys):
     status, shown = said(capsys, "shrink", DOMINO, "index=0,1")
-    assert status == 2 and "names several values; give one" in shown.err
+    assert status == 2 and "has multiple values; give one" in shown.err
     assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
 
 
@@ -140,7 +140,7 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
     program, given, *overrides = shlex.split(example)
     assert (program, given) == ("scengen", verb)
     for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
-        compose.shown(verb, getattr(one, "overrides", one))
+        compose.as_yaml(verb, getattr(one, "overrides", one))
     takes_task = "task" in task_files.groups(verb)
     assert takes_task == ("stout_starter turned_slab" in text) == ("+task.axes.NAME" in text)
     assert ("certify.robust.runs=4" in text) == ("certify" in task_files.groups(verb))

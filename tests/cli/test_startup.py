@@ -44,6 +44,16 @@ def test_the_list_of_tasks_imports_no_family(given, families):
     assert told == 0 and sum(name.startswith("scengen.tasks.") for name in modules) == families
 
 
+@pytest.mark.parametrize("load", ["scengen.load_task('domino_single')", "import scengen.envs.gym"])
+def test_a_task_and_its_environments_need_neither_ray_nor_the_settings_of_commands(load):
+    code = f"import json, sys, scengen; {load}; print(json.dumps(list(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = json.loads(done.stdout.splitlines()[-1])
+    assert "scengen.compose" in modules
+    assert not {"ray", "scengen.work.cluster"} & set(modules)
+    assert not [name for name in modules if name.startswith("scengen.commands")]
+
+
 @pytest.mark.slow
 def test_the_first_compilation_is_told_of_once(tmp_path):
     """Twice with a cache of compiled code that is empty at first: what is compiled is told, what is read is not."""

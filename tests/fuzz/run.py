@@ -28,8 +28,8 @@ LIMIT = 60
 """Wall-clock time of one command line [s]: more than any needs that does no work."""
 REMEDY = re.compile(
     r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |"
-    r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is not an option|install|takes one pool|"
-    r"correct |delete |wait for|needs \w+=|widen|wants a display"
+    r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is not an option|install|"
+    r"takes one pool|correct |delete |wait for|needs \w+=|widen|wants a display"
 )
 """Words with which an error says what would be right."""
 

@@ -33,7 +33,7 @@ def test_every_setting_of_a_command_exists(line, monkeypatch):
             monkeypatch.syspath_prepend(ROOT / "example")
             overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
         for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
-            compose.shown(verb, getattr(one, "overrides", one))
+            compose.as_yaml(verb, getattr(one, "overrides", one))
 
 
 def test_a_command_that_fails_is_seen(tmp_path):
