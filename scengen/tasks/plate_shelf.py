@@ -111,7 +111,7 @@ class PlateShelf(PlateAndSlot[Plate]):
         yield from go_to(arm, [HANDOVER_POINT[0], y, z], SIDEWAYS, STEADY, OPEN)
 
     def hand_over(self, world: World) -> Plan:
-        """The jaw takes the lip, then the cup lets go."""
+        """Take the lip with the jaw; then the cup lets go."""
         right, left = world.arms
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS)
 
