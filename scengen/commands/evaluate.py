@@ -2,7 +2,8 @@
 
 from rich.table import Table
 
-from ..evaluate.rollouts import EvaluateSettings, cells, evaluate, markdown, plain, table
+from ..evaluate.rollouts import EvaluateSettings, evaluate
+from ..evaluate.table import cells, markdown, plain, table
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path

@@ -1,1 +1,1 @@
-"""Policies on pools: rollouts, rates with intervals, how many rollouts are enough."""
+"""Evaluation of policies on pools: rollouts, rates with intervals, statistical power."""

@@ -1,6 +1,6 @@
-"""Policies: what they are to us, how one is found by name, and four built-in ones that tell whether a pool is sound.
+"""Policies: their interface, how one is found by name, and four built-in ones that serve as references for a pool.
 
-A policy is whatever `factory(env)` returns, as long as it has the two methods of `Policy`. The factory is named
+A policy is any object with the two methods of `Policy` that `factory(env)` returns. The factory is named
 `module:factory` and called once in every process and for every task.
 """
 
@@ -27,10 +27,10 @@ from ..sim.world import IDLE, hands
 
 
 class Policy(Protocol):
-    """What evaluation asks of a policy."""
+    """The interface of a policy."""
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """An episode begins; everything random in it must come from `seed`."""
+        """Begin an episode; all randomness of the policy in it must come from `seed`."""
         ...
 
     def act(self, observation: Observation) -> ArrayLike:
@@ -42,13 +42,13 @@ Factory = Callable[[PoolEnv], Policy]
 
 
 class Idle:
-    """Does nothing: whatever it solves was no problem."""
+    """A policy that does nothing: a scenario that it solves is trivial."""
 
     def __init__(self, env: PoolEnv):
         self._action = np.resize(IDLE, env.action_space.shape or ())
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Nothing to remember."""
+        """Begin an episode; the policy has no state."""
 
     def act(self, observation: Observation) -> ArrayLike:
         """No motion, grippers open."""
@@ -56,22 +56,22 @@ class Idle:
 
 
 class Random:
-    """Uniformly random actions."""
+    """A policy with uniformly random actions."""
 
     def __init__(self, env: PoolEnv):
         self._random, self._shape = np.random.default_rng(), env.action_space.shape
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin the stream of `seed`."""
+        """Begin the random stream of `seed`."""
         self._random = np.random.default_rng(seed)
 
     def act(self, observation: Observation) -> ArrayLike:
-        """Numbers in [-1, 1]."""
+        """Uniform random numbers in [-1, 1]."""
         return self._random.uniform(-1.0, 1.0, self._shape)
 
 
 class Oracle:
-    """The task's own scripted solution. It reads the full state: an upper bound, no competitor."""
+    """The task's own scripted solution. It reads the full state and serves as an upper bound, not as a competitor."""
 
     def __init__(self, env: PoolEnv):
         self.env, self.filter = env, Filter(len(hands(env.task.embodiment)))
@@ -84,7 +84,7 @@ class Oracle:
         self.filter.reset()
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The plan's next action, filtered once, as for the certificate; idle when it is over."""
+        """The plan's next action, filtered once, as for the certificate; idle after the end of the plan."""
         try:
             return self.sent(next(self.plan))
         except (StopIteration, GaveUp):
@@ -93,7 +93,7 @@ class Oracle:
 
 
 class NearestReplay:
-    """Plays the witness of the nearest training scenario other than the one at hand: what pure memory achieves."""
+    """A policy that replays the witness of the nearest other training scenario: the success of pure memory."""
 
     def __init__(self, env: PoolEnv, memory: Library | None):
         """
@@ -101,7 +101,7 @@ class NearestReplay:
             memory: training scenarios of the task.
 
         Raises:
-            BadConfig: there are none, or one alone.
+            BadConfig: there are fewer than two.
         """
         if memory is None or len(memory) < 2:
             raise BadConfig(f"policy replay needs a pool of {env.task.name} with split id and at least 2 scenarios")
@@ -109,7 +109,7 @@ class NearestReplay:
         self.points = np.array([coordinates(env.task, params) for (params,) in memory.columns("params")])
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Look up the nearest witness."""
+        """Find the nearest witness."""
         here = coordinates(self.env.task, self.env.values)
         far = np.linalg.norm(self.points - here, axis=1)
         far[self.memory.directory.ids == info["scenario"].encode()] = np.inf
@@ -117,7 +117,7 @@ class NearestReplay:
         self.next = 0
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The witness's next action; idle when it is over."""
+        """The witness's next action; idle after its end."""
         if self.next == len(self.actions):
             return self.env.world.idle
         self.next += 1
@@ -125,13 +125,15 @@ class NearestReplay:
 
 
 BUILT_IN: dict[str, Factory] = {"idle": Idle, "random": Random, "oracle": Oracle}
+"""Factories of the built-in policies, by name."""
 REPLAY = "replay"
-AT_FULL_RATE = (REPLAY, "oracle")
+"""Name of the built-in policy that needs training scenarios."""
+FULL_RATE_POLICIES = (REPLAY, "oracle")
 """Built-in policies whose actions are meant for one control period each."""
 
 
 def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:
-    """The parameters of a scenario that training varies, each in units of its training range."""
+    """The parameters of a scenario that vary in training, each in units of its training range."""
     found = []
     for name, dist in task.training.items():
         low, high = min(i.low for i in dist.support), max(i.high for i in dist.support)
@@ -140,8 +142,12 @@ def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:
     return np.array(found)
 
 
-def find(name: str, memory: Library | None = None) -> Factory:
-    """The factory of a policy: a built-in name, or `module:factory` from the path or the working directory.
+def find_policy(name: str, memory: Library | None = None) -> Factory:
+    """The factory of a policy.
+
+    Args:
+        name: a built-in name, or `module:factory` from the path or the working directory.
+        memory: training scenarios, for the policy `replay`.
 
     Raises:
         ScengenError: there is no such policy.
@@ -168,14 +174,14 @@ def find(name: str, memory: Library | None = None) -> Factory:
     return found
 
 
-def made(name: str, factory: Factory, env: PoolEnv) -> Policy:
-    """What a factory returns.
+def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
+    """The policy that a factory returns.
 
     Raises:
-        ForeignCode: it raises something.
-        BadConfig: it returns no policy.
+        ForeignCode: the factory raises an error.
+        BadConfig: the returned object is not a policy.
     """
-    with blamed(name, "its factory"):
+    with policy_errors(name, "its factory"):
         policy = factory(env)
     if missing := [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]:
         what = f"returned {type(policy).__name__}, which has no method {' and no '.join(missing)}"
@@ -184,11 +190,11 @@ def made(name: str, factory: Factory, env: PoolEnv) -> Policy:
 
 
 @contextmanager
-def blamed(name: str, part: str) -> Iterator[None]:
-    """Tell a fault of a policy from one of scengen's.
+def policy_errors(name: str, part: str) -> Iterator[None]:
+    """Attribute an error to the policy unless scengen raises it on purpose.
 
     Raises:
-        ForeignCode: something was raised that scengen does not raise on purpose.
+        ForeignCode: an error that is not a `ScengenError`.
     """
     try:
         yield
@@ -199,14 +205,14 @@ def blamed(name: str, part: str) -> Iterator[None]:
 
 
 def identity(name: str, factory: Factory, policy: Policy) -> str:
-    """Hash of what a policy says it is (its attribute or method `identity`, or `version`), or else of its source.
+    """Hash of a policy's attribute or method `identity` or `version`; of its source if it has neither.
 
     The source of a policy is the file of its factory and those of its class and bases, each with all Python files of
-    its package. Weights in other files do not count: a policy that loads some says their version.
+    its package. Weights in other files are not included: a policy that loads weights should declare their version.
     """
     for attribute in ("identity", "version"):
         if (said := getattr(policy, attribute, None)) is not None:
-            with blamed(name, f"its {attribute}"):
+            with policy_errors(name, f"its {attribute}"):
                 said = said() if callable(said) else said
             return _sha(f"{attribute} {said!r}".encode())
     files: set[Path] = set()

@@ -1,10 +1,11 @@
-"""The costs that scengen promises, measured as ratios within one run: `scengen bench`."""
+"""Measurement of the costs that scengen promises, as ratios within one run: `scengen bench`."""
 
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -31,27 +32,53 @@ from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import Rollout, run
 from ..validate.settings import QUICK
 
-LIMITS = {
-    "rollout_to_raw": (1.25, "at most"),
-    "two_arms_to_raw": (1.25, "at most"),
-    "two_arms_to_one": (2.3, "at most"),
-    "robosuite_to_ours": (8.0, "at least"),
-    "scenario_to_first_step_ms": (20.0, "at most"),
-    "env_step_to_raw": (1.4, "at most"),
-    "env_reset_ms": (20.0, "at most"),
-}
-"""What is promised."""
-
 PERIODS = 200
-"""Control periods of the comparison with robosuite: two seconds."""
-NOTHING = 0.05
-"""What costs less than this is no part of the cost of a certificate [s]."""
-CAMERA_TICKS = 20
-"""Control periods with a camera, which takes a hundred times as long without a graphics card."""
+"""Number of control periods of the comparison with robosuite: two seconds."""
+NEGLIGIBLE_COST = 0.05
+"""Processor time below which a check is left out of the cost of a certificate [s]."""
+CAMERA_PERIODS = 20
+"""Number of control periods with a camera, which takes a hundred times as long without a graphics card."""
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A promised limit of a measure."""
+
+    limit: float
+    side: str
+    """Side of the limit: `at most` or `at least`."""
+    what: str
+    """Description of the measure."""
+
+    def holds(self, value: float) -> bool:
+        """Whether a measured value satisfies the limit."""
+        return value <= self.limit if self.side == "at most" else value >= self.limit
+
+
+PROMISES = {
+    "rollout_to_raw": Promise(
+        1.25, "at most", "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states"
+    ),
+    "two_arms_to_raw": Promise(
+        1.25, "at most", "a control period of two arms (controllers, contacts) / mj_step of the same states"
+    ),
+    "two_arms_to_one": Promise(
+        2.3, "at most", "a control period of two arms / of one in the same scene, each arm moving alike"
+    ),
+    "robosuite_to_ours": Promise(
+        8.0, "at least", "robosuite's env.step / our control period, on the same compiled Lift model"
+    ),
+    "scenario_to_first_step_ms": Promise(20.0, "at most", "from parameter values to the first physics step, warm (ms)"),
+    "env_step_to_raw": Promise(
+        1.4, "at most", "the Gymnasium environment's step, proprioception only / mj_step of the same states"
+    ),
+    "env_reset_ms": Promise(20.0, "at most", "the Gymnasium environment's reset of a loaded scenario (ms)"),
+}
+"""Promised limits, by measure."""
 
 
 def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
-    """Measure everything `repeats` times and take medians of ratios.
+    """Measure everything `repeats` times and take the medians of the ratios.
 
     Raises:
         ImportError: robosuite's Python code does not run on this machine.
@@ -64,19 +91,10 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
         **gym_costs(repeats),
     }
     table = Table("measure", "value", "limit", "what", title="bench", title_justify="left")
-    told = {
-        "rollout_to_raw": "a rollout (oracle, filter, controller, contacts, goal) / mj_step of the same states",
-        "two_arms_to_raw": "a control period of two arms (controllers, contacts) / mj_step of the same states",
-        "two_arms_to_one": "a control period of two arms / of one in the same scene, each arm moving alike",
-        "robosuite_to_ours": "robosuite's env.step / our control period, on the same compiled Lift model",
-        "scenario_to_first_step_ms": "from parameter values to the first physics step, warm (ms)",
-        "env_step_to_raw": "the Gymnasium environment's step, proprioception only / mj_step of the same states",
-        "env_reset_ms": "the Gymnasium environment's reset of a loaded scenario (ms)",
-    }
     for name, value in result.items():
-        limit, side = LIMITS[name]
-        holds = value <= limit if side == "at most" else value >= limit
-        table.add_row(name, f"{value:.2f}", f"{side} {limit:g}: {'holds' if holds else 'MISSED'}", told[name])
+        promise = PROMISES[name]
+        kept = "holds" if promise.holds(value) else "MISSED"
+        table.add_row(name, f"{value:.2f}", f"{promise.side} {promise.limit:g}: {kept}", promise.what)
     periods = costs(repeats)
     beside = Table("control period of 10 ms", "cost (ms)", "times MuJoCo", title="environments", title_justify="left")
     for name, value in periods.items():
@@ -85,7 +103,7 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
 
 
 def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
-    """Processor time of a quick certificate of every task, by check [s]: of its first training scenario."""
+    """Processor time of a quick certificate of every task's first training scenario, by check [s]."""
     costs = {name: _certificate(compose.load_task(name)) for name in task_files.tasks()}
     named = [check for check in CHECKS if any(check in cost for cost in costs.values())]
     table = Table("task", *named, "all", title="processor time of a certificate (s)", title_justify="left")
@@ -99,7 +117,7 @@ def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
 
 
 def _certificate(task: Task) -> dict[str, float]:
-    """What each check costs that is made on the first training scenario [s]."""
+    """Processor time of each check of the first training scenario [s]."""
     trial = Trial(task.draw(ID, 0, 0).scenario, task.horizon, QUICK, task.embodiment)
     cost = {}
     for name in CHECKS:
@@ -108,11 +126,11 @@ def _certificate(task: Task) -> dict[str, float]:
         cost[name] = time.process_time() - begin
         if check.passed is False:
             break
-    return {name: seconds for name, seconds in cost.items() if seconds >= NOTHING}
+    return {name: seconds for name, seconds in cost.items() if seconds >= NEGLIGIBLE_COST}
 
 
 def rollout_to_raw(repeats: int) -> float:
-    """Time of an oracle rollout over that of the bare mj_step calls through the same states."""
+    """Ratio of the time of an oracle rollout to that of the bare mj_step calls through the same states."""
     task = compose.load_task("domino_single")
     scenario = task.draw("id", 0, 0).scenario
     world = world_of(scenario)
@@ -125,7 +143,7 @@ def rollout_to_raw(repeats: int) -> float:
 
 
 def two_arms(repeats: int) -> dict[str, float]:
-    """A control period of two arms over the bare mj_step calls, and over a control period of one arm."""
+    """Ratios of the time of a control period of two arms to the bare mj_step calls, and to a period of one arm."""
     text = rebuild(compose.load_task("domino_single").draw("id", 0, 0).scenario)
     one, two = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2))
     single = _waving()
@@ -149,7 +167,7 @@ def two_arms(repeats: int) -> dict[str, float]:
 
 
 def gym_costs(repeats: int) -> dict[str, float]:
-    """The Gymnasium environment without cameras: its step over the bare mj_step calls, and its reset [ms]."""
+    """Costs of the Gymnasium environment without cameras: its step over bare mj_step calls, and its reset [ms]."""
     with _pool() as pool:
         env, actions = PoolEnv("domino_single", pool.folder), next(pool.rows()).witness
     env.reset()
@@ -160,9 +178,9 @@ def gym_costs(repeats: int) -> dict[str, float]:
 
 
 def costs(repeats: int) -> dict[str, float]:
-    """What a control period of 10 ms costs in each environment, same scenario, same actions, by name [ms].
+    """Cost of a control period of 10 ms in each environment with the same scenario and actions, by name [ms].
 
-    Those with a camera of 256 x 256 pixels are missing where there is no OpenGL.
+    Environments with a camera of 256 x 256 pixels are missing if there is no OpenGL.
     """
     with _pool() as pool:
         row = next(pool.rows())
@@ -170,7 +188,7 @@ def costs(repeats: int) -> dict[str, float]:
         bare = PoolEnv("domino_single", pool.folder)
         seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     bare.reset()
-    raw, brief = _bare(bare.world, actions), actions[:CAMERA_TICKS]
+    raw, brief = _bare(bare.world, actions), actions[:CAMERA_PERIODS]
     found = {
         "MuJoCo: five bare mj_step": statistics.median(_seconds(raw) / len(actions) for _ in range(repeats)),
         "scengen in Gymnasium: proprioception": statistics.median(_stepping(bare, actions) for _ in range(repeats)),
@@ -186,7 +204,7 @@ def costs(repeats: int) -> dict[str, float]:
 
 @contextmanager
 def _pool() -> Iterator[Pool]:
-    """A pool of one scenario, for as long as it is needed."""
+    """A temporary pool of one scenario."""
     with tempfile.TemporaryDirectory() as folder:
         task, settings = compose.load_task("domino_single"), GenerateSettings(n=1, pool=f"{folder}/pool")
         yield generate(task, QUICK, settings, lambda *_: None).pool
@@ -235,7 +253,7 @@ def _bare(world: World, actions: Actions) -> Callable[[], None]:
 
 
 def robosuite_to_ours(repeats: int) -> float:
-    """Time of robosuite's env.step over that of our control period, same model, same actions."""
+    """Ratio of the time of robosuite's env.step to our control period, with the same model and actions."""
     env = _lift()
     model = env.sim.model._model
     loop = Loop(model, mujoco.MjData(model), home=panda.HOME)
@@ -289,7 +307,7 @@ def scenario_to_first_step(repeats: int) -> float:
 
 
 def _waving() -> Actions:
-    """Actions of one arm that moves about in the air, shape (PERIODS, 7)."""
+    """Actions of one arm that moves in free space, shape (PERIODS, 7)."""
     return 0.3 * np.sin(0.05 * np.arange(PERIODS)[:, None] + np.arange(ACTION)).astype(np.float32)
 
 

@@ -9,7 +9,8 @@ import helpers
 import pytest
 
 from scengen import cli
-from scengen.evaluate.rollouts import EvaluateSettings, evaluate, table
+from scengen.evaluate.rollouts import EvaluateSettings, evaluate
+from scengen.evaluate.table import table
 from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
