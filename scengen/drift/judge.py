@@ -26,7 +26,7 @@ from ..scenario import Scenario
 from ..validate.certify import Trial
 from ..validate.claims import wrong_names
 from ..validate.rebuilt import difference
-from ..validate.recheck import FIRST, REPLAYED
+from ..validate.recheck import BEFORE_WITNESS, WITH_WITNESS
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
 from ..validate.stored import settings_of_manifest, task_of_manifest
@@ -91,7 +91,8 @@ class Judge:
         trial = Trial(scenario, row.horizon, self.settings, row.embodiment, attacked)
         stored = {check.name: check for check in row.certificate.checks}
         found: list[Check] = []
-        for name in {"replay": ("compiles",), "recheck": FIRST, "full": (*FIRST, *ORACLES)}[self.level]:
+        made = {"replay": ("compiles",), "recheck": BEFORE_WITNESS, "full": (*BEFORE_WITNESS, *ORACLES)}
+        for name in made[self.level]:
             found.append(_made(trial, name))
             if name == "compiles" and not found[-1].passed:
                 return Judgement(row.id, str(row.name), "", False, "", _compared(found, stored))
@@ -100,11 +101,11 @@ class Judge:
         numbers = {"outcome": witness.outcome, "seconds": witness.seconds}
         found.append(Check("witness", witness.solved, witness.reason, {"horizon": row.horizon}, numbers))
         if witness.solved:
-            trial.witness = witness
-            found += [_made(trial, name) for name in REPLAYED if self.level != "replay"]
+            trial.solution = witness
+            found += [_made(trial, name) for name in WITH_WITNESS if self.level != "replay"]
         elif self.level != "full":
             found.append(_made(trial, "solved"))  # whether it was the recording alone that does not survive
-        if self.level == "full" and self.settings.attack and trial.witness is not None:
+        if self.level == "full" and self.settings.attack and trial.solution is not None:
             found.append(_made(trial, "attack"))
         same = witness.digest == row.certificate.final_state
         return Judgement(row.id, str(row.name), witness.digest, same, scene, _compared(found, stored))

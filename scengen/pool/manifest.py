@@ -265,7 +265,7 @@ def _check_entry(entry: FileEntry) -> None:
 
 
 def _check_attack(attack: Mapping[str, Any]) -> None:
-    """What `scengen.attack.campaign.stored` writes, as far as it is read again."""
+    """What `scengen.attack.campaign.store_in_pool` writes, as far as it is read again."""
     for name in ("rates", "hits"):
         listed = attack.get(name)
         demand(isinstance(listed, list) and len(listed) <= MAX_HITS, f"attack.{name} is not a list")

@@ -30,7 +30,7 @@ from .journal import Journal, Record
 
 @dataclass(frozen=True)
 class GenerateSettings:
-    """Settings of `scengen generate`; meanings stand in conf/command/generate.yaml."""
+    """Settings of `scengen generate`; conf/command/generate.yaml explains them."""
 
     split: str = ID
     sampler: str = "iid"
@@ -57,32 +57,33 @@ class GenerateSettings:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run came to."""
+    """Result of a run."""
 
     pool: Pool
     certified: int
     indices: int
     funnel: Mapping[str, int]
     reasons: Mapping[str, int]
-    """Rejections by "check: reason"."""
+    """Number of rejections by "check: reason"."""
     first_draws: int
-    """Indices whose very first draw was certified."""
+    """Number of indices whose first draw was certified."""
     attack: attacks.AttackReport | None
-    """What the adversary has found, if it was asked for."""
+    """Report of the adversary, if an attack was asked for."""
     cpu: float
-    """Processor time of all indices that count, in this run or earlier ones [s]."""
+    """Processor time of all counted indices, in this run or earlier ones [s]."""
 
 
-MOST_LOST = 100
-"""A run ends when so many scenarios in a row crash or reach a limit: of a sound family hardly one in a hundred does."""
+MAX_LOST = 100
+"""Number of scenarios in a row that crash or reach a limit, at which a run ends: of a sound family hardly one in a
+hundred does."""
 
 Progress = Callable[[int, int, Mapping[str, int]], None]
-"""Called with the certified count, the number of finished indices, and the verdicts so far."""
+"""Called with the number of certified scenarios, the number of finished indices, and the verdicts so far."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the indices of a run have in common; called with one, it draws and certifies that scenario."""
+    """Settings that all indices of a run share. Calling it with an index draws and certifies that scenario."""
 
     task: Task
     split: Split
@@ -120,7 +121,7 @@ class Job:
         return Record(index, "unknown", PROCESS, reason, draw.attempt + 1, dict(draw.rejected), None, 0.0)
 
     def _draw(self, index: int) -> Draw | Record:
-        """The scenario of an index, or the record of one that has none."""
+        """The scenario of an index, or the record of an index that has none."""
         try:
             return self.task.draw(self.split, self.seed, index, self.task.design(self.sampler))
         except Infeasible as error:
@@ -132,9 +133,9 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
     """Make the pool that the settings describe, continuing an earlier run of the same settings.
 
     Args:
-        task: what to generate.
-        certify_settings: of the certificates.
-        progress: told about every finished index.
+        task: the task of the scenarios.
+        certify_settings: settings of the certificates.
+        progress: called for every finished index.
 
     Raises:
         ScengenError: the pool cannot be written, or belongs to another run.
@@ -161,15 +162,15 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
 
 @contextmanager
 def _writing(folder: Path) -> Iterator[None]:
-    """Tell of a place that cannot be written.
+    """Report a folder that cannot be written.
 
     Raises:
-        PoolError: in one line, with the remedy.
+        PoolError: one line with the remedy.
     """
     try:
         yield
     except OSError as error:
-        why = f"{refused(folder, error)}; what is finished is kept, repeat the command to continue"
+        why = f"{refused(folder, error)}; finished work is kept, repeat the command to continue"
         raise PoolError(why) from None
 
 
@@ -195,19 +196,19 @@ def row_of(task: Task, draw: Draw, certified: Certified) -> PoolRow:
 
 
 def funnel(records: list[Record]) -> dict[str, int]:
-    """How many draws got through each step."""
-    order = ["", *reversed(CHECKS)]  # "" is a scenario that passed everything
+    """Number of draws that got through each step."""
+    order = ["", *reversed(CHECKS)]  # "" is a scenario that passed all checks
     counts = {"proposed": sum(r.proposals for r in records)}
     for stage, checks in STAGES.items():
         last = order.index(checks[-1])
-        counts[stage] = sum(order.index(_CHECK.get(r.check, r.check)) < last for r in records)
+        counts[stage] = sum(order.index(_COUNTED_AS.get(r.check, r.check)) < last for r in records)
     return counts
 
 
 _WITHOUT_ROW = ("feasible", PROCESS, "attack")
-"""Rejections that leave no certificate that tells of them."""
-_CHECK = {PROCESS: "compiles"}
-"""What the funnel counts a scenario as that has ended its process: feasible, and through nothing else."""
+"""Checks whose rejections leave no certificate."""
+_COUNTED_AS = {PROCESS: "compiles"}
+"""Check that counts as failed if a scenario has ended its process: it was feasible, and got through no other step."""
 
 
 def _config(job: Job) -> RunConfig:
@@ -232,10 +233,12 @@ def _extend(
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     verdicts = Counter(r.verdict for r in records.values())
     lost_in_a_row = 0
-    filling = Filling(journal, 0 if settings.attack else settings.n)  # an attack has the last word on what is in a pool
+    filling = Filling(
+        journal, 0 if settings.attack else settings.n
+    )  # an attack decides last which scenarios are in a pool
 
     def needed(index: int) -> bool:
-        """Whether index can still be among the first n certified ones."""
+        """Whether an index can still be among the first n certified ones."""
         if verdicts["certified"] < settings.n:
             return True
         return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
@@ -249,18 +252,18 @@ def _extend(
             filling.follow(records)
         verdicts[record.verdict] += 1
         lost_in_a_row = lost_in_a_row + 1 if record.check == PROCESS else 0
-        if lost_in_a_row == MOST_LOST:
-            why = f"{MOST_LOST} scenarios one after the other have no verdict, the last because it {record.reason}"
-            raise PoolError(f"{why}; give them more with limit_seconds= and limit_mb=, or look at one with workers=1")
+        if lost_in_a_row == MAX_LOST:
+            why = f"{MAX_LOST} scenarios in a row have no verdict, the last because it {record.reason}"
+            raise PoolError(f"{why}; raise limit_seconds= and limit_mb=, or debug one with workers=1")
         progress(verdicts["certified"], len(records), verdicts)
 
 
 def _attack(
     job: Job, settings: GenerateSettings, records: dict[int, Record], journal: Journal, progress: Progress
 ) -> attacks.AttackReport:
-    """Attack the scenarios that go into the pool; those that turn out to have a way around do not go into it."""
-    chosen = _first_certified(records, settings.n)
-    subjects = attacks.certified(job.task, journal.rows(chosen))
+    """Attack the scenarios that go into the pool. Those that have a way around are left out."""
+    indices = _first_certified(records, settings.n)
+    subjects = attacks.certified(job.task, journal.rows(indices))
     wanted = attacks.AttackSettings(
         split=settings.split,
         budget=settings.attack,
@@ -269,14 +272,14 @@ def _attack(
         limit_seconds=settings.limit_seconds,
         limit_mb=settings.limit_mb,
     )
-    about = sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
+    key = sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
 
-    def told(done: int, hits: int) -> None:
-        progress(len(chosen), len(records), {f"attacked, {hits} hits": done})
+    def attacked_so_far(done: int, hits: int) -> None:
+        progress(len(indices), len(records), {f"attacked, {hits} hits": done})
 
-    report = attacks.attack(job.task, subjects, wanted, journal.folder / f"attack-{about[:12]}", told)
+    report = attacks.attack(job.task, subjects, wanted, journal.folder / f"attack-{key[:12]}", attacked_so_far)
     around = {hit.scenario: hit for hit in reversed(report.refuting)}
-    for index, one in zip(chosen, subjects, strict=True):
+    for index, one in zip(indices, subjects, strict=True):
         if hit := around.get(one.scenario.id):
             reason = f"a way around, {hit}"
             records[index] = replace(records[index], verdict="refuted", check="attack", reason=reason)
@@ -297,7 +300,7 @@ def _finish(
     journal: Journal,
     report: attacks.AttackReport | None,
 ) -> Summary:
-    """Write the first n certified indices, and count up to the last of them."""
+    """Write the first n certified scenarios, and count the indices up to the last of them."""
     certified = _first_certified(records, settings.n)
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
@@ -316,7 +319,7 @@ def _finish(
         reasons=dict(reasons),
         **made_with(task),
         shards=(),
-        attack=None if report is None else attacks.stored(report, folder),
+        attack=None if report is None else attacks.store_in_pool(report, folder),
     )
     ready = moved_shards(journal, certified, folder)
     rest = journal.rows(certified[len(ready) * writing.SHARD_ROWS :])

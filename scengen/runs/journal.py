@@ -1,4 +1,4 @@
-"""The memory of a run: what became of every index, kept safe against being killed at any moment."""
+"""The journal of a run: a record for every index. A run may be killed at any moment and continued."""
 
 import json
 import shutil
@@ -23,7 +23,7 @@ from ..work.targets import refused, try_folder
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What became of one index."""
+    """Result of one index."""
 
     index: int
     verdict: str
@@ -31,35 +31,35 @@ class Record:
     """The first check that failed; empty for a certified scenario."""
     reason: str
     proposals: int
-    """Draws made for this index, infeasible ones included."""
+    """Number of draws for this index, infeasible ones included."""
     infeasible: dict[str, int]
-    """Infeasible draws by reason."""
+    """Number of infeasible draws by reason."""
     row: PoolRow | None
-    """The scenario, if it goes into the pool or is kept on request; None in what `Journal.records` gives."""
+    """The scenario, if it goes into the pool or is kept on request; None in the records of `Journal.records`."""
     cpu: float
     """Processor time spent [s]; differs from run to run and stays out of the pool."""
 
     def light(self) -> "Record":
-        """The same without its row, its words shared with all other records: a million of them take 400 MB."""
+        """The record without its row, its words shared with all other records: a million of them take 400 MB."""
         words = {name: sys.intern(getattr(self, name)) for name in ("verdict", "check", "reason")}
-        return replace(self, row=None, infeasible=self.infeasible or NOTHING, **words)
+        return replace(self, row=None, infeasible=self.infeasible or NONE_INFEASIBLE, **words)
 
 
-NOTHING: dict[str, int] = {}
-"""The infeasible draws of an index that had none."""
+NONE_INFEASIBLE: dict[str, int] = {}
+"""Infeasible draws of an index that had none, shared by all such records."""
 
 
 class Journal:
     """Records of one run in an SQLite file beside the pool. One writer at a time."""
 
     def __init__(self, pool: Path, identity: Mapping[str, Any]):
-        """Open or continue the run that makes `pool`.
+        """Begin or continue the run that makes `pool`.
 
         Args:
-            identity: everything that the scenarios depend on.
+            identity: all settings that the scenarios depend on.
 
         Raises:
-            ScengenError: the pool cannot be written, another run holds it, or one with another identity was begun.
+            ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was begun.
         """
         if not pool.name or pool.name == "..":
             raise PoolError(f"{pool} cannot become a pool; name a folder of its own with pool=")
@@ -87,7 +87,7 @@ class Journal:
 
     def _open(self, pool: Path, identity: Mapping[str, Any]) -> None:
         text = json.dumps(identity, sort_keys=True)
-        with self._told():
+        with self._faults_told():
             self._db = sqlite3.connect(self._path)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("CREATE TABLE IF NOT EXISTS run (identity TEXT)")
@@ -109,15 +109,15 @@ class Journal:
             )
 
     def records(self) -> dict[int, Record]:
-        """All records so far by index, without their rows: those of a large run do not fit into memory."""
-        with self._told():
+        """All records so far by index, without their rows, which do not fit into memory in a large run."""
+        with self._faults_told():
             found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
             return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu).light() for body, cpu in found)}
 
     def rows(self, indices: Iterable[int]) -> Iterator[PoolRow]:
-        """The stored scenarios of these indices, one after the other."""
+        """The stored scenarios of some indices, one after the other."""
         for index in indices:
-            with self._told():
+            with self._faults_told():
                 query = "SELECT scene, actions FROM record WHERE idx = ?"
                 scene, actions = self._db.execute(query, (index,)).fetchone()
                 plain = json.loads(scene)
@@ -126,13 +126,13 @@ class Journal:
             yield row
 
     def add(self, record: Record) -> None:
-        """Store one record; once this returns it survives a kill."""
+        """Store one record. It is on disk when this returns."""
         body = {f.name: getattr(record, f.name) for f in fields(record) if f.name not in ("row", "cpu")}
         scene, actions = None, None
         if record.row is not None:
             scene = json.dumps(record.row.plain())
             actions = np.asarray(record.row.witness, np.float32).tobytes()
-        with self._told(), self._db:
+        with self._faults_told(), self._db:
             self._db.execute(
                 "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",
                 (record.index, json.dumps(body), scene, actions, record.cpu),
@@ -145,18 +145,18 @@ class Journal:
             key: hash of its scenarios.
             entry: entry of the shard in a manifest.
         """
-        with self._told(), self._db:
+        with self._faults_told(), self._db:
             self._db.execute("INSERT OR REPLACE INTO shard VALUES (?, ?, ?)", (number, key, json.dumps(asdict(entry))))
 
     def shard(self, number: int, key: str) -> FileEntry | None:
         """Entry of a shard that was written; None if there is none with these scenarios."""
-        with self._told():
+        with self._faults_told():
             found = self._db.execute("SELECT entry FROM shard WHERE number = ? AND key = ?", (number, key)).fetchone()
             return FileEntry(**json.loads(found[0])) if found else None
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Tell a journal that is damaged from one that cannot be reached: only the former is worth nothing.
+    def _faults_told(self) -> Iterator[None]:
+        """Report faults, and distinguish a damaged journal, which is useless, from one that cannot be reached.
 
         Raises:
             PoolError: one line with the remedy.
@@ -164,7 +164,7 @@ class Journal:
         try:
             yield
         except sqlite3.Error as error:
-            code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says where in SQLite
+            code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the other bits are details
             raise PoolError(f"{self._path} {_FAULT.get(code) or f'gives an error ({error}); {_KEPT}'}") from None
         except (ValueError, TypeError, KeyError):
             raise PoolError(f"{self._path} {_DAMAGED}") from None
@@ -174,13 +174,13 @@ class Journal:
         self._lock.release()
 
 
-_KEPT = "what is finished is kept, repeat the command to continue"
+_KEPT = "finished work is kept, repeat the command to continue"
 _DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to begin again"
-_READ_ONLY = f"can only be read; make it and its folder writable, {_KEPT}"
-_IN_USE = f"is in use by another program; wait for that, {_KEPT}"
+_READ_ONLY = f"is read-only; make it and its folder writable, {_KEPT}"
+_IN_USE = f"is in use by another program; wait for it, {_KEPT}"
 _FAULT = {
     sqlite3.SQLITE_FULL: f"cannot grow, the disk is full; make room, {_KEPT}",
-    sqlite3.SQLITE_IOERR: f"cannot be read or written, the disk is full or at fault; make room or mend it, {_KEPT}",
+    sqlite3.SQLITE_IOERR: f"cannot be read or written, the disk is full or faulty; make room or repair it, {_KEPT}",
     sqlite3.SQLITE_READONLY: _READ_ONLY,
     sqlite3.SQLITE_PERM: _READ_ONLY,
     sqlite3.SQLITE_CANTOPEN: f"cannot be opened; see that its folder is writable and the disk has room, {_KEPT}",
@@ -189,4 +189,4 @@ _FAULT = {
     sqlite3.SQLITE_CORRUPT: _DAMAGED,
     sqlite3.SQLITE_NOTADB: _DAMAGED,
 }
-"""What is wrong with a journal and what helps, by SQLite's primary result code."""
+"""Fault of a journal and its remedy, by SQLite's primary result code."""

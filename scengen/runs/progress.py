@@ -1,4 +1,4 @@
-"""Progress of long work: a progress bar on a terminal, a line now and then elsewhere."""
+"""Progress of long work: a progress bar on a terminal, a line every few seconds elsewhere."""
 
 import time
 from types import TracebackType
@@ -8,14 +8,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ..work.parallel import Executor, Workers
 from ..work.printed import PlainConsole, printable
 
-EVERY = 15.0
-"""Seconds between two lines where there is no terminal."""
+LINE_INTERVAL = 15.0
+"""Time between two lines if there is no terminal [s]."""
 
 
 class ProgressBar:
-    """Shows how far some work has come, how fast it goes, when it will end, and on how many nodes.
+    """Shows the progress of some work, its speed, its estimated end, and the number of nodes.
 
-    The total is None where nobody knows when it will end.
+    The total is None if the end is unknown.
     """
 
     def __init__(self, console: PlainConsole, title: str, total: int | None, workers: Workers = 1):
@@ -23,7 +23,7 @@ class ProgressBar:
         self.console, self.title, self.total, self.workers = console, title, total, workers
         self._last, self._said = time.monotonic(), 0
         self._first: tuple[float, int] | None = None
-        """When something was shown first, and how much was done: a run that goes on has done more than this one."""
+        """Time of the first call of `show`, and the work done by then, part of it by an earlier run."""
         columns = (
             TextColumn("{task.description}", markup=False),
             BarColumn(),
@@ -45,13 +45,13 @@ class ProgressBar:
             self._progress.stop()
 
     def of(self, done: int, total: int, note: str = "") -> None:
-        """Say that `done` of a total are done that was not known before."""
+        """Show that `done` of a new total are done."""
         self.total = total
         self._progress.update(self._task, total=total)
         self.show(done, note)
 
     def show(self, done: int, note: str = "") -> None:
-        """Say that `done` of the total are done."""
+        """Show that `done` of the total are done."""
         now = time.monotonic()
         if self._first is None or done < self._first[1]:  # other work has begun
             self._first = now, done
@@ -59,7 +59,7 @@ class ProgressBar:
         rate = (done - self._first[1]) / (now - self._first[0]) if now > self._first[0] else 0.0
         told = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
         self._progress.update(self._task, completed=done, note=told)
-        due = now - self._last > EVERY or (done == self.total and self._said != done)
+        due = now - self._last > LINE_INTERVAL or (done == self.total and self._said != done)
         if due and not self.console.is_terminal:
             self._last, self._said = now, done
             left = (self.total - done) / rate if rate and self.total else 0.0

@@ -1,1 +1,1 @@
-"""Certificates: checks, rollouts, verification without any oracle."""
+"""Certificates: checks, rollouts, and verification without an oracle."""

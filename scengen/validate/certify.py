@@ -21,12 +21,12 @@ from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
 CONFIDENCE = 0.95
-"""Of the one-sided bound on the oracle's success rate."""
+"""Confidence of the one-sided bound on the oracle's success rate."""
 
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate with the files it speaks of. Texts are empty where the scene was never built."""
+    """A certificate with the scene and the witness that it is about. The scene is empty if it was never built."""
 
     certificate: Certificate
     scene_xml: str
@@ -48,16 +48,16 @@ def certify(
     Args:
         scenario: an instance of a family that has an oracle.
         horizon: time limit for reaching the goal [s].
-        settings: of the checks.
+        settings: settings of the checks.
         embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
-        last: the check after which to stop, for those who want to know about it only; nothing is certified then.
-        adversary: who attacks the scenario where the settings ask for it: `scengen.attack.check.attacked`.
+        last: the check after which to stop, if only this check is of interest; nothing is certified then.
+        adversary: attacks the scenario if the settings ask for it: `scengen.attack.check.attacked`.
 
     Raises:
         BadConfig: the settings ask for an attack, and there is no adversary.
     """
     if settings.attack and adversary is None:
-        what = f"certify.attack = {settings.attack}, but nobody attacks"
+        what = f"certify.attack = {settings.attack}, but no adversary is given"
         raise BadConfig(f"{what}; pass adversary=scengen.attack.check.attacked")
     trial = Trial(scenario, horizon, settings, embodiment, adversary)
     checks: list[Check] = []
@@ -68,20 +68,20 @@ def certify(
             checks.extend(Check(rest, None, why, {}, {}) for rest in list(CHECKS)[len(checks) :])
             break
         checks.append(trial.check(name))
-    witness = trial.witness
+    solution = trial.solution
     empty = np.zeros((0, action_size(embodiment)), np.float32)
     return Certified(
         Certificate(settings.name, tuple(checks)),
         trial.text,
-        witness.actions if witness else empty,
-        witness.digest if witness else "",
+        solution.actions if solution else empty,
+        solution.digest if solution else "",
     )
 
 
 class Trial:
-    """What the checks of one scenario share: its text, its world, its witness.
+    """State that the checks of one scenario share: its text, its world, its solution.
 
-    Whoever has a witness already may set it, and run the checks that only replay it.
+    If a solution exists already, set `text` and `solution` to run only the checks that replay it.
     """
 
     def __init__(
@@ -95,11 +95,13 @@ class Trial:
         self.scenario, self.horizon, self.settings, self.embodiment = scenario, horizon, settings, embodiment
         self.adversary = adversary
         self.text = ""
-        self.witness: Rollout | None = None
+        """The scene, MJCF; empty before it compiles."""
+        self.solution: Rollout | None = None
+        """Rollout of the oracle that reached the goal, whose actions become the witness; None before there is one."""
 
     def check(self, name: str) -> Check:
-        """Run one of `CHECKS`; some rely on what earlier ones have left here."""
-        look = {
+        """Run one of `CHECKS`; some need the results of earlier ones."""
+        checks = {
             "feasible": self._feasible,
             "compiles": self._compiles,
             "overlap": self._overlap,
@@ -114,15 +116,15 @@ class Trial:
             "witness": self._witness,
             "attack": self._attack,
         }
-        settings, numbers, reason = look[name]()
+        settings, numbers, reason = checks[name]()
         waived = reason.startswith(NOT_CHECKED)
         return Check(name, None if waived else not reason, reason, settings, numbers)
 
-    # Each check returns its settings, its numbers, and the reason of its failure: empty when it passed, and one that
-    # begins with `NOT_CHECKED` where there is nothing to check.
+    # Each check returns its settings, its numbers, and the reason of its failure: empty if it passed, and one that
+    # begins with `NOT_CHECKED` if there is nothing to check.
 
     def _feasible(self) -> "Finding":
-        """What refutes the scenario before anything moves; of one that stands, what its physics depends on."""
+        """Constraints of the family. Numbers of a feasible scenario are the features that its physics depends on."""
         if refutation := self.scenario.infeasible():
             return {}, dict(refutation.numbers), refutation.reason
         return {}, dict(self.scenario.features()), ""
@@ -149,25 +151,25 @@ class Trial:
         return {"overlap": self.settings.overlap}, {"deepest": depth}, reason
 
     def _rest(self) -> "Finding":
-        """Nobody acts; the goal is watched too, at the start and at the end of the time, or before the first event."""
+        """Whether bodies move without action. The goal is evaluated at the start, and at the end or before an event."""
         world, limits = self.world, self.settings.rest
         bodies = [b for b in world.free_bodies if b not in self.scenario.MOVING]
 
-        def seen() -> tuple[dict[str, tuple[Vec3, Mat3]], bool]:
+        def state() -> tuple[dict[str, tuple[Vec3, Mat3]], bool]:
             return {b: (world.com(b), world.rot(b)) for b in bodies}, self.scenario.success(world)
 
-        start, self.solved_at_start = seen()
+        start, self.solved_at_start = state()
         end, self.solved_after_rest = start, self.solved_at_start
         episode, waiting = Episode(self.scenario, world), self.scenario.pending(world)
         for _ in range(round(limits.seconds / Loop.PERIOD)):
             if episode.step(world.filter(world.idle)) == "unstable":
                 return asdict(limits), {}, episode.reason
             if waiting and not self.scenario.pending(world):
-                break  # what the event has set in motion is no lack of rest
+                break  # motion that the event has started does not count
             if waiting:
-                end, self.solved_after_rest = seen()
+                end, self.solved_after_rest = state()
         else:
-            end, self.solved_after_rest = seen()
+            end, self.solved_after_rest = state()
         drift = {b: float(np.linalg.norm(end[b][0] - start[b][0])) for b in bodies}
         turn = {b: _angle(end[b][1], start[b][1]) for b in bodies}
         worst, most = (
@@ -187,7 +189,7 @@ class Trial:
         return {}, {}, "the goal holds after settling" if self.solved_after_rest else ""
 
     def _idle(self) -> "Finding":
-        """Nobody acts until the time limit, or until everything has been at rest for longer than `rest` watches."""
+        """Whether doing nothing reaches the goal. It may end at rest, after the seconds of the check `rest`."""
 
         def wait(world: World) -> Plan:
             yield from repeat(world.idle, round(self.settings.rest.seconds / Loop.PERIOD))
@@ -200,17 +202,17 @@ class Trial:
         episode = self._run(self.scenario.oracle)
         if not episode.solved:
             return {"horizon": self.horizon}, _outcome(episode), f"the oracle failed: {episode.reason}"
-        self.witness = episode
+        self.solution = episode
         return {"horizon": self.horizon}, _outcome(episode), ""
 
     def _shortcuts(self) -> "Finding":
-        """Every tempting plan, through the teleoperation filter and without it: a policy has none in its way."""
+        """Every tempting plan, through the teleoperation filter and without it, because a policy acts without it."""
         numbers: dict[str, dict[str, Any]] = {}
         for name, shortcut in self.scenario.shortcuts().items():
             numbers[name] = {}
             for how, raw in ACTIONS.items():
                 tried = try_shortcut(self.scenario, self.world, shortcut, self.horizon, self.settings.settle, raw)
-                numbers[name][how] = _attempted(tried)
+                numbers[name][how] = _outcome_of_shortcut(tried)
                 if tried.solved:
                     return {}, numbers, f"{name!r} reaches the goal ({how})"
                 if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
@@ -243,13 +245,13 @@ class Trial:
         return size, numbers, f"{limits.runs} runs cannot show a bound of {limits.bound:g}; ask for more"
 
     def _numerics(self) -> "Finding":
-        """The witness with half the time step and with twice the iterations; where it flips, the oracle must do."""
-        assert self.witness is not None
+        """The witness with half the time step and with twice the iterations; if it fails, the oracle must succeed."""
+        assert self.solution is not None
         half, patient = self._load(substeps=2 * self.world.loop.substeps), self._load()
         patient.model.opt.iterations *= 2
         numbers: dict[str, Any] = {}
         for name, world in {"half_time_step": half, "twice_the_iterations": patient}.items():
-            kept = replay(self.scenario, world, self.witness.actions, self.horizon, self.settings.settle)
+            kept = replay(self.scenario, world, self.solution.actions, self.horizon, self.settings.settle)
             numbers[name] = {"witness": kept.outcome}
             if not kept.solved:
                 again = run(self.scenario, world, self.scenario.oracle, self.horizon, self.settings.settle)
@@ -259,7 +261,7 @@ class Trial:
         return {}, numbers, ""
 
     def _ablations(self) -> "Finding":
-        assert self.witness is not None
+        assert self.solution is not None
         if not (ablations := self.scenario.ablations()):
             return {}, {}, no_ablations(self.scenario)
         numbers = {}
@@ -268,7 +270,7 @@ class Trial:
             episode = replay(
                 self.scenario,
                 World.load(text, self.embodiment),
-                self.witness.actions,
+                self.solution.actions,
                 self.horizon,
                 self.settings.settle,
                 until_settled=True,
@@ -279,21 +281,21 @@ class Trial:
         return {}, numbers, ""
 
     def _witness(self) -> "Finding":
-        """The recorded actions alone, in a freshly loaded world, must end in the same bits."""
-        assert self.witness is not None
-        again = replay(self.scenario, self._load(), self.witness.actions, self.horizon, self.settings.settle)
+        """The recorded actions alone, in a freshly loaded world, which must end in the same bits."""
+        assert self.solution is not None
+        again = replay(self.scenario, self._load(), self.solution.actions, self.horizon, self.settings.settle)
         settings = {"settle": self.settings.settle}
-        numbers = {"periods": len(self.witness.actions), "seconds": self.witness.seconds}
+        numbers = {"periods": len(self.solution.actions), "seconds": self.solution.seconds}
         if not again.solved:
             return settings, numbers, f"the recorded actions do not solve the scenario: {again.reason}"
         return (
             settings,
             numbers,
-            "" if again.digest == self.witness.digest else "the replay ends in another state",
+            "" if again.digest == self.solution.digest else "the replay ends in another state",
         )
 
     def _attack(self) -> "Finding":
-        """Whether the built-in adversary finds a way around what the task is about."""
+        """Whether the built-in adversary reaches the goal without the means that the task requires."""
         if not self.settings.attack:
             return {}, {}, NO_ATTACK
         assert self.adversary is not None
@@ -307,18 +309,19 @@ class Trial:
 
 
 Finding = tuple[Mapping[str, Any], Mapping[str, Any], str]
+"""Settings and numbers of a check, and the reason of its failure."""
 Adversary = Callable[[Trial], Finding]
-"""Attacks the scenario of a trial whose witness has been found."""
+"""Attacks the scenario of a trial that has a solution."""
 ACTIONS = {"filtered": False, "raw": True}
-"""How actions come to the controller, and whether that is raw."""
+"""Ways in which actions reach the controller, and whether that is raw."""
 NO_ATTACK = f"{NOT_CHECKED}the settings ask for no rollouts of the adversary"
-"""What a certificate says where nobody has attacked."""
+"""Reason in a certificate without an attack."""
 NOT_TRIED = "not tried"
-"""What a certificate says of a shortcut that gave up: nothing is known about it."""
+"""Outcome in a certificate of a shortcut that gave up: nothing is known about it."""
 
 
 def no_ablations(scenario: Scenario) -> str:
-    """What a certificate says where a family has no ablations."""
+    """Reason in a certificate of a family that has no ablations."""
     return NOT_CHECKED + (scenario.NO_ABLATIONS or "the family has no ablations, and does not say why")
 
 
@@ -331,8 +334,8 @@ def _outcome(episode: Rollout) -> dict[str, Any]:
     return {"outcome": episode.outcome, "reason": episode.reason, "seconds": episode.seconds}
 
 
-def _attempted(tried: Rollout) -> dict[str, Any]:
-    """As `_outcome`, of a shortcut: one that gave up, and was not stopped by a failure, has not been tried."""
+def _outcome_of_shortcut(tried: Rollout) -> dict[str, Any]:
+    """Like `_outcome`. A shortcut that gave up, and was not stopped by a failure, counts as not tried."""
     told = _outcome(tried)
     return {**told, "outcome": NOT_TRIED} if tried.gave_up and tried.outcome == "timeout" else told
 

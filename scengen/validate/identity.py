@@ -1,4 +1,4 @@
-"""The code and the versions that a certificate depends on."""
+"""Code and versions that a certificate depends on."""
 
 import ast
 import hashlib
@@ -18,7 +18,7 @@ from ..versions import versions
 
 
 def check_versions(made: Mapping[str, str], where: str) -> None:
-    """Refuse what was certified with another MuJoCo or robosuite than the installed one.
+    """Refuse a pool that was certified with another MuJoCo or robosuite than the installed one.
 
     Raises:
         PoolError: one of them differs.
@@ -32,18 +32,18 @@ def check_versions(made: Mapping[str, str], where: str) -> None:
 
 
 JUDGES = ("scengen.episode", "scengen.validate.rollout", "scengen.validate.certify")
-"""Modules that decide what a certificate says, besides those that a family imports."""
+"""Modules that decide the verdict of a certificate, besides those that a family imports."""
 
 
 @cache
 def source_sha256(family: type[Scenario]) -> str:
     """Hash of the code that a certificate depends on: the family's module, and everything below it.
 
-    Imports are followed through scengen, the family's own package and any other code that lies open on the path:
-    assets, skills, predicates, helpers of third parties. An installed distribution counts by its name and version;
-    those that scengen itself depends on stand under `versions`, and the standard library under nothing. Comments,
-    docstrings, formatting and the methods `oracle` and `features` of the family do not count: a certificate rests on
-    the witness, not on how it was found or how its scene is described.
+    Imports are followed through scengen, the family's own package and any other source files on the path: assets,
+    skills, predicates, modules of third parties. An installed distribution counts by its name and version. The
+    distributions that scengen itself depends on are listed in `versions` instead, and the standard library does not
+    count. Comments, docstrings, formatting and the methods `oracle` and `features` of the family do not count: a
+    certificate rests on the witness, not on how it was found or how its scene is described.
     """
     module = inspect.getmodule(family)
     assert module is not None
@@ -54,7 +54,7 @@ def source_sha256(family: type[Scenario]) -> str:
 
 @cache
 def packages(family: type[Scenario]) -> Mapping[str, str]:
-    """Installed distributions that the code of a certificate imports by itself, with their versions."""
+    """Versions of the installed distributions that the code of a certificate imports, by name."""
     module = inspect.getmodule(family)
     assert module is not None
     files, _ = _sources(module.__name__, *JUDGES)
@@ -62,14 +62,14 @@ def packages(family: type[Scenario]) -> Mapping[str, str]:
     own = {name.partition(".")[0] for name in files}
     found = {}
     for top in tops - own - sys.stdlib_module_names:
-        for name in _distributions().get(top, [top]):  # a module that is one compiled file is listed by nobody
+        for name in _distributions().get(top, [top]):  # a module of one compiled file is not listed
             with suppress(importlib.metadata.PackageNotFoundError):
                 found[name] = importlib.metadata.version(name)
     return found
 
 
 def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:
-    """Files of some modules and of all that they import, by module; and installed distributions, as `name version`."""
+    """Files of some modules and of all their imports, by module; and installed distributions, as `name version`."""
     own = {name.partition(".")[0] for name in names}
     files: dict[str, Path] = {}
     installed: set[str] = set()
@@ -77,7 +77,7 @@ def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:
     while todo:
         importer, name = todo.pop()
         top = name.partition(".")[0]
-        ours = importer.startswith("scengen.") and top != "scengen"  # what scengen needs stands under `versions`
+        ours = importer.startswith("scengen.") and top != "scengen"  # what scengen needs is listed in `versions`
         if name in files or ours or top in sys.stdlib_module_names or not (path := _file(name)):
             continue
         if top not in own and (distributions := _distributions().get(top)):
@@ -90,7 +90,7 @@ def _sources(*names: str) -> tuple[dict[str, Path], set[str]]:
 
 @cache
 def _imports(name: str, path: Path) -> tuple[str, ...]:
-    """Names that a file imports, wherever in it; of `from a import b` both `a` and `a.b`, which may be a module."""
+    """Names that a file imports anywhere in it; of `from a import b` both `a` and `a.b`, which may be a module."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     found: list[str] = []
     for node in ast.walk(ast.parse(path.read_text())):
@@ -105,7 +105,7 @@ def _imports(name: str, path: Path) -> tuple[str, ...]:
 
 @cache
 def _file(name: str) -> Path | None:
-    """The Python file of a module; None if there is none, as for names that are no modules."""
+    """The Python file of a module; None if there is none, for instance because the name is not a module."""
     try:
         spec = importlib.util.find_spec(name)
     except (ModuleNotFoundError, ValueError):
@@ -129,7 +129,8 @@ def _dependencies() -> frozenset[str]:
 def _essence(path: Path, family: str) -> str:
     """The code of a file without comments and docstrings, and without `oracle` and `features` of the class `family`.
 
-    As nested lists, not as text that Python writes: that of 3.12 has other quotes in f-strings than that of 3.11."""
+    It is written as nested lists, because `ast.unparse` of Python 3.12 has other quotes in f-strings than that of 3.11.
+    """
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -140,8 +141,8 @@ def _essence(path: Path, family: str) -> str:
 
 
 def _plain(node: object) -> object:
-    """A syntax tree as lists, without what is empty: later Pythons know more kinds of what is not there."""
-    if isinstance(node, ast.JoinedStr):  # Python 3.12.1 sees empty texts in some
+    """A syntax tree as lists, without empty fields, of which later Pythons have more."""
+    if isinstance(node, ast.JoinedStr):  # Python 3.12.1 adds empty texts to some
         return ["JoinedStr", [_plain(v) for v in node.values if not (isinstance(v, ast.Constant) and v.value == "")]]
     if isinstance(node, ast.AST):
         told = [(name, _plain(value)) for name, value in ast.iter_fields(node) if value is not None and value != []]
@@ -150,6 +151,7 @@ def _plain(node: object) -> object:
 
 
 def _ignored(statement: ast.stmt, of_family: bool) -> bool:
+    """Whether a statement does not count: a docstring, or a method of the family that certificates do not rest on."""
     documents = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
     return documents or (
         of_family and isinstance(statement, ast.FunctionDef) and statement.name in ("oracle", "features")

@@ -1,4 +1,4 @@
-"""The result of a verification as JUnit XML: a test for every scenario, a failure for a refuted one."""
+"""Reports of verification as JUnit XML: a test for every scenario, a failure for a refuted one."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -11,10 +11,10 @@ _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit(reports: Mapping[str, Report]) -> str:
-    """The text of a file that CI systems read, a suite for each pool.
+    """Text of a file for CI systems, with a suite for each pool.
 
     Args:
-        reports: by the name of the pool.
+        reports: reports by the name of the pool.
     """
     suites = ET.Element("testsuites")
     suites.extend(_suite(pool, report) for pool, report in reports.items())

@@ -1,4 +1,4 @@
-"""Whether what an untrusted pool holds can be played at all: tried where it can be ended, before it is looked at."""
+"""Trial runs of untrusted scenes in a process that can be ended, before anything else uses the scenes."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -11,21 +11,21 @@ from ..sim.world import World
 from ..work.parallel import SHOWN, Workers, apart, each
 
 Played = tuple[str, str, Actions]
-"""A scene, its robot, and what is done in it."""
+"""A scene, MJCF, its robot, and actions."""
 
 
 def play(what: Played) -> None:
-    """Compile a scene and play actions in it, without looking at what comes of it."""
+    """Compile a scene and play actions in it. The result is not used."""
     scene_xml, embodiment, actions = what
     world = World.load(scene_xml, embodiment)
     world.reset()
-    with suppress(Unstable):  # whoever looks at it sees that too
+    with suppress(Unstable):  # later uses of the scene meet it again
         for action in actions:
             world.apply(action)
 
 
 def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[str, str]]:
-    """Id and reason of every scenario that crashes, or takes more than a scenario may.
+    """Id and reason of every scenario that crashes or exceeds the limits of a scenario.
 
     Raises:
         ScengenError: a scene does not compile.
@@ -40,7 +40,7 @@ def _try(row: PoolRow) -> tuple[str, str] | None:
 
 
 def check_row(row: PoolRow) -> PoolRow:
-    """Refuse a scenario that crashes, or takes more than a scenario may.
+    """Refuse a scenario that crashes or exceeds the limits of a scenario.
 
     Raises:
         ScengenError: it does; or its scene does not compile.
@@ -50,5 +50,9 @@ def check_row(row: PoolRow) -> PoolRow:
 
 
 def check_scene(scene_xml: str, embodiment: str) -> None:
-    """The same of a scene at its start."""
+    """Refuse a scene that crashes or exceeds the limits at its start.
+
+    Raises:
+        ScengenError: it does; or it does not compile.
+    """
     apart(play, (scene_xml, embodiment, NO_WITNESS), SHOWN, "compiling a scene")

@@ -1,4 +1,4 @@
-"""What verification simulates: the witness again, the checks that need no oracle, or the whole certificate."""
+"""Simulations of verification: the witness again, the checks that need no oracle, or the whole certificate."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ from .rollout import Rollout, replay
 from .settings import CertifySettings
 
 LEVELS = ("replay", "recheck", "full")
-"""How much is simulated: the witness alone; every check that needs no oracle; every check."""
-FIRST = ("feasible", "compiles", "overlap", "rest", "unsolved", "idle")
-"""Checks that need neither oracle nor witness, in the order in which each relies on those before it."""
-REPLAYED = ("numerics", "ablations")
-"""Checks that need the witness. Where it flips under other numerics the certificate lets the oracle try, and so does
-verification: only there it needs one."""
+"""Levels of verification: simulate the witness alone; every check that needs no oracle; every check."""
+BEFORE_WITNESS = ("feasible", "compiles", "overlap", "rest", "unsolved", "idle")
+"""Checks that need neither oracle nor witness, in order: each needs those before it."""
+WITH_WITNESS = ("numerics", "ablations")
+"""Checks that need the witness. If the witness fails under other numerics, the certificate and its verification let the
+oracle try: only then verification needs an oracle."""
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """What came of it."""
+    """Result of a simulation."""
 
     reasons: tuple[str, ...]
-    """What does not hold; empty if all is well."""
+    """Faults; empty if there are none."""
     drifted: bool
-    """The witness reaches the goal, but ends in other bits than on the machine of the certificate."""
+    """Whether the witness reaches the goal, but ends in other bits than on the machine of the certificate."""
 
 
 def simulate(
@@ -43,12 +43,12 @@ def simulate(
     level: str,
     adversary: Adversary | None = None,
 ) -> Simulated:
-    """Simulate what a level asks for, until something does not hold.
+    """Simulate what a level asks for, until a fault is found.
 
     Args:
-        row: whose labels, names and settings have been found right.
-        text: the scene as the family builds it here; that of the row is never compiled.
-        settings: of the certificate.
+        row: a row whose labels, names and settings are right.
+        text: the scene as the family builds it here; the scene of the row is never compiled.
+        settings: settings of the certificate.
         level: one of `LEVELS`.
         adversary: see `certify`.
     """
@@ -57,7 +57,7 @@ def simulate(
     trial.text = text
     stored = {check.name: check for check in row.certificate.checks}
     counted = trial.check("compiles")
-    if reasons := list(_against(counted, stored["compiles"], True)):
+    if reasons := list(_differences(counted, stored["compiles"], True)):
         return Simulated(tuple(reasons), False)
     rollout = replay(scenario, trial.world, row.witness, row.horizon, settings.settle)
     drifted = rollout.digest != row.certificate.final_state
@@ -72,22 +72,22 @@ def simulate(
 def fails_again(
     row: PoolRow, scenario: Scenario, settings: CertifySettings, level: str, adversary: Adversary | None
 ) -> Iterator[str]:
-    """Where a kept reject does not fail as its certificate says. On a machine that rounds otherwise it need not.
+    """Differences between a kept reject and its certificate. On a machine with different rounding there may be some.
 
     Args:
-        row: whose labels, names, settings and scene have been found right.
+        row: a row whose labels, names, settings and scene are right.
         level: `recheck` repeats the checks without an oracle as far as they were made, `full` all of them.
         adversary: see `certify`.
     """
     if level == "replay" or row.certificate.fingerprint != fingerprint():
         return
-    last = None if level == "full" else FIRST[-1]
+    last = None if level == "full" else BEFORE_WITNESS[-1]
     again = certify(scenario, row.horizon, settings, row.embodiment, last, adversary)
     for check, stored in zip(again.certificate.checks, row.certificate.checks, strict=True):
-        if last and check.name not in FIRST:
+        if last and check.name not in BEFORE_WITNESS:
             return
         if (check.passed, check.reason) != (stored.passed, stored.reason):
-            told = "is passed" if check.passed else f"fails: {check.reason}" if check.reason else "is not made"
+            told = "passes" if check.passed else f"fails: {check.reason}" if check.reason else "is not made"
             yield f"check {check.name} of this reject {told} when it is made again"
             return
         if not alike(check.numbers, stored.numbers):
@@ -96,10 +96,10 @@ def fails_again(
 
 
 def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -> str:
-    """Why the scenario of an index is not certified, as a manifest counts it; empty if it is.
+    """Reason why the scenario of an index is not certified, as a manifest counts it; empty if it is certified.
 
     Args:
-        index: at which a feasible scenario is drawn.
+        index: an index with a feasible scenario.
         adversary: see `certify`.
     """
     task = claims.task
@@ -112,22 +112,22 @@ def _replayed(row: PoolRow, rollout: Rollout, here: bool) -> Iterator[str]:
         yield f"the witness fails: {rollout.reason}"
         return
     if here and rollout.digest != row.certificate.final_state:
-        yield "the witness ends in another state, although this machine rounds as the certificate's did"
+        yield "the witness ends in another state, although this machine rounds like the certificate's"
     if here and not np.array_equal(rollout.actions, row.witness):
-        yield f"the witness has {len(row.witness)} actions, and {len(rollout.actions)} are played"
+        yield f"the witness has {len(row.witness)} actions, but {len(rollout.actions)} are played"
     if here and rollout.seconds != _check(row, "witness").numbers["seconds"]:
         yield f"the witness reaches the goal after {rollout.seconds:g} s, not when its certificate says"
 
 
 def _repeated(trial: Trial, rollout: Rollout, stored: dict[str, Check], here: bool) -> Iterator[str]:
-    for name in (*FIRST, *REPLAYED):
-        if name in REPLAYED:
-            trial.witness = rollout
+    for name in (*BEFORE_WITNESS, *WITH_WITNESS):
+        if name in WITH_WITNESS:
+            trial.solution = rollout
         try:
             found = trial.check(name)
         except NoOracle:
-            found = Check(name, False, "the witness does not hold, and this machine has no oracle", {}, {})
-        yield from _against(found, stored[name], here)
+            found = Check(name, False, "the witness fails, and this machine has no oracle", {}, {})
+        yield from _differences(found, stored[name], here)
         if not found.passed and not found.waived:
             return
 
@@ -147,11 +147,11 @@ def _certified_again(
     same_oracle = np.array_equal(again.witness, row.witness)
     for check in again.certificate.checks:
         depends = check.name in ("solved", "robust", "numerics", "ablations", "witness", "attack")
-        yield from _against(check, stored[check.name], here and (same_oracle or not depends))
+        yield from _differences(check, stored[check.name], here and (same_oracle or not depends))
 
 
-def _against(found: Check, stored: Check, exact: bool) -> Iterator[str]:
-    """Where a check that was made again does not say what is stored."""
+def _differences(found: Check, stored: Check, exact: bool) -> Iterator[str]:
+    """Differences between a check that was made again and the stored one."""
     if not found.passed and not found.waived:
         yield f"check {found.name} fails: {found.reason}"
     elif exact and not alike(found.numbers, stored.numbers):

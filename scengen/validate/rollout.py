@@ -19,30 +19,31 @@ from ..scenario import Action, Planner, Scenario, Shortcut
 from ..sim.world import World
 from .settings import Robust
 
-STILL_FOR = 0.5
-"""For so long every coordinate of scene and robot must keep to its place where an episode is called settled [s] ..."""
-STILL = 5e-4
-"""... but for this [m, rad]: 1 mm in a second. What trembles in its place is at rest, as it is where a hand presses."""
-PATIENCE = 3.0
-"""How many time limits a shortcut gets that is simulated to rest: two fallen tiles may rock for 14 s."""
+REST_TIME = 0.5
+"""Time for which every coordinate of scene and robot must keep to its place before an episode counts as settled [s]."""
+REST_TOLERANCE = 5e-4
+"""Largest change of a coordinate during `REST_TIME` [m, rad], 1 mm in a second. A body that trembles in its place is at
+rest, for instance one that a hand presses."""
+SHORTCUT_TIME_LIMITS = 3.0
+"""Duration of a shortcut that is simulated to rest, in time limits: two fallen tiles may rock for 14 s."""
 AT_REST = "everything came to rest without reaching the goal"
-"""The reason of an episode that was seen to its end."""
+"""Reason of an episode that was simulated to rest."""
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """What came of a rollout."""
+    """Result of a rollout."""
 
     outcome: Outcome
     reason: str
-    """Why it is no success; empty for a success."""
+    """Reason why it is not a success; empty for a success."""
     seconds: float
-    """When the goal was reached, or when the episode ended [s]."""
+    """Time at which the goal was reached, or at which the episode ended [s]."""
     actions: Actions
     digest: str
     """Hash of the final physics state."""
     gave_up: str = ""
-    """Why the plan could not be carried out to its end; empty if it could, or if the episode ended before."""
+    """Reason why the plan could not be completed; empty if it was, or if the episode ended before."""
 
     @property
     def solved(self) -> bool:
@@ -51,13 +52,13 @@ class Rollout:
 
 @dataclass(frozen=True)
 class Jitter:
-    """Small disturbances of a rollout. Which ones is decided by `key` alone."""
+    """Small disturbances of a rollout, drawn from `key` alone."""
 
     key: str
     position: float
     """Largest displacement of a free body in x and in y [m]."""
     turn: float
-    """Largest turn of a free body about the vertical, and of what hangs on a disturbed hinge about that [deg]."""
+    """Largest turn of a free body about the vertical, and of a body on a disturbed hinge about the hinge [deg]."""
     mass: float
     """Largest relative change of a free body's mass."""
     friction: float
@@ -69,7 +70,7 @@ class Jitter:
 
     @classmethod
     def within(cls, limits: Robust, key: str, run: int) -> Self:
-        """The jitter of one of several runs under the same limits; every second run is late."""
+        """The jitter of one of several runs under the same limits; every second run has latency."""
         late = run % 2 * limits.latency
         sizes = (limits.position, limits.turn, limits.mass, limits.friction, limits.noise)
         return cls(f"{key}/{run}", *sizes, late)
@@ -78,7 +79,7 @@ class Jitter:
         """A world like `world`, with its bodies moved, heavier or lighter, and more or less slippery.
 
         Args:
-            hinges: that start turned, with what hangs on them heavier or lighter too: `Scenario.DISTURBED`.
+            hinges: hinges that start turned, and whose bodies are heavier or lighter too: `Scenario.DISTURBED`.
         """
         model = copy.copy(world.model)
         for name in world.free_bodies:
@@ -131,12 +132,13 @@ def run(
 
     Args:
         horizon: time limit for reaching the goal [s].
-        until_settled: the episode may end once the plan has ended, everything is at rest, and no event is pending.
-        raw: actions go to the controller as they are, clipped; else through the teleoperation filter.
+        until_settled: whether the episode may end once the plan has ended, everything is at rest, and no event is
+            pending.
+        raw: whether actions go to the controller as they are, clipped; else through the teleoperation filter.
     """
     world.reset()
     stillness = Stillness(scenario, world) if until_settled else None
-    return _live(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
+    return _play(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
 
 
 def replay(
@@ -150,44 +152,40 @@ def replay(
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
     stillness = Stillness(scenario, world) if until_settled else None
-    return _live(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
+    return _play(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
 
 
 def try_shortcut(
     scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0, raw: bool = False
 ) -> Rollout:
-    """Play a tempting plan as a certificate does: within the time limit, or where it must come to rest, beyond it."""
-    patience = PATIENCE if shortcut.to_rest else 1.0
+    """Play a tempting plan as a certificate does: until the time limit, or longer if it is simulated to rest."""
+    patience = SHORTCUT_TIME_LIMITS if shortcut.to_rest else 1.0
     return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True, raw=raw)
 
 
 class _Planned:
-    """Actions of a plan, filtered or raw, with noise and latency if wanted."""
+    """Actions of a plan, filtered or raw, with noise and latency if a jitter is given."""
 
     def __init__(self, world: World, planner: Planner, jitter: Jitter | None, raw: bool):
-        self.plan, self.world, self.jitter, self.sent = (
-            planner(world),
-            world,
-            jitter,
-            unfiltered if raw else world.filter,
-        )
+        self.plan, self.world, self.jitter = planner(world), world, jitter
+        self.filter = unfiltered if raw else world.filter
         self.ended, self.note, self.periods = False, "", 0
-        self.late: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
+        self.delayed: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
 
     def next(self) -> NDArray[np.float32]:
         """The next action for the controller."""
-        action = self._ask()
+        action = self._planned()
         if self.jitter:
-            self.late.append(self.jitter.shaken(action, self.periods))
-            action = self.late.popleft()
+            self.delayed.append(self.jitter.shaken(action, self.periods))
+            action = self.delayed.popleft()
         self.periods += 1
-        return self.sent(action)
+        return self.filter(action)
 
     def stop(self) -> None:
         """Called when the goal has been reached: the rest of the plan is not played."""
         self.ended = True
 
-    def _ask(self) -> Action:
+    def _planned(self) -> Action:
         if not self.ended:
             try:
                 return next(self.plan)
@@ -199,41 +197,44 @@ class _Planned:
 
 
 class _Recorded:
-    """Recorded actions, then no-ops; the recording covers the settling phase."""
+    """Recorded actions, then idle ones. The recording covers the settling phase."""
 
     note = ""
 
     def __init__(self, world: World, actions: Actions):
-        self.world, self.rows, self.ended = world, iter(np.asarray(actions, np.float32)), False
+        self.world, self.ended = world, False
+        self.left = iter(np.asarray(actions, np.float32))
 
     def next(self) -> NDArray[np.float32]:
         """The next action for the controller."""
-        row = next(self.rows, None)
-        self.ended = row is None
-        return self.world.idle.astype(np.float32) if row is None else row
+        action = next(self.left, None)
+        self.ended = action is None
+        return self.world.idle.astype(np.float32) if action is None else action
 
     def stop(self) -> None:
         """Called when the goal has been reached; a recording goes on."""
 
 
 class Stillness:
-    """Watches whether everything has come to rest after the actions have ended, with no event to come."""
+    """Watches whether everything has come to rest after the actions have ended and with no event pending."""
 
     def __init__(self, scenario: Scenario, world: World):
         self.scenario, self.world = scenario, world
-        self.places: deque[NDArray[np.float64]] = deque(maxlen=round(STILL_FOR / Loop.PERIOD) + 1)
+        self.places: deque[NDArray[np.float64]] = deque(maxlen=round(REST_TIME / Loop.PERIOD) + 1)
 
     def lasts(self) -> bool:
-        """Whether all has been at rest for long enough now; asked once in every control period."""
+        """Whether everything has been at rest for `REST_TIME` now; called once in every control period."""
         if self.scenario.pending(self.world):
             self.places.clear()
         self.places.append(self.world.data.qpos.copy())
-        if len(self.places) < (self.places.maxlen or 0) or np.abs(self.places[0] - self.places[-1]).max() >= STILL:
-            return False  # the cheap question first
-        return bool(np.ptp(self.places, axis=0).max() < STILL)
+        if len(self.places) < (self.places.maxlen or 0):
+            return False
+        if np.abs(self.places[0] - self.places[-1]).max() >= REST_TOLERANCE:  # the cheap test first
+            return False
+        return bool(np.ptp(self.places, axis=0).max() < REST_TOLERANCE)
 
 
-def _live(
+def _play(
     scenario: Scenario,
     world: World,
     source: _Planned | _Recorded,
@@ -249,8 +250,8 @@ def _live(
         return episode.step(actions[-1])
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
-        rows = np.array(actions, np.float32).reshape(-1, world.size)
-        return Rollout(outcome, reason, round(at, 6), rows, world.digest, source.note)
+        played = np.array(actions, np.float32).reshape(-1, world.size)
+        return Rollout(outcome, reason, round(at, 6), played, world.digest, source.note)
 
     while step() is None:
         if stillness and source.ended and not episode.held and stillness.lasts():
@@ -267,13 +268,13 @@ def _live(
 
 
 def _turn_start(model: mujoco.MjModel, hinge: str, angle: float) -> None:
-    """Let what hangs on a hinge start turned by `angle` [rad], and the hinge read so.
+    """Start a hinge, and the body on it, turned by `angle` [rad].
 
-    A joint turns its body by its reading less `qpos0`: to change the start, the body's own place must be changed too.
+    A joint turns its body by its reading less `qpos0`: to change the start, the body's own pose must be changed too.
     """
     joint = model.joint(hinge)
     if model.jnt_type[joint.id] != mujoco.mjtJoint.mjJNT_HINGE:
-        raise ValueError(f"{hinge} is no hinge; only the start of a hinge can be turned")
+        raise ValueError(f"{hinge} is not a hinge; only the start of a hinge can be turned")
     body, turn, turned, before, after = int(joint.bodyid[0]), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(3)
     mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
     mujoco.mju_mulQuat(turned, model.body_quat[body], turn)
@@ -285,7 +286,7 @@ def _turn_start(model: mujoco.MjModel, hinge: str, angle: float) -> None:
 
 
 def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and everything that hangs on it."""
+    """A body and its descendants."""
     parts = [root]
     for body in range(root + 1, model.nbody):
         if int(model.body_parentid[body]) in parts:

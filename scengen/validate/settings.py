@@ -18,7 +18,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Robust:
-    """Jitter and least bound of the robustness check."""
+    """Jitter and lower bound of the robustness check."""
 
     runs: int = 4
     bound: float = 0.45
@@ -32,7 +32,7 @@ class Robust:
 
 @dataclass(frozen=True)
 class CertifySettings:
-    """Settings of all checks. Units stand beside the numbers in conf/certify/quick.yaml."""
+    """Settings of all checks. Units are given beside the numbers in conf/certify/quick.yaml."""
 
     name: str = "quick"
     overlap: float = 0.001
@@ -42,7 +42,7 @@ class CertifySettings:
     attack: int = 0
 
     def check(self) -> None:
-        """Raise `BadConfig` for a number with which a check would mean nothing or never end."""
+        """Raise `BadConfig` for a number with which a check would be meaningless or never end."""
         for name, value in leaves(asdict(self)):
             low, high, unit = BOUNDS[name]
             if not low <= value <= high:
@@ -65,7 +65,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "robust.latency": (0, 100, " control periods"),  # one second
     "attack": (0, 10_000, " rollouts"),
 }
-"""Least and largest value of every setting, and its unit."""
+"""Smallest and largest value of every setting, and its unit."""
 
 
 def leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
@@ -80,4 +80,4 @@ def leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]
 
 
 QUICK = CertifySettings()
-"""Few repetitions: seconds per scenario."""
+"""Settings with few repetitions, which take seconds per scenario."""

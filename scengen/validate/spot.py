@@ -1,17 +1,18 @@
-"""What a random sample says about all rows of a pool."""
+"""Statistics of a random sample of the rows of a pool."""
 
 from math import comb, exp, lgamma
 
 CONFIDENCE = 0.95
+"""Probability with which a sample meets a false row."""
 
 
 def excluded_share(total: int, sample: int) -> float:
-    """The least share of false rows that a sample without a false one excludes at 95 %.
+    """The smallest share of false rows that a sample without a false row excludes at 95 %.
 
-    Were at least this share of the rows false, a sample of this size would have met one with at least 95 % probability
-    (hypergeometric: rows are drawn without putting any back). 300 of a million rows exclude 1 %.
+    If at least this share of the rows were false, a sample of this size would contain one with a probability of at
+    least 95 % (hypergeometric: rows are drawn without replacement). 300 of a million rows exclude 1 %.
     """
-    low, high = 0, total - sample + 1  # with that many false ones every sample meets one
+    low, high = 0, total - sample + 1  # with so many false rows every sample contains one
     while high - low > 1:
         middle = (low + high) // 2
         if _missed(total, sample, middle) <= 1 - CONFIDENCE:
@@ -22,7 +23,7 @@ def excluded_share(total: int, sample: int) -> float:
 
 
 def _missed(total: int, sample: int, false: int) -> float:
-    """Probability that a sample meets none of the false ones."""
+    """Probability that a sample contains none of the false rows."""
     if false > total - sample:
         return 0.0
     if total <= 1000:

@@ -21,7 +21,7 @@ from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.errors import BadConfig, ScengenError
 from scengen.fingerprint import fingerprint
 from scengen.pool.files import sha256
-from scengen.validate.recheck import FIRST, REPLAYED
+from scengen.validate.recheck import BEFORE_WITNESS, WITH_WITNESS
 from scengen.validate.stored import settings_of_manifest
 from scengen.work.parallel import Limits
 
@@ -69,7 +69,7 @@ def test_the_control_repeats_every_bit(made, same):
     for one, row in zip(same, made.rows(), strict=True):
         assert one["same_bits"] and not one["unknown"] and not one["scene"]
         assert one["final_state"] == row.certificate.final_state
-        assert [check["name"] for check in one["checks"]] == [*FIRST, "witness", *REPLAYED]
+        assert [check["name"] for check in one["checks"]] == [*BEFORE_WITNESS, "witness", *WITH_WITNESS]
         assert not any(check["flipped"] for check in one["checks"])
         assert all(c["numbers"] == c["stored"] for c in one["checks"] if c["name"] != "witness")
 
@@ -94,7 +94,7 @@ def test_where_the_recording_fails_the_oracle_is_asked(changed):
     _, second = changed
     made = {check["name"]: check["passed"] for check in second["checks"]}
     assert made["witness"] is False and made["solved"] is True
-    assert not made.keys() & set(REPLAYED), "nothing is played that has no witness"
+    assert not made.keys() & set(WITH_WITNESS), "nothing is played that has no witness"
 
 
 def test_the_control_is_named_where_it_is_missing(made, same, changed, result):

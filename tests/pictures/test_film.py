@@ -193,7 +193,7 @@ def test_a_film_shows_of_every_shortcut_what_the_certificate_saw(row, scenario, 
             assert vars(rollout).items() >= seen.items()
     patient = {"wait": Shortcut(lambda world: iter(()), to_rest=True)}
     monkeypatch.setattr(type(scenario), "shortcuts", lambda self: patient)
-    monkeypatch.setattr("scengen.validate.rollout.STILL", 0.0)  # nothing is ever at rest
+    monkeypatch.setattr("scengen.validate.rollout.REST_TOLERANCE", 0.0)  # nothing is ever at rest
     certificate = certify(scenario, row.horizon, last="shortcuts").certificate
     _, rollout = film.shortcut(row, scenario, "wait")
     assert rollout.seconds == certificate["shortcuts"].numbers["wait"]["filtered"]["seconds"] == 3 * row.horizon

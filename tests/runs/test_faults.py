@@ -71,8 +71,8 @@ class Refusing:
 
 TOLD = {
     sqlite3.SQLITE_FULL: "the disk is full; make room",
-    sqlite3.SQLITE_IOERR_WRITE: "the disk is full or at fault",
-    sqlite3.SQLITE_READONLY_DBMOVED: "can only be read; make it and its folder writable",
+    sqlite3.SQLITE_IOERR_WRITE: "the disk is full or faulty",
+    sqlite3.SQLITE_READONLY_DBMOVED: "is read-only; make it and its folder writable",
     sqlite3.SQLITE_BUSY_SNAPSHOT: "is in use by another program; wait",
     sqlite3.SQLITE_CORRUPT_INDEX: "is damaged; move its folder aside (do not delete it)",
     sqlite3.SQLITE_NOTADB: "is damaged; move its folder aside (do not delete it)",
@@ -147,9 +147,9 @@ def test_a_pool_that_cannot_be_finished_keeps_its_run(finished, tmp_path, capsys
         def fail(*_):
             raise OSError(code, os.strerror(code))
 
-        patch.setattr(generate.pool, "write", fail)
+        patch.setattr(generate.writing, "write_pool", fail)
         status, err = said(capsys, *command(tmp_path / "pool"))
-    assert status == 2 and says in err and "what is finished is kept" in err and err.count("\n") == 1
+    assert status == 2 and says in err and "finished work is kept" in err and err.count("\n") == 1
     assert cli.run(command(tmp_path / "pool")) == 0
     assert Pool.open(tmp_path / "pool").sha256 == Pool.open(finished).sha256
 
@@ -297,8 +297,8 @@ def test_a_limit_on_files_is_one_line_and_the_run_goes_on_afterwards(finished, t
 
 
 def test_a_run_that_loses_every_scenario_ends_and_says_why(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(generate, "MOST_LOST", 2)
+    monkeypatch.setattr(generate, "MAX_LOST", 2)
     slow = ("limit_seconds=1", "certify.robust.runs=500")
     assert cli.run(["generate", "task=domino_single", "n=3", *slow, f"pool={tmp_path / 'pool'}"]) == 2
-    told = "2 scenarios one after the other have no verdict, the last because it took longer than 1 s"
+    told = "2 scenarios in a row have no verdict, the last because it took longer than 1 s"
     assert told in capsys.readouterr().err

@@ -26,7 +26,7 @@ from scengen.attack.priors import fit
 from scengen.params import with_values
 from scengen.tasks.domino_select import LANES, SLAB_DISPLACEMENT, DominoSelect
 from scengen.validate.rebuilt import rebuild
-from scengen.validate.rollout import AT_REST, STILL
+from scengen.validate.rollout import AT_REST, REST_TOLERANCE
 
 TASK = load_task("domino_select")
 SPLITS = ["id", *TASK.axes]
@@ -38,7 +38,7 @@ def lane_of(scenario, kind):
     return next(k for k in scenario.wrong if scenario.defects[k].kind == kind)
 
 
-def strike(scenario, k, spin, rest=STILL):
+def strike(scenario, k, spin, rest=REST_TOLERANCE):
     """Give the first tile of chain `k` a spin [rad/s], without robot, and simulate until nothing is faster than `rest`.
 
     Returns how far the red slab that went farthest has gone [m].
@@ -68,7 +68,8 @@ def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_a_r
     """The hand strikes the top of a tile with up to 0.4 m/s, 8 rad/s at 50 mm; below 5 rad/s one may rock back."""
     scenario = TASK.draw(split, 0, 1).scenario
     spin = speed / scenario.starter.height
-    rest = 3 * STILL if split == "low_tiles" else STILL  # three low tiles, fallen on one another, rock by 1.4 mrad/s
+    # three low tiles, fallen on one another, rock by 1.4 mrad/s
+    rest = 3 * REST_TOLERANCE if split == "low_tiles" else REST_TOLERANCE
     reached = [k for k in range(LANES) if strike(scenario, k, spin, rest) >= SLAB_DISPLACEMENT]
     assert reached == [scenario.intact]
 
@@ -92,7 +93,7 @@ def test_a_push_at_a_wrong_chain_is_watched_until_all_is_still_and_no_rule_ends_
     k = lane_of(scenario, kind)
     ended = play_shortcut(TASK, scenario, f"topple_chain_{k}", w)
     assert (ended.outcome, ended.reason) == ("timeout", AT_REST) and ended.seconds < TASK.horizon - 2.0
-    assert w.tilt(f"tile_{k}_0") > math.radians(45) and np.abs(w.data.qvel).max() < STILL
+    assert w.tilt(f"tile_{k}_0") > math.radians(45) and np.abs(w.data.qvel).max() < REST_TOLERANCE
     fallen = [name for name in scenario.feet if w.tilt(name) > math.radians(45)]
     assert {name.split("_")[1] for name in fallen} == {str(k)}
     assert (f"decoy_{k}" in fallen) == (kind == DECOY)
