@@ -1,4 +1,4 @@
-"""A rod stays on the ridge if its centre of mass is over it; nobody can see where that is, and the wrist feels it."""
+"""A rod stays on the ridge if its centre of mass is over it; the place is hidden, and the wrist can measure it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ def laid(off, **changes):
 
 
 def left_alone(scenario, seconds=1.5):
-    """The world after some time in which nobody acts."""
+    """The world after some time without actions."""
     world = load(MEDIUM, scenario)
     for _ in range(round(100 * seconds)):
         world.step(IDLE)
@@ -84,7 +84,7 @@ def test_a_rod_counts_only_if_it_crosses_the_ridge(turned, counts):
 
 @pytest.mark.parametrize(("com", "mass"), [(0.085, 0.10), (0.04, 0.15), (-0.085, 0.15)])
 def test_the_oracle_feels_the_centre_of_mass_to_a_millimetre_and_reads_it_nowhere(com, mass, monkeypatch):
-    """Told another rod, it does the same to the bit."""
+    """With parameters of another rod, it does the same to the bit."""
     felt, lay = [], Balance.lay
 
     def watched(self, world, along, yaw=0.0):
@@ -103,7 +103,7 @@ def test_the_oracle_feels_the_centre_of_mass_to_a_millimetre_and_reads_it_nowher
 
 
 def test_scenes_that_differ_in_what_is_hidden_only_are_the_same_to_the_eye():
-    """Of everything in the compiled model only what weighs may differ: no size, colour, place, name or order."""
+    """Only masses and what depends on them may differ in the compiled model: no size, colour, place, name or order."""
     rods = Rod(com=0.08, mass=0.10), Rod(com=-0.03, mass=0.15)
     worlds = [World.load(scene_text.emit(replace(ROD, rod=r).build())[0], visual=True) for r in rods]
     a, b = (world.model for world in worlds)
@@ -138,8 +138,8 @@ def test_no_fixed_place_along_the_rod_balances_more_than_a_tenth_of_training(tas
 # --- ways around ------------------------------------------------------------------------
 
 
-def test_a_rod_that_tipped_could_be_taken_up_again_and_that_is_why_it_is_lost():
-    """Try after try: the rule is what makes a wrong one cost the episode."""
+def test_a_rod_that_tipped_could_be_picked_up_again_and_therefore_it_is_lost():
+    """Repeated attempts would succeed: only the rule makes a failed attempt end the episode."""
     scenario = replace(ROD, rod=Rod(com=0.05))
     assert play_shortcut(MEDIUM, scenario, "by_the_middle").reason == "the rod was let go and tipped"
     patient = unguarded(Balance)(rod=scenario.rod)
@@ -154,7 +154,7 @@ def test_a_rod_that_tipped_could_be_taken_up_again_and_that_is_why_it_is_lost():
 
 @dataclass(frozen=True, kw_only=True)
 class Lenient(Balance):
-    """Asks for a level rod on the ridge and nothing else: it may be held, and lie along the ridge."""
+    """The goal is a level rod on the ridge and nothing else: it may be held, and lie along the ridge."""
 
     def success(self, world):
         return world.tilt("rod") <= MAX_TILT and world.touching("rod", "stand/ridge")

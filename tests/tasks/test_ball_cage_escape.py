@@ -52,7 +52,7 @@ def test_the_trap_takes_the_ball_at_its_own_angle(more, reason):
 
 
 @pytest.mark.parametrize("name", ["tip_it_to_the_wrong_end", "tip_it_to_both_ends", "shake_it_level"])
-def test_whoever_does_not_look_fills_the_trap(name):
+def test_blind_tilts_and_shakes_fill_the_trap(name):
     assert play_shortcut(TASK, NOMINAL, name).reason == "the ball fell into the trap"
 
 
@@ -88,7 +88,7 @@ def test_a_ball_that_is_shaken_over_the_sill_is_lost_and_only_the_rule_forbids_i
 
 
 @pytest.mark.parametrize("rate", [0.5, 1.0, 2.0])
-def test_whoever_tilts_is_not_taken_for_somebody_who_shakes(rate):
+def test_a_tilt_does_not_count_as_a_shake(rate):
     def lean_over(world):
         down = np.array([math.sin(NOMINAL.least_tilt + TILT_MARGIN), 0.0, -math.cos(NOMINAL.least_tilt + TILT_MARGIN)])
         yield from NOMINAL.pick_up(world)
@@ -99,7 +99,7 @@ def test_whoever_tilts_is_not_taken_for_somebody_who_shakes(rate):
 
 
 def test_one_fixed_answer_is_right_in_half_of_the_draws():
-    """A choice among two ends: whoever leans the cage in one heading guesses."""
+    """A choice between two ends: a tilt in one fixed heading is a guess."""
     draws = [TASK.draw("id", 0, i).scenario for i in range(300)]
     right = [[draw.answer().right(value) for draw in draws] for value in NOMINAL.answer().candidates]
     assert max(map(np.mean, right)) <= 0.55 + 1.64 * math.sqrt(0.25 / 300)

@@ -20,7 +20,7 @@ BACK = BounceIntercept(x=-0.2, y=-0.05, aim=12.0)
 
 
 def moving(scenario, until=3.0, world=None):
-    """Where the ball is and how it moves, in every period from its launch on, nobody acting [m, m/s, rad/s]."""
+    """Place and velocity of the ball in every period after its launch, without actions [m, m/s, rad/s]."""
     world = world or load(TASK, scenario)
     found = []
     while world.time < scenario.launch + until:
@@ -53,7 +53,7 @@ def test_energy_is_lost_in_the_bounce_alone():
 
 
 def test_a_ball_that_rolls_keeps_its_spin_and_is_no_mirror_image():
-    """v = 5/7 v' + 2/7 w: w is what the floor has left of the spin while the bounce lasted."""
+    """v = 5/7 v' + 2/7 w: w is the spin that the floor leaves during the bounce."""
     felt = replace(BACK, aim=0.0, friction=0.3, enclosure=Enclosure(restitution=0.9))
     found = moving(felt)
     back = -found[-1, 6] / found[20, 6]
@@ -66,7 +66,7 @@ def test_a_ball_that_rolls_keeps_its_spin_and_is_no_mirror_image():
     ("changed", "bounces"), [({}, 1), ({"aim": 40.0}, 2), ({"aim": -25.0, "side": -1, "turn": 15.0}, 2)]
 )
 def test_its_way_is_foreseen(changed, bounces):
-    """Within 12 mm until it leaves the walls again: what comes back scatters by a hundredth or two."""
+    """Within 12 mm until it leaves the walls again: returned speeds scatter by a hundredth or two."""
     scenario = replace(BACK, **changed)
     ways = scenario.ways(scenario.start, scenario.speed * scenario.u, np.zeros(3))
     assert len(ways) == bounces + 1
@@ -98,7 +98,7 @@ def test_a_bounce_goes_on_from_a_saved_state():
 
 
 @pytest.mark.parametrize("name", ["go_to_where_it_is", "follow_it"])
-def test_who_goes_after_it_touches_it_too_soon_or_never_gets_there(name):
+def test_a_hand_that_follows_it_touches_it_too_soon_or_does_not_reach_it(name):
     assert not play_shortcut(TASK, CATCH, name).solved
 
 

@@ -119,7 +119,7 @@ def test_a_flight_goes_on_bit_by_bit_from_a_saved_state(scenario):
 
 
 def test_the_tray_rides_evenly_and_keeps_its_angular_momentum_when_it_takes_the_cube():
-    """It hangs on a rail without friction: what comes from above does not push it along."""
+    """Its rail has no friction, and a cube from above does not push it along."""
     world, rate = thrown(RIDE), math.copysign(math.radians(RIDE.rate), RIDE.bearing)
     inertia, mass = world.model.dof_M0[world.model.joint(RAIL).dofadr[0]], RIDE.cube.mass
 
@@ -141,7 +141,7 @@ def test_where_the_tray_is_when_it_is_thrown_it_falls_behind_it():
 
 
 def test_straight_ahead_the_table_is_in_the_way():
-    """The constraint is right: what is thrown there by the same oracle strikes the table's edge or comes down on it."""
+    """The constraint is right: a cube that the same oracle throws there strikes the table's edge or lands on it."""
     ahead = replace(TOSS, bearing=0.0)
     world = load(TASK, ahead)
     assert ahead.infeasible().reason == "the table is in the way"

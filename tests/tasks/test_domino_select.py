@@ -1,4 +1,4 @@
-"""Only the intact chain reaches a red slab, by physics and not by rule; what is no fair choice gets no certificate."""
+"""Only the intact chain reaches a red slab, by physics and not by rule; an unfair choice gets no certificate."""
 
 import math
 from dataclasses import dataclass, replace
@@ -149,7 +149,7 @@ def test_first_tiles_stand_in_one_row_and_slabs_in_another_whatever_is_wrong():
     assert len({x for name, x in along.items() if not name.startswith("tile")}) == 1
 
 
-def test_a_chain_is_not_told_from_another_by_the_look_of_its_tiles():
+def test_tiles_of_all_chains_look_the_same():
     model = EVERY_KIND.build().compile()
     looks = {name: tuple(model.geom(f"{name}/box").rgba) for name in EVERY_KIND.feet if name.startswith("tile")}
     assert {look for name, look in looks.items() if name.endswith("_0")} == {tuple(np.float32(EVERY_KIND.starter.rgba))}
@@ -195,7 +195,7 @@ class Mended(DominoSelect):
 
 @dataclass(frozen=True, kw_only=True)
 class Hidden(Mended):
-    """As Mended, but a rule ends every try at a wrong chain before anybody sees that it works."""
+    """As Mended, but a rule ends every attempt at a wrong chain before it can succeed."""
 
     def failure(self, world):
         touched = (k for k in self.wrong if world.touched("robot", f"tile_{k}_0"))

@@ -118,6 +118,6 @@ def test_a_memorised_push_is_lost_where_the_chain_runs_diagonally():
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
-    """What certificates make of scenes that are tampered with is in tests/validate/test_certify.py."""
+    """Certificates of manipulated scenes are tested in tests/validate/test_certify.py."""
     chains = DominoSingle(gap_ratio=2.2), DominoSingle(x=0.35), DominoSingle(count=2, x=0.34, y=0.34, heading=-135.0)
     each_refuted_for_its_own_reason(chains)

@@ -96,7 +96,7 @@ def test_the_ball_may_be_touched_on_the_near_side_and_not_on_the_far_side():
 
 
 def test_a_ball_that_falls_short_may_not_be_caught_and_let_go_again():
-    """Trial and error would find the height without a thought; without the rule it does."""
+    """Trial and error would find the height; without the rule it does."""
     episode = play_shortcut(TASK, NOMINAL, "catch_it_and_try_higher")
     assert episode.reason == "the ball was touched again after its run"
     assert play_shortcut(TASK, unguarded(GalileoRampDrop)(), "catch_it_and_try_higher").solved
@@ -111,7 +111,7 @@ class Bouncing(GalileoRampDrop):
 
 
 def test_a_ball_may_not_fall_on_the_ramp():
-    """One that bounces may come down on the patch, from a place that looks at nothing."""
+    """One that bounces may come down on the patch, from a fixed place."""
     sound = TASK.draw("id", 0, 5).scenario
     bouncing = with_values(Bouncing(), {p.name: p.nominal for p in parameters(sound)})
     assert play_shortcut(TASK, bouncing, "let_it_bounce_across").solved
@@ -151,7 +151,7 @@ MEASURES = {
     "level distance from the middle": lambda s, at: s.ramp.floor(at)[0],
     "place of the hand across the table": lambda s, at: s.resting(-at)[1],
 }
-"""Ways to tell a place of release, `at` [m] from the middle of the valley, by one number."""
+"""Ways to express a place of release, `at` [m] from the middle of the valley, by one number."""
 
 
 @pytest.mark.parametrize("measure", MEASURES.values(), ids=MEASURES)

@@ -1,4 +1,4 @@
-"""A ball rolls as far as a textbook says, through the gap and not round it; who aims badly has no second try."""
+"""A ball rolls as far as a textbook says, through the gap and not around it; a badly aimed ball is lost."""
 
 import math
 from dataclasses import replace
@@ -28,7 +28,7 @@ PLAIN = GapFunnel()
 
 
 def rolled(scenario, speed, seconds):
-    """The world after a ball in the gap has been rolling from a speed [m/s], and nobody has acted."""
+    """The world after a ball in the gap has rolled from a speed [m/s], without actions."""
     world = load(TASK, scenario)
     ball = world.model.body("ball")
     at, dof = world.model.jnt_qposadr[ball.jntadr[0]], ball.dofadr[0]
@@ -96,7 +96,7 @@ def test_memorised_actions_stop_short_where_the_ball_rolls_less_far():
     assert not replayed(TASK, trained, other).solved
 
 
-def test_nobody_touches_the_ball_where_it_comes_to_rest():
+def test_the_ball_comes_to_rest_out_of_reach():
     assert solution(TASK, PLAIN).solved
     assert math.dist(PLAIN.zone_at[:2], (-0.56, 0.0)) > 0.88
 

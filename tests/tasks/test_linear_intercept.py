@@ -23,7 +23,7 @@ CATCH = TASK.draw("id", 0, 0).scenario
 
 
 def path(scenario, seconds):
-    """Where the ball is in every period, and how fast [m, m/s], nobody acting."""
+    """Place [m] and velocity [m/s] of the ball in every period, without actions."""
     world, places, velocities = load(TASK, scenario), [], []
     for _ in range(round(seconds * 100)):
         with world.events():
@@ -76,7 +76,7 @@ def test_where_it_is_now_is_too_late(name):
 
 
 def test_a_slower_ball_could_be_followed():
-    """Why there is no slower one: a hand that goes after it lags by its speed over 9.2 / s, less than half a pad."""
+    """Why no ball is slower: a hand that follows it lags by its speed over 9.2 / s, less than half a pad."""
     slow = replace(CATCH, speed=0.08, x=0.1)
     assert play_shortcut(TASK, slow, "follow_it").solved
 

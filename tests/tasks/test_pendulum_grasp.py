@@ -27,7 +27,7 @@ GRASP = TASK.draw("id", 0, 0).scenario
 
 
 def closing(scenario, late):
-    """What comes of fingers that touch `late` [s] after the turning point."""
+    """Rollout of fingers that touch the bob `late` [s] after the turning point."""
     return play(TASK, scenario, lambda world: scenario.close_before(world, scenario.closing_time - late))
 
 
@@ -36,7 +36,7 @@ def closing(scenario, late):
 
 @pytest.mark.parametrize("phase", [-150.0, 0.0, 60.0, 180.0])
 def test_it_swings_from_any_moment_on_to_its_amplitude(phase):
-    """The event of the start gives it the rate that belongs to its angle; nobody is near."""
+    """The event at the start gives it the rate that belongs to its angle; the hand is far away."""
     scenario = replace(GRASP, phase=phase)
     world, angles = load(TASK, scenario), []
     for _ in range(150):

@@ -29,7 +29,7 @@ NOMINAL = RampSort(reds=1, blues=1)
 
 
 def put(world, i, along, across, scenario, height=0.0):
-    """Put a ball on the ground of a place that is told in the ramp's axes [m]."""
+    """Put a ball on the ground at a place in the ramp's axes [m]."""
     lying = (BIN_FLOOR + scenario.ball.radius + height) * UP
     world.data.joint(f"ball_{i}_free").qpos[:3] = scenario.at(along, across) + lying
     mujoco.mj_kinematics(world.model, world.data)

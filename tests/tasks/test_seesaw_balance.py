@@ -1,4 +1,4 @@
-"""Only the place where the moments balance keeps the deck level; nobody can see it, and hands off is what counts."""
+"""Only the place where the moments balance keeps the deck level; it is hidden, and the hand may not help."""
 
 import math
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ def laid(scenario, along, target_along):
 
 
 def settled(scenario, along, target_along=None):
-    """The world after 4 s in which nobody acts."""
+    """The world after 4 s without actions."""
     world = load(TASK, scenario, laid(scenario, along, scenario.offset if target_along is None else target_along))
     for _ in range(400):
         world.step(IDLE)
@@ -92,14 +92,14 @@ def test_whatever_is_within_bounds_is_refuted_with_numbers_or_has_room_to_balanc
 
 
 def test_no_fixed_place_balances_a_tenth_of_training_and_no_three_a_fifth():
-    """Told which arm is up and how far out the target stands; fitted on 400 draws, measured on as many others."""
+    """Given the raised arm and the place of the target; fitted on 400 draws, measured on as many others."""
     scenarios = [TASK.draw("id", 0, i).scenario for i in range(800)]
     one, two, three = fit(scenarios[:400], fresh=scenarios[400:])
     assert 0.0 < one.fresh <= one.bound <= 0.10 and one.fresh < two.fresh < three.fresh <= three.bound <= 0.20
 
 
-def test_who_weighs_the_counterweight_knows_no_more():
-    """The lever law with the true mass of the counterweight, and the middle of training for all that is not weighed."""
+def test_the_mass_of_the_counterweight_alone_does_not_help():
+    """The lever law with the true mass of the counterweight, and the middle of training for the other masses."""
     scenarios = [TASK.draw("id", 1, i).scenario for i in range(400)]
     known = [replace(s, seesaw=replace(s.seesaw, mass=0.26), target=Block(mass=0.35)).balance for s in scenarios]
     balanced = [abs(s.balance - at) <= s.margin for s, at in zip(scenarios, known, strict=True)]
@@ -115,7 +115,7 @@ def test_the_target_stands_to_the_left_and_to_the_right_in_training():
 
 
 def test_scenes_that_differ_in_masses_only_are_the_same_to_the_eye():
-    """Of everything in the compiled model only what weighs may differ: no size, colour, place, name or texture."""
+    """Only masses and their consequences may differ in the compiled model: no size, colour, place, name or texture."""
     one = SeesawBalance()
     other = replace(
         one,
@@ -158,7 +158,7 @@ def test_which_arm_is_raised_is_seen_but_not_where_the_counterweight_belongs(sce
 
 @pytest.mark.parametrize("scenario", [LIGHT, HEAVY], ids=["light", "heavy"])
 def test_the_oracle_reads_no_mass_and_puts_the_counterweight_more_than_once(scenario, monkeypatch):
-    """Told wrong masses, it does the same to the bit."""
+    """With wrong masses as parameters, it does the same to the bit."""
     tries, put_at = [], SeesawBalance.put_at
 
     def counted(self, world, along):
@@ -184,7 +184,7 @@ def test_memorised_actions_are_lost_where_masses_are_others():
 
 @dataclass(frozen=True, kw_only=True)
 class Lenient(SeesawBalance):
-    """Asks for a level deck and nothing else: it may be held."""
+    """The goal is a level deck and nothing else: it may be held."""
 
     def success(self, world):
         return world.tilt(BEAM) <= MAX_TILT

@@ -28,7 +28,7 @@ from scengen.tasks.slide_catch import FALL_TIME, ORDERS, Load, SlideCatch
 
 TASK = load_task("slide_catch")
 NOMINAL = SlideCatch(start=0.3)
-"""Nobody needs the time to take the bin where nobody takes it."""
+"""Scenario for tests that do not use the bin, and need no time to take it."""
 LIFTED = math.radians(4.3) * 0.04 * 0.01
 """How far the slab lifts a block 40 mm from the lip in a control period [m]."""
 SLIDING = replace(NOMINAL, start=1.8)
@@ -39,7 +39,7 @@ SLIDING = replace(NOMINAL, start=1.8)
 
 @pytest.fixture(scope="module")
 def idle():
-    """Time and every block's place and velocity after each period in which nobody acts, shapes (n,) and (n, 3, 3)."""
+    """Time and every block's place and velocity after each period without actions, shapes (n,) and (n, 3, 3)."""
     world = load(TASK, NOMINAL)
     episode = Episode(unguarded(SlideCatch)(start=0.3), world)
     times, places, velocities = [], [], []
