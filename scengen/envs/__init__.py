@@ -1,1 +1,1 @@
-"""Pools as environments: Gymnasium's interface over certified scenarios."""
+"""Environments over pools of certified scenarios: Gymnasium's and robosuite's interfaces."""

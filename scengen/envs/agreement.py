@@ -1,4 +1,4 @@
-"""Whether certificates hold in robosuite too: a witness is played there and here, and the ends are compared."""
+"""Agreement of certificates with robosuite: replays a witness in both simulations and compares the outcomes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,19 +20,20 @@ from .robosuite import RobosuiteEnv, env_class
 
 @dataclass(frozen=True)
 class Comparison:
-    """One witness, played here and in robosuite."""
+    """Outcomes of one witness in scengen and in robosuite."""
 
     task: str
     id: str
     ours: Outcome | Literal["unknown"]
+    """Outcome in scengen; unknown if the comparison crashed or reached a limit."""
     theirs: Outcome | Literal["unknown"]
-    """Both are unknown where the comparison has crashed, or has reached a limit."""
+    """Outcome in robosuite; unknown if the comparison crashed or reached a limit."""
     reason: str
-    """Why robosuite's is no success, or why nothing is known; empty for a success."""
+    """Reason of robosuite's outcome, or of an unknown one; empty for a success."""
     apart: float
-    """Largest distance of a grip site here and there at equal times [m]."""
+    """Largest distance between the positions of a grip site in both at equal times [m]."""
     later: float
-    """How much later robosuite's episode was decided [s]."""
+    """Time by which robosuite's episode was decided later [s]."""
 
     @property
     def agrees(self) -> bool:
@@ -47,12 +48,13 @@ def compare_all(
     search: tuple[str, ...] = (),
     limits: Limits | None = None,
 ) -> list[Comparison]:
-    """Compare every scenario of some pools, or the `first` so many of each; ordered by task and id.
+    """Compare every scenario of some pools, or the `first` ones of each; ordered by task and id.
 
     Args:
-        progress: told how many scenarios have been compared.
+        progress: function that gets the number of compared scenarios.
+        first: number of scenarios of each pool; all of them if None.
         search: folders of other packages with tasks, see `task_files.search_path`.
-        limits: of every scenario; None to work in this process.
+        limits: limits for each scenario; None to work in this process.
 
     Raises:
         ScengenError: a pool is damaged, or was made with another version of MuJoCo or robosuite.
@@ -65,7 +67,7 @@ def compare_all(
 
 
 def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
-    """Play one witness here and in robosuite."""
+    """Replay one witness in scengen and in robosuite."""
     env = env_class(row.task, search)(
         scenario=row,
         use_object_obs=False,
@@ -75,9 +77,9 @@ def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
         ignore_done=True,
     )
     settle = row.certificate.settle or 0.0
-    world = _Traced.load(row.scene_xml, row.embodiment)
+    world = _TracedWorld.load(row.scene_xml, row.embodiment)
     ours = replay(env.scenario, world, row.witness, row.horizon, settle)
-    theirs, reason, seconds, path = _played(env, row.witness, settle)
+    theirs, reason, seconds, path = _replay_in_robosuite(env, row.witness, settle)
     env.close()
     together = min(len(path), len(world.path))
     apart = np.linalg.norm(np.array(path[:together]) - np.array(world.path[:together]), axis=-1)
@@ -90,8 +92,8 @@ def _lost(row: PoolRow, reason: str) -> Comparison:
 
 
 @dataclass
-class _Traced(World):
-    """A world that remembers where its hands were."""
+class _TracedWorld(World):
+    """A world that records the positions of its hands."""
 
     path: list[list[Vec3]] = field(default_factory=list)
 
@@ -100,10 +102,12 @@ class _Traced(World):
         self.path.append([arm.hand for arm in self.arms])
 
 
-def _played(env: RobosuiteEnv, actions: Actions, settle: float) -> tuple[Outcome, str, float, list[list[Vec3]]]:
-    """Outcome of recorded actions in robosuite, its reason, when it was decided [s], and the paths of the hands.
+def _replay_in_robosuite(
+    env: RobosuiteEnv, actions: Actions, settle: float
+) -> tuple[Outcome, str, float, list[list[Vec3]]]:
+    """Outcome of recorded actions in robosuite, its reason, the time of the decision [s], and the paths of the hands.
 
-    As in `rollout.replay`: the robot is idle when the actions have ended, and the goal must hold for `settle` seconds.
+    As in `rollout.replay`, the robot is idle after the last action, and the goal must hold for `settle` seconds.
     """
     rows, path = iter(actions), list[list[Vec3]]()
 

@@ -1,15 +1,16 @@
-"""Where everything in a scene is and how it moves: robosuite's `object-state`, for policies without eyes.
+"""Poses and velocities of all bodies of a scene: robosuite's `object-state`, for state-based policies.
 
-Privileged, and still no more than perfect eyes would see: poses and velocities of the bodies, and no parameter.
-Velocities are those of a body's origin, since those of its centre of mass would give away where that is.
+It is privileged, but contains only what perfect vision could measure: poses and velocities of the bodies, and no
+parameter. Velocities are those of a body's origin, because those of the centre of mass would reveal its position.
 
     <body>_pos  <body>_quat                            in the world [m], xyzw
     <body>_vel_lin  <body>_vel_ang                     of its origin, world axes [m/s], [rad/s]
-    <body>_to_robot0_eef_pos  ..._quat                 seen from the hand, in its axes; the same for every further arm
-    <body>_to_robot0_eef_vel_lin  ..._vel_ang          the same of the velocity, less the hand's own motion
+    <body>_to_robot0_eef_pos  ..._quat                 relative to the hand, in its axes; likewise for a second arm
+    <body>_to_robot0_eef_vel_lin  ..._vel_ang          velocities relative to the hand and its motion, in its axes
 
 Bodies without joints, such as a bin, have poses and no velocities. All scenarios of a task have the same entries, in
-the order of the bodies' names, those that can move first; a body that a scenario lacks reads 0, its quaternion too.
+the order of the bodies' names, movable bodies first. If a scenario lacks a body, its entries are 0, also its
+quaternion.
 """
 
 import re
@@ -34,65 +35,67 @@ from ..sim import scene_text
 from ..sim.world import World
 
 NAME = "object-state"
-"""robosuite's name of the whole."""
-ALWAYS = ("world", "table")
-"""Bodies that are the same in every scenario."""
+"""robosuite's name of the whole vector."""
+COMMON_BODIES = ("world", "table")
+"""Bodies that are the same in every scenario, and left out."""
 
 POSE = {"pos": ("x", "y", "z"), "quat": ("x", "y", "z", "w")}
-"""Parts of a pose, and what their entries are."""
+"""Parts of a pose, and the names of their entries."""
 MOTION = {"vel_lin": ("x", "y", "z"), "vel_ang": ("x", "y", "z")}
-"""The same of a velocity."""
+"""Parts of a velocity, and the names of their entries."""
 POSE_SIZE = sum(map(len, POSE.values()))
+"""Number of entries of a pose."""
 BOUNDS = {"pos": 3.0, "quat": 1.0, "vel_lin": 100.0, "vel_ang": 1000.0}
-"""Larger readings are cut: far beyond the room [m], and beyond what anything here reaches [m/s], [rad/s]."""
+"""Largest absolute value of each part, to which readings are clipped: far beyond the room [m], and beyond the speeds
+of all bodies here [m/s], [rad/s]."""
 
 
 def xyzw(rot: Mat3) -> NDArray[np.float64]:
-    """A rotation as a quaternion in the order that robosuite's keys promise, shape (4,)."""
+    """A rotation as a quaternion xyzw, the order of robosuite's keys, shape (4,)."""
     return _quats(rot[None])[0]
 
 
 Bodies = Mapping[str, bool]
-"""Names of bodies, and whether each can move."""
+"""Names of bodies, and whether each is movable."""
 
 
 def bodies_of(task: Task, scenes: Iterable[str] = ()) -> Bodies:
-    """The bodies that scenarios of a task may have, whatever its parameters are in training and on its axes.
+    """The bodies that scenarios of a task may have, with any parameters of training and of the axes.
 
     Args:
-        scenes: further scenes, MJCF, such as those of a pool that was drawn with other distributions.
+        scenes: further scenes (MJCF), such as those of a pool that was drawn with other distributions.
     """
     found: dict[str, bool] = {}
-    for told in chain(map(_built, _variants(task)), map(_written, _different(scenes))):
-        for name, moves in told.items():
+    for bodies in chain(map(_bodies_built, _variants(task)), map(_bodies_in_text, _distinct(scenes))):
+        for name, moves in bodies.items():
             found[name] = found.get(name, False) or moves
-    return {name: found[name] for name in sorted(found, key=_naturally) if name not in ALWAYS}
+    return {name: found[name] for name in sorted(found, key=_natural_key) if name not in COMMON_BODIES}
 
 
 def all_bodies(several: Iterable[Bodies]) -> Bodies:
     """The bodies of several tasks together."""
     found: dict[str, bool] = {}
-    for told in several:
-        found |= {name: moves or found.get(name, False) for name, moves in told.items()}
-    return {name: found[name] for name in sorted(found, key=_naturally)}
+    for bodies in several:
+        found |= {name: moves or found.get(name, False) for name, moves in bodies.items()}
+    return {name: found[name] for name in sorted(found, key=_natural_key)}
 
 
 @dataclass(frozen=True)
 class ObjectState:
-    """A vector of poses and velocities, its names, and how it is read."""
+    """A vector of poses and velocities: its entries, their names and bounds, and how to read it."""
 
     bodies: Bodies
     arms: int
-    """How many hands the bodies are also seen from."""
+    """Number of hands relative to which poses and velocities are also given."""
 
     @cached_property
     def ordered(self) -> tuple[str, ...]:
-        """Names of the bodies, those that can move first."""
+        """Names of the bodies, movable ones first."""
         return tuple(sorted(self.bodies, key=lambda name: not self.bodies[name]))
 
     @cached_property
     def segments(self) -> dict[str, slice]:
-        """Where each reading, such as `cube_pos`, stands in the vector."""
+        """Slice of the vector for each reading, such as `cube_pos`."""
         found, start = {}, 0
         for name, entries in self._readings():
             found[name] = slice(start, start + len(entries))
@@ -106,15 +109,15 @@ class ObjectState:
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """No entry is larger in size, shape (n,)."""
+        """Largest absolute value of each entry, shape (n,)."""
         sizes = [next(b for kind, b in BOUNDS.items() if name.endswith(kind)) for name, _ in self._readings()]
         return np.repeat(sizes, [len(entries) for _, entries in self._readings()])
 
     def read(self, world: World) -> NDArray[np.float64]:
-        """The vector as it is now, shape (n,); velocities are those of the last physics step (2 ms)."""
+        """The present vector, shape (n,). Velocities are those of the last physics step (2 ms)."""
         model, data = world.model, world.data
         found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in self.ordered]
-        ids = np.maximum(found, 0, dtype=int)  # -1 where there is no such body
+        ids = np.maximum(found, 0, dtype=int)  # -1 if there is no such body
         pos, rot = data.xpos[ids], data.xmat[ids].reshape(-1, 3, 3)
         ang, lin = _velocities(world, pos, ids)
         frames = [_frame(pos, rot, lin, ang)]
@@ -128,7 +131,7 @@ class ObjectState:
         return np.concatenate([rows[:moving].ravel(), rows[moving:, :, :POSE_SIZE].ravel()])
 
     def _readings(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Every reading and its entries, in order."""
+        """Names of all readings and of their entries, in order."""
         for body in self.ordered:
             kinds = {**POSE, **MOTION} if self.bodies[body] else POSE
             for frame in ("", *(f"to_{Names(number).arm}eef_" for number in range(self.arms))):
@@ -151,7 +154,7 @@ def _quats(rots: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of vectors, shape (n, 3); numpy's own takes five times as long for a few."""
+    """Cross products of vectors, shape (n, 3). For a few vectors numpy's function takes five times as long."""
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
@@ -164,15 +167,15 @@ def _velocities(
 
 
 def _variants(task: Task) -> Iterator[Scenario]:
-    """Scenarios that have all bodies between them: in training and on each axis, whole numbers take all their values.
+    """Scenarios that together have all bodies: in training and on each axis, integer parameters take all their values.
 
-    One at a time, while the others are at their largest. Nothing is asked but which bodies there are, so that it does
-    not matter whether a scenario is feasible.
+    One parameter varies at a time, while the others have their largest value. Only the bodies of the scenarios matter,
+    so they need not be feasible.
     """
-    whole = [name for name, p in task.known.items() if p.integer]
+    integers = [name for name, p in task.known.items() if p.integer]
     spaces: Sequence[Mapping[str, Dist]] = [task.training, *(axis.replace for axis in task.axes.values())]
     for space in spaces:
-        counts = {name: _whole_numbers({**task.training, **space}[name]) for name in whole}
+        counts = {name: _whole_numbers({**task.training, **space}[name]) for name in integers}
         largest = with_values(task.family(), {name: values[-1] for name, values in counts.items()})
         yield largest
         for name in set(counts) & set(space):
@@ -183,8 +186,8 @@ def _whole_numbers(dist: Dist) -> list[int]:
     return sorted({v for i in dist.support for v in range(ceil(i.low), floor(i.high) + 1)})
 
 
-def _built(scenario: Scenario) -> Bodies:
-    scene = scenario.build()  # held by name: the bodies of a scene that nobody holds have lost their joints
+def _bodies_built(scenario: Scenario) -> Bodies:
+    scene = scenario.build()  # keeps a reference: without one, the bodies of the scene lose their joints
     return {body.name: bool(body.joints or body.mocap) for body in scene.bodies}
 
 
@@ -192,8 +195,8 @@ _NUMBERS = re.compile(r"""(["'])[-+.e\d\s]*\1""")
 """Values of attributes that are numbers."""
 
 
-def _different(scenes: Iterable[str]) -> Iterator[str]:
-    """Of scenes that differ in numbers only, one: a pool has as many texts as scenarios, and few sets of bodies."""
+def _distinct(scenes: Iterable[str]) -> Iterator[str]:
+    """One of all scenes that differ only in numbers: a pool has one text per scenario, but few sets of bodies."""
     seen = set[int]()
     for text in scenes:
         if (rest := hash(_NUMBERS.sub("", text))) not in seen:
@@ -201,7 +204,7 @@ def _different(scenes: Iterable[str]) -> Iterator[str]:
             yield text
 
 
-def _written(text: str) -> Bodies:
+def _bodies_in_text(text: str) -> Bodies:
     scene_text.check(text)
     found = {}
     for body in ET.fromstring(text).iter("body"):
@@ -210,6 +213,6 @@ def _written(text: str) -> Bodies:
     return found
 
 
-def _naturally(name: str) -> list[str | int]:
-    """What names are sorted by: `tile_2` before `tile_10`."""
+def _natural_key(name: str) -> list[str | int]:
+    """Sort key of names that puts `tile_2` before `tile_10`."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]

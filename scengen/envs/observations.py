@@ -1,13 +1,13 @@
-"""What a policy may see: the paper's streams under robosuite's names, each read only if it is asked for.
+"""Streams of observations: the paper's streams under robosuite's names, each read only if it is requested.
 
-Shapes, units and names follow the paper's table of modalities; images are (height, width, 3), first row on top. The
-table is of one arm. A second one has the same streams, with `robot1_` in the place of `robot0_` or before the name; one
-that the scene's events move has none, and is seen in pictures only.
-`robot0_eef_quat` is the orientation of the grip site, robosuite's `robot0_eef_quat_site`; what robosuite calls
-`robot0_eef_quat` is that of the body `right_hand`.
+Shapes, units and names follow the paper's table of modalities. Images are (height, width, 3), first row on top. The
+table is for one arm. A second arm has the same streams, with `robot1_` in place of `robot0_` or as a prefix. An arm
+that the scene's events move has no streams and is visible in pictures only.
+`robot0_eef_quat` is the orientation of the grip site, robosuite's `robot0_eef_quat_site`. robosuite's own
+`robot0_eef_quat` is the orientation of the body `right_hand`.
 
-Where a scenario is seen turned or mirrored (`Scenario.orientation`), its pictures are, and no other stream: poses stay
-in the axes in which actions are meant. `seen_<body>_pos` tells what such a picture suggests, to policies without eyes.
+If a scenario is seen turned or mirrored (`Scenario.orientation`), only its pictures are turned: poses stay in the axes
+of the actions. For state-based policies `seen_<body>_pos` is the position that such a picture shows.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,9 +27,9 @@ from .object_state import NAME, POSE, ObjectState, xyzw
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
 TAXELS = 8
-"""Rows and columns of a tactile grid (paper, table of modalities)."""
+"""Number of rows and of columns of a tactile grid (paper, table of modalities)."""
 PADS = {"tactile_left": "finger1_pad_collision", "tactile_right": "finger2_pad_collision"}
-"""The finger pad under each tactile grid. The grid spans the pad's inner face, columns along x, rows along z."""
+"""Geom of the finger pad of each tactile grid. The grid spans the pad's inner face, columns along x, rows along z."""
 
 
 @dataclass(frozen=True)
@@ -37,19 +37,20 @@ class Stream:
     """One kind of reading."""
 
     names: tuple[str, ...]
-    """What each entry of a vector is, such as `x`; of a grid, what its axes are."""
+    """Name of each entry of a vector, such as `x`; or of each axis of a grid."""
     bound: float | NDArray[np.float64]
-    """No reading is larger in size; finite where the robot's limits make it so. One for all entries or one for each."""
+    """Largest absolute value, for all entries or for each; the robot's limits determine it where they can."""
     read: Callable[[World], NDArray[np.float64]]
+    """Function that reads the stream from a world."""
     grid: tuple[int, ...] = ()
-    """Shape of a grid; a vector has none."""
+    """Shape of a grid; empty for a vector."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         return self.grid or (len(self.names),)
 
     def entries(self, name: str) -> tuple[str, ...]:
-        """Full names of the entries, such as `robot0_eef_pos.x`, of a stream of that name."""
+        """Full names of the entries, such as `robot0_eef_pos.x`, if the stream has this name."""
         return self.names if self.grid or name == NAME else tuple(f"{name}.{entry}" for entry in self.names)
 
 
@@ -59,7 +60,7 @@ def _world_force(arm: Arm) -> NDArray[np.float64]:
 
 def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
     def read(arm: Arm) -> NDArray[np.float64]:
-        """Normal force of every contact on the pad, in the taxel where it acts [N]."""
+        """Sum of the normal forces of the contacts in each taxel [N]."""
         world, grid, force = arm.world, np.zeros((TAXELS, TAXELS)), np.zeros(6)
         geom = world.model.geom(f"{Names(arm.number).hand}{pad}").id
         half = world.model.geom_size[geom]
@@ -76,9 +77,9 @@ def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
     return read
 
 
-def _of_arm(number: int, hand: str) -> dict[str, Stream]:
-    """The streams of one arm but the cameras. Quaternions are xyzw, as robosuite's key promises."""
-    robot, further = Names(number).arm, Names(number).arm if number else ""
+def _arm_streams(number: int, hand: str) -> dict[str, Stream]:
+    """The streams of one arm without the cameras. Quaternions are xyzw, as under robosuite's keys."""
+    robot, prefix = Names(number).arm, Names(number).arm if number else ""
 
     def stream(names: Sequence[str], bound: float, read: Callable[[Arm], NDArray[np.float64]]) -> Stream:
         return Stream(tuple(names), bound, lambda world: read(world.arms[number]))
@@ -87,19 +88,19 @@ def _of_arm(number: int, hand: str) -> dict[str, Stream]:
         read = _tactile(pad)
         return Stream(("row", "column"), 1e4, lambda world: read(world.arms[number]), (TAXELS, TAXELS))
 
-    joints, push = [f"joint{i + 1}" for i in range(JOINTS)], ("force_x", "force_y", "force_z")
+    joints, force = [f"joint{i + 1}" for i in range(JOINTS)], ("force_x", "force_y", "force_z")
     found = {
         f"{robot}eef_pos": stream(POSE["pos"], 3.0, lambda arm: arm.hand),
         f"{robot}eef_quat": stream(POSE["quat"], 1.0, lambda arm: xyzw(arm.hand_rot)),
         f"{robot}joint_pos": stream(joints, 7.0, lambda arm: arm.joint_pos),
         f"{robot}joint_vel": stream(joints, 100.0, lambda arm: arm.joint_vel),
         f"{robot}gripper_qpos": stream(("finger_joint1", "finger_joint2"), 0.1, lambda arm: arm.finger_pos),
-        f"{further}force_torque": stream((*push, "torque_x", "torque_y", "torque_z"), 1e4, lambda arm: arm.wrench()),
-        f"{further}force_torque_world": stream(push, 1e4, _world_force),
+        f"{prefix}force_torque": stream((*force, "torque_x", "torque_y", "torque_z"), 1e4, lambda arm: arm.wrench()),
+        f"{prefix}force_torque_world": stream(force, 1e4, _world_force),
         **{f"{robot}{name}": grid(pad) for name, pad in PADS.items()},
     }
-    lacking = [] if hand == JAW else [f"{robot}{name}" for name in JAW_ONLY]
-    return {name: stream for name, stream in found.items() if name not in lacking}
+    missing = [] if hand == JAW else [f"{robot}{name}" for name in JAW_ONLY]
+    return {name: stream for name, stream in found.items() if name not in missing}
 
 
 def turns_pictures(family: type[Scenario]) -> bool:
@@ -108,21 +109,22 @@ def turns_pictures(family: type[Scenario]) -> bool:
 
 
 def privileged(state: ObjectState, family: type[Scenario], orientation: Callable[[], Orientation]) -> dict[str, Stream]:
-    """`object-state`, each reading in it by itself, and where pictures show the bodies.
+    """`object-state`, each reading in it as a stream, and the positions at which pictures show the bodies.
 
     Args:
-        orientation: how the pictures of the running scenario are held; asked only if its family turns any.
+        orientation: function that gives the orientation of pictures of the running scenario; used only if its family
+            turns any.
     """
     found = {NAME: Stream(state.names, state.bounds, state.read)}
     for body, moves in state.bodies.items():
-        found |= _parts(ObjectState({body: moves}, state.arms))
+        found |= _body_streams(ObjectState({body: moves}, state.arms))
         if turns_pictures(family) and moves:
-            found[f"seen_{body}_pos"] = _seen(body, orientation)
+            found[f"seen_{body}_pos"] = _seen_position(body, orientation)
     return found
 
 
-def _parts(state: ObjectState) -> dict[str, Stream]:
-    """The readings of one body, each by itself."""
+def _body_streams(state: ObjectState) -> dict[str, Stream]:
+    """The readings of one body, each as a stream."""
 
     def part(where: slice) -> Stream:
         names = tuple(name.rpartition(".")[2] for name in state.names[where])
@@ -131,14 +133,14 @@ def _parts(state: ObjectState) -> dict[str, Stream]:
     return {name: part(where) for name, where in state.segments.items()}
 
 
-def _seen(body: str, orientation: Callable[[], Orientation]) -> Stream:
+def _seen_position(body: str, orientation: Callable[[], Orientation]) -> Stream:
     return Stream(POSE["pos"], 3.0, lambda world: orientation().seen_at(world.pos(body)))
 
 
 OWN_POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
-"""Streams about an arm's own pose."""
+"""Streams of an arm's own pose, without its prefix."""
 JAW_ONLY = ("gripper_qpos", *PADS)
-"""Streams that an arm without jaw does not have."""
+"""Streams that only an arm with a jaw has."""
 
 CAMERAS = {
     "rgb_exo_right_cam": "agentview",
@@ -146,33 +148,33 @@ CAMERAS = {
     "rgb_ego_cam": "robot0_robotview",
     "rgb_gripper_cam": "robot0_eye_in_hand",
 }
-"""The paper's names of the cameras, and robosuite's."""
+"""robosuite's names of the cameras, by the paper's."""
 
 
 def streams_of(embodiment: str) -> dict[str, Stream]:
-    """All streams that this robot has but the cameras, one arm after the other."""
-    arms = (_of_arm(number, hand) for number, hand in enumerate(hands(embodiment)))
+    """All streams of a robot without the cameras, one arm after the other."""
+    arms = (_arm_streams(number, hand) for number, hand in enumerate(hands(embodiment)))
     return {name: stream for arm in arms for name, stream in arm.items()}
 
 
 def cameras_of(embodiment: str) -> dict[str, str]:
-    """robosuite's names of all cameras that this robot has, by the paper's."""
+    """robosuite's names of all cameras of a robot, by the paper's."""
     further = [Names(number).arm for number in range(1, len(hands(embodiment)))]
     return {**CAMERAS, **{f"{arm}rgb_gripper_cam": f"{arm}eye_in_hand" for arm in further}}
 
 
 def proprioception(embodiment: str) -> tuple[str, ...]:
-    """Names of the streams about the robot's own pose."""
+    """Names of the streams of the robot's own pose."""
     poses = [f"{Names(number).arm}{name}" for number in range(len(hands(embodiment))) for name in OWN_POSE]
     return tuple(name for name in streams_of(embodiment) if name in poses)
 
 
 ALL = "+".join([JAW] * MAX_ARMS)
-"""The robot that has every stream and camera that any has."""
+"""Embodiment that has all streams and cameras."""
 
 
 def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> None:
-    """Raise `UnknownName` for the first name that is neither a stream of this robot nor a camera nor one of `poses`."""
+    """Raise `UnknownName` for the first name that is neither a stream nor a camera of the robot, nor in `poses`."""
     known = [*streams_of(embodiment), *cameras_of(embodiment), *poses]
     for name in names:
         if name not in known:
@@ -180,14 +182,14 @@ def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> 
 
 
 MOVES = ("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z", "gripper")
-"""What the seven numbers of an arm's action are."""
+"""Names of the seven numbers of an arm's action."""
 
 
 def action_names(embodiment: str) -> tuple[str, ...]:
-    """What the numbers of an action are, such as `robot0_move_x`."""
+    """Names of the numbers of an action, such as `robot0_move_x`."""
     return tuple(f"{Names(number).arm}{move}" for number in range(len(hands(embodiment))) for move in MOVES)
 
 
 def named(streams: Mapping[str, Stream], names: Iterable[str]) -> tuple[str, ...]:
-    """Full names of the entries of some vectors, one after the other."""
+    """Full names of the entries of some streams, one after the other."""
     return tuple(entry for name in names for entry in streams[name].entries(name))

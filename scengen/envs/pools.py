@@ -1,4 +1,4 @@
-"""Which scenarios an environment plays: those of some pools, of a split, or one of them."""
+"""The scenarios that an environment plays: those of some pools, of a split, or one of them."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,23 +10,23 @@ from ..pool.library import Library
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
-"""Folder of a pool, or several."""
+"""Folder of a pool, or several folders."""
 
 
 def rows_of(pool: Folders | None, task: str) -> Library:
     """The scenarios of some pools.
 
     Raises:
-        PoolError: a pool is missing, damaged, empty, of another version or task, or there is none.
+        PoolError: no pool is given, or one is missing, damaged, empty, or of another version or task.
     """
     folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
     if not folders:
-        raise PoolError("no pool was named; say pool=FOLDER, or a list of them; scengen generate makes pools")
-    return Library([_opened(each, task) for folder in folders for each in _of_task(folder, task)])
+        raise PoolError("no pool was given; give pool=FOLDER or a list of folders; scengen generate makes pools")
+    return Library([_open_checked(each, task) for folder in folders for each in _pools_of_task(folder, task)])
 
 
-def _of_task(folder: str | Path, task: str) -> list[str]:
-    """A pool, or of a folder of pools those of the task."""
+def _pools_of_task(folder: str | Path, task: str) -> list[str]:
+    """The pool in a folder, or, in a folder of pools, those of the task."""
     found = members(folder)
     if len(found) == 1:
         return found
@@ -36,27 +36,28 @@ def _of_task(folder: str | Path, task: str) -> list[str]:
 
 
 def chosen(rows: Library, scenario: str | None, split: str | None = None) -> Library:
-    """The scenarios of a split, and of these the one of that name.
+    """The scenarios of a split, or one of them.
 
     Args:
-        scenario: what `Pool.row` takes: a name, an id, or how one begins.
+        scenario: name, id, or unique prefix of an id, as in `Pool.row`. Default: all scenarios.
+        split: name of the split. Default: all splits.
 
     Raises:
-        UnknownName: there is none.
-        BadConfig: several ids begin so.
+        UnknownName: there is no such scenario or split.
+        BadConfig: several ids have this prefix.
     """
     if split is not None:
         rows = rows.of_split(split)
     return rows if scenario is None else rows.only(rows.find(scenario))
 
 
-def _opened(folder: str | Path, task: str) -> Pool:
-    """A sound pool of a task."""
+def _open_checked(folder: str | Path, task: str) -> Pool:
+    """An undamaged pool of a task."""
     pool = Pool.open(folder).check()
     check_versions(pool.manifest.versions, str(folder))
     tasks, _ = pool.kinds("task")
     if not tasks:
-        raise PoolError(f"{folder} holds no scenario; see scengen generate")
+        raise PoolError(f"{folder} holds no scenario; fill it with scengen generate")
     if others := {*tasks} - {task}:
         raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
     return pool

@@ -3,8 +3,8 @@
     row = Pool.open("generated/domino_single-id").row("3f")
     env = robosuite.make("DominoSingle", robots="Panda", scenario=row, use_camera_obs=False)
 
-robosuite composes the model, its controller moves the robot, its clock steps the physics. From here come the text of
-the scene, the suction cup, the events of the scene, and the verdict, which is the one of certification.
+robosuite composes the model, its controller moves the robot, and its clock steps the physics. scengen adds the text of
+the scene, the suction cup, the events of the scene, and the verdict, which is that of certification.
 """
 
 import re
@@ -43,42 +43,43 @@ from robosuite.utils.observables import Observable, sensor
 Observations = OrderedDict[str, Any]
 
 ROBOT = "Panda"
-"""robosuite's name of the robot that certificates speak of."""
+"""robosuite's name of the certified robot."""
 GRIPPERS = {JAW: "PandaGripper", SUCTION: "SuctionGripper"}
-"""robosuite's names of the hands of our embodiments."""
+"""robosuite's names of the hands of scengen's embodiments."""
 
 
 class RobosuiteEnv(ManipulationEnv):
     """The scenarios of one task as a robosuite environment; `env_class` makes a class for each task.
 
-    `reward` is 1 once the goal has been reached, else 0; `done` comes at the horizon alone, as everywhere in
-    robosuite. `info` holds `scenario`, `success` and `reason`, why there is none and never will be.
-    Goal, failures and events of the scene follow the certificate's clock of 100 Hz under any `control_freq`; the
+    `reward` is 1 once the goal has been reached, else 0. `done` is true at the horizon only, as in all environments of
+    robosuite. `info` holds `scenario`, `success`, and `reason`, the reason of a failure.
+    Goal, failures and events of the scene follow the certificate's clock of 100 Hz with any `control_freq`. The
     certificate itself holds for 100 Hz and robosuite's default controller.
 
-    Where a scenario is seen turned or mirrored (`Scenario.orientation`), every camera observation is, depth and
-    segmentation included; `seen_<body>_pos`, of modality "seen", is where the picture lets a body appear. `<body>_pos`,
-    the robot's own pose and actions stay as they are. `object-state` is that of Gymnasium, entry by entry.
+    If a scenario is seen turned or mirrored (`Scenario.orientation`), every camera observation is turned, depth and
+    segmentation included. `seen_<body>_pos`, of modality "seen", is the position at which the picture shows a body.
+    `<body>_pos`, the robot's own pose and actions stay as they are. `object-state` is that of the Gymnasium
+    environment, entry by entry.
 
-    `get_ep_meta` names the scenario, as demonstrations of robosuite keep it; after `set_ep_meta` with it, hard resets
-    load that one.
+    `get_ep_meta` contains the id of the scenario, for robosuite's demonstrations. After `set_ep_meta` with this id,
+    hard resets load that scenario.
     """
 
     NAME: ClassVar[str] = ""
     """Name of the task."""
     SEARCH: ClassVar[tuple[str, ...]] = ()
-    """Where else to look for its file, see `task_files.search_path`."""
+    """Further folders that may hold its file, see `task_files.search_path`."""
 
     sim: Any
     """robosuite's simulation."""
     row: PoolRow
-    """The scenario as its pool tells it."""
+    """Row of the running scenario in its pool."""
     scenario: Scenario
-    """The scenario itself. Privileged: a policy that reads it knows what it should find out."""
+    """Running scenario. Privileged: it holds the hidden parameters, which a policy must find out."""
     episode: Episode
     """Outcome and reason so far, by the certificate's clock."""
     world: World
-    """robosuite's model and data, seen through names. To be looked at; robosuite is who steps it."""
+    """Access to robosuite's model and data by names. Read it only; robosuite steps the simulation."""
 
     def __init__(
         self,
@@ -94,31 +95,31 @@ class RobosuiteEnv(ManipulationEnv):
         reward_shaping: bool = False,
         **arguments: Any,
     ):
-        """Choose scenarios and build the first.
+        """Select the scenarios and build the first one.
 
         Args:
-            robots: "Panda", or a list of two where the task has two arms; default: what the task asks for.
-            scenario: a row of a pool, or with `pool` what `Pool.row` takes: a name, an id, or how one begins. Without
-                it, every hard reset draws one from the pools, decided by robosuite's `seed`.
-            pool: folder of a pool, or several.
-            use_object_obs: also observe `object-state` and every reading in it, such as `<body>_pos` [m]
+            robots: "Panda", or a list of two for a task with two arms. Default: the robots of the task.
+            scenario: a row of a pool; or, with `pool`, a name, an id, or a unique prefix of an id, as in `Pool.row`.
+                Without it, every hard reset draws one from the pools; robosuite's `seed` determines the draws.
+            pool: folder of a pool, or several folders.
+            use_object_obs: whether to observe `object-state` and every reading in it, such as `<body>_pos` [m]
                 (`scengen.envs.object_state`); and `seen_<body>_pos` [m], if the family turns pictures.
-            gripper_types: "default" is the hand of each arm that the task asks for; no others are accepted.
-            control_freq: actions in a second.
-            horizon: actions in an episode; default: the task's time limit.
-            action_filter: None, the paper's interface for policies; or "teleop" for the filter that the actions of
-                people and oracles pass, which is defined for 100 Hz.
+            gripper_types: "default" for the hands of the task; other hands are refused.
+            control_freq: actions per second.
+            horizon: actions in an episode. Default: the task's time limit.
+            action_filter: None, the paper's interface for policies; or "teleop" for the filter of teleoperation and of
+                the oracles, which is defined for 100 Hz.
             reward_scale: reward of a reached goal.
-            reward_shaping: False; there is no reward on the way, which would tell how the puzzle is solved.
+            reward_shaping: False. There is no intermediate reward, because it would reveal how to solve the puzzle.
             arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
 
         Raises:
-            ScengenError: no such scenario, one of another task, or made with other versions of MuJoCo or robosuite;
-                pictures that are seen turned by a quarter are not square.
+            ScengenError: there is no such scenario, or it is of another task, or was made with other versions of
+                MuJoCo or robosuite; pictures that are turned by a quarter are not square.
         """
         _check_filter_rate(action_filter, control_freq)
         if reward_shaping:
-            raise BadConfig("reward_shaping = True; the only reward is that of the goal: say reward_shaping=False")
+            raise BadConfig("reward_shaping = True; the only reward is that of the goal: give reward_shaping=False")
         self.action_filter, self.reward_scale, self.use_object_obs = action_filter, reward_scale, use_object_obs
         self.task = compose.load_task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
@@ -126,7 +127,7 @@ class RobosuiteEnv(ManipulationEnv):
         self._object_state: NDArray[np.float64] | None = None
         if use_object_obs:
             bodies = bodies_of(self.task, _scenes(self._choice))
-            self.objects = ObjectState(bodies, self._driven)
+            self.objects = ObjectState(bodies, self._controlled_arms)
         super().__init__(
             robots=[ROBOT] * len(grippers) if robots is None else robots,
             gripper_types=grippers,  # type: ignore[arg-type]
@@ -135,40 +136,40 @@ class RobosuiteEnv(ManipulationEnv):
             **arguments,
         )
 
-    # --- what robosuite asks for ----------------------------------------------------------
+    # --- robosuite's interface ------------------------------------------------------------
 
     def reward(self, action: NDArray[np.float64] | None = None) -> float:
         """`reward_scale` once the goal has been reached, else 0."""
         return self.reward_scale * float(self._check_success())
 
     def reset(self) -> Observations:
-        """robosuite's reset, and the scene's events of the first control period."""
+        """Reset as robosuite does, and run the scene's events of the first control period."""
         observations = super().reset()
         self.episode.begin()
         return observations
 
     def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
-        """robosuite's step, behind the filter that was asked for."""
+        """Step as robosuite does, after the action filter, if there is one."""
         return super().step(self.world.filter(action) if self.action_filter else action)
 
     @property
     def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Least and largest action: of the arms that actions drive. Those of the scene's own get theirs from it."""
+        """Smallest and largest action of the controlled arms. The scene itself drives its own arms."""
         low, high = map(np.asarray, super().action_spec)
         return low[: self.action_dim], high[: self.action_dim]
 
     @property
     def action_dim(self) -> int:
-        """Numbers in an action."""
+        """Number of entries of an action."""
         return action_size(self.task.embodiment)
 
     @property
-    def _driven(self) -> int:
-        """How many robots actions drive."""
+    def _controlled_arms(self) -> int:
+        """Number of robots that actions control."""
         return len(hands(self.task.embodiment))
 
     def _certified_grippers(self, gripper_types: str | Sequence[str]) -> list[str]:
-        """robosuite's names of the hands that the task asks for, one for each arm.
+        """robosuite's names of the task's hands, one for each arm.
 
         Raises:
             BadConfig: other hands were given.
@@ -179,7 +180,7 @@ class RobosuiteEnv(ManipulationEnv):
         return grippers
 
     def _check_success(self) -> bool:
-        """Whether the goal has been reached, and nothing forbidden has happened since."""
+        """Whether the goal has been reached, without a failure since."""
         return self.episode.outcome == "success"
 
     def _check_robot_configuration(self, robots: Sequence[str]) -> None:
@@ -190,29 +191,29 @@ class RobosuiteEnv(ManipulationEnv):
         if layout not in (layouts := ("default", "parallel") if len(certified) > 1 else ("default",)):
             self._refuse("env_configuration", [layout], layouts[-1:])
 
-    def _refuse(self, what: str, given: Sequence[str], certified: Sequence[str]) -> None:
-        told = f"{what} = {', '.join(given)}; the scenarios of {self.NAME} are certified with {', '.join(certified)}"
-        raise BadConfig(told)
+    def _refuse(self, argument: str, given: Sequence[str], certified: Sequence[str]) -> None:
+        accepted = f"the scenarios of {self.NAME} are certified with {', '.join(certified)}"
+        raise BadConfig(f"{argument} = {', '.join(given)}; {accepted}")
 
     def _load_model(self) -> None:
         super()._load_model()
-        self.row = self._wanted() or self._choice[int(self.rng.integers(len(self._choice)))]
+        self.row = self._requested_row() or self._choice[int(self.rng.integers(len(self._choice)))]
         self.scenario = self.task.scenario(self.row.params)
         for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
             self.scenario.orientation.check_size(width, height)
         self.model = self._composed(self.row)
 
     def _composed(self, row: PoolRow) -> SceneTask:
-        """A scene with the robots that have been loaded."""
+        """The scene of a row with the loaded robots."""
         robots = [robot.robot_model for robot in self.robots]
         for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
             robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
         return SceneTask(SceneModel(row.scene_xml), robots)
 
     def model_text(self, row: PoolRow) -> str:
-        """The MJCF that robosuite composes of a scenario, as demonstrations keep it.
+        """The MJCF of a scenario as composed by robosuite, for demonstrations.
 
-        Paths of meshes begin at robosuite's own folder, from where `edit_model_xml` finds them on any machine.
+        Paths of meshes are relative to robosuite's own folder, so that `edit_model_xml` finds them on any machine.
         """
         text = self._composed(row).get_xml()
         return re.sub(r'file="[^"]*?(robosuite/models/[^"]*)"', r'file="\1"', text)
@@ -226,7 +227,7 @@ class RobosuiteEnv(ManipulationEnv):
     def _setup_references(self) -> None:
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
-        self.world = World(model, data, Loop(model, data), len(self.robots) - self._driven)
+        self.world = World(model, data, Loop(model, data), len(self.robots) - self._controlled_arms)
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()
@@ -235,11 +236,11 @@ class RobosuiteEnv(ManipulationEnv):
         return observables
 
     def _create_camera_sensors(self, *arguments: Any, **named: Any) -> tuple[list[Callable[..., Any]], list[str]]:
-        """robosuite's, with the pictures held as the running scenario has them."""
+        """robosuite's sensors, with pictures in the orientation of the running scenario."""
         sensors, names = super()._create_camera_sensors(*arguments, **named)
-        return [self._held(read) for read in sensors], names
+        return [self._oriented(read) for read in sensors], names
 
-    def _held(self, read: Callable[[Any], NDArray]) -> Callable[[Any], NDArray]:
+    def _oriented(self, read: Callable[[Any], NDArray]) -> Callable[[Any], NDArray]:
         rows = IMAGE_CONVENTION_MAPPING[macros.IMAGE_CONVENTION]  # 1: the first row is at the bottom; -1: on top
 
         @sensor(modality=read.__modality__)  # type: ignore[attr-defined]
@@ -250,45 +251,45 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _reset_internal(self) -> None:
         super()._reset_internal()
-        # robosuite's controllers looked at the arms before these took their initial posture: let them look again.
+        # robosuite's controllers have read the arms before these took their initial posture: make them read again.
         for controller in (part for robot in self.robots for part in robot.part_controllers.values()):
             controller.new_update = True
-        self.sim.data.qacc_warmstart[:] = 0.0  # what building those controllers left behind
+        self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon), 0
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
-        """Between mj_step1 and mj_step2, in every physics step."""
+        """Command the arms; robosuite calls it between mj_step1 and mj_step2 of every physics step."""
         assert len(action) == self.action_dim, f"an action has {self.action_dim} numbers, not {len(action)}"
-        every = np.split(np.asarray(self.world.joined(action)), len(self.robots))
-        for number, (robot, own) in enumerate(zip(self.robots, every, strict=True)):
-            # Partners hear something new in every control period, however seldom actions come.
-            robot.control(own, policy_step=policy_step if number < self._driven else self._substep == 0)
+        actions = np.split(np.asarray(self.world.joined(action)), len(self.robots))
+        for number, (robot, own) in enumerate(zip(self.robots, actions, strict=True)):
+            # The scene's own arms get a new action in every control period, with any `control_freq`.
+            robot.control(own, policy_step=policy_step if number < self._controlled_arms else self._substep == 0)
         self.world.command(action)
         self.world.loop.watch(first=self._substep == 0)
 
     def _update_observables(self, force: bool = False) -> None:
-        """After every physics step; forced, after a reset."""
+        """Update observables and clock; robosuite calls it after every physics step, and after a reset (`force`)."""
         self._object_state = None
         super()._update_observables(force)
         if not force:
             self._substep = (self._substep + 1) % self.world.loop.substeps
             if self._substep == 0:
-                self._period_ends()
+                self._end_period()
 
     def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
         reward, done, info = super()._post_action(action)
         success = self._check_success()
         return reward, done, {**info, "scenario": self.row.id, "success": success, "reason": self.episode.reason}
 
-    # --- which scenario ---------------------------------------------------------------------
+    # --- choice of the scenario -----------------------------------------------------------
 
     def get_ep_meta(self) -> dict[str, Any]:
-        """What a demonstration keeps of its episode: the scenario's id, and the instruction as `lang`."""
+        """Metadata of an episode for demonstrations: the scenario's id, and the instruction as `lang`."""
         return {**super().get_ep_meta(), "scenario": self.row.id, "lang": self.row.instruction}
 
-    def _wanted(self) -> PoolRow | None:
-        """The scenario that `set_ep_meta` asks for, if it does."""
+    def _requested_row(self) -> PoolRow | None:
+        """The scenario whose id was given to `set_ep_meta`, or None."""
         if (id_ := self._ep_meta.get("scenario")) is None:
             return None
         if isinstance(self._choice, Library):
@@ -300,21 +301,21 @@ class RobosuiteEnv(ManipulationEnv):
 
     # --- the certificate's clock ----------------------------------------------------------
 
-    def _period_ends(self) -> None:
-        """Judge the control period that has passed, and let the scene's events of the next happen."""
-        mujoco.mj_kinematics(self.world.model, self.world.data)  # else poses are those of 2 ms before
+    def _end_period(self) -> None:
+        """Judge the past control period, and run the scene's events of the next one."""
+        mujoco.mj_kinematics(self.world.model, self.world.data)  # otherwise poses are those of 2 ms before
         if self.episode.outcome is None and self.world.warnings:
             self.episode.outcome, self.episode.reason = "unstable", ", ".join(self.world.warnings)
         self.episode.judge()
         self.episode.begin()
 
     def _object_sensors(self) -> dict[str, Callable[[Any], NDArray[np.float64]]]:
-        """Every reading of `object-state`, and where pictures show what can move [m]."""
+        """Sensors of all readings of `object-state`, and of the positions where pictures show movable bodies [m]."""
 
         def reading(where: slice) -> Callable[[Any], NDArray[np.float64]]:
             @sensor(modality="object")
             def part(_: Any) -> NDArray[np.float64]:
-                if self._object_state is None:  # once for all readings of a moment
+                if self._object_state is None:  # read once for all readings of a moment
                     self._object_state = self.objects.read(self.world)
                 return self._object_state[where]
 
@@ -336,7 +337,7 @@ del REGISTERED_ENVS[RobosuiteEnv.__name__]  # only its subclasses have a task
 
 
 def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
-    """The environment of a task, which robosuite then knows under the task's name in CamelCase.
+    """The environment class of a task, registered in robosuite under the task's name in CamelCase.
 
     Args:
         task: name of the task.
@@ -348,7 +349,7 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
     name = "".join(part.capitalize() for part in task.split("_"))
     known = REGISTERED_ENVS.get(name, RobosuiteEnv)
     if not issubclass(known, RobosuiteEnv):
-        raise BadConfig(f"task {task}: robosuite has an environment {name} of its own; rename the task")
+        raise BadConfig(f"task {task}: robosuite has its own environment {name}; rename the task")
     if (known.NAME, known.SEARCH) == (task, search):
         return known
     about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
@@ -367,10 +368,10 @@ def _listed(names: str | Sequence[str]) -> list[str]:
 
 
 def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> Sequence[PoolRow]:
-    """The scenarios to draw from: one row, the one of some pools whose id begins with a text, or all of them.
+    """The scenarios to draw from: one row, one scenario of some pools, or all scenarios of the pools.
 
     Raises:
-        ScengenError: there is none, or one of another task or made with other versions.
+        ScengenError: there is no such scenario, or it is of another task, or was made with other versions.
     """
     if isinstance(scenario, PoolRow) and pool is None:
         where = f"scenario {scenario.name}"
@@ -379,15 +380,17 @@ def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> 
             raise PoolError(f"{where} belongs to {scenario.task}, not to {task}")
         return [scenario]
     if pool is None or isinstance(scenario, PoolRow):
-        raise BadConfig("which scenario? say scenario=Pool.open(folder).row(id), or pool=folder and scenario=id")
+        raise BadConfig(
+            "no scenario was given; give scenario=Pool.open(folder).row(id), or pool=folder and scenario=id"
+        )
     return chosen(rows_of(pool, task), scenario)
 
 
 def _scenes(rows: Sequence[PoolRow]) -> Iterator[str]:
-    """Texts of their scenes."""
-    return (
-        (scene for (scene,) in rows.columns("scene_xml")) if isinstance(rows, Library) else (r.scene_xml for r in rows)
-    )
+    """Texts of the scenes of some rows."""
+    if isinstance(rows, Library):
+        return (scene for (scene,) in rows.columns("scene_xml"))
+    return (row.scene_xml for row in rows)
 
 
 for _name in task_files.tasks():

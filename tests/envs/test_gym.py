@@ -162,8 +162,8 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_singel", REFERENCE), UnknownName, "did you mean 'domino_single'"),
         (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
         (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
-        (lambda: PoolEnv("domino_single", []), PoolError, "no pool was named; say pool=FOLDER"),
-        (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was named; say pool=FOLDER"),
+        (lambda: PoolEnv("domino_single", []), PoolError, "no pool was given; give pool=FOLDER"),
+        (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was given; give pool=FOLDER"),
         (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
         (
             lambda: PoolEnv("domino_single", REFERENCE, scenario="z"),

@@ -67,5 +67,5 @@ def test_pictures_are_a_dictionary_of_cameras():
 
 
 def test_other_environments_are_refused():
-    with pytest.raises(BadConfig, match="cannot wrap CartPoleEnv; it is for environments of scengen"):
+    with pytest.raises(BadConfig, match="cannot wrap CartPoleEnv; it wraps environments of scengen"):
         LeRobotNames(gymnasium.make("CartPole-v1"))
