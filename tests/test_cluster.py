@@ -20,8 +20,10 @@ from scengen.commands.settings import read
 from scengen.commands.verify import VerifySettings
 from scengen.errors import BadConfig, ScengenError
 from scengen.runs.progress import ProgressBar
-from scengen.work import cluster
-from scengen.work.cluster import QUIET, Cluster, ClusterError, about
+from scengen.work import crew
+from scengen.work import nodes as node_checks
+from scengen.work.cluster import QUIET, Cluster
+from scengen.work.nodes import ClusterError, about
 from scengen.work.parallel import Executor, Limits, WorkerDied, each
 
 LIMITS = Limits(2.0, 400)
@@ -48,12 +50,12 @@ def node_of(item):
         (("executor=ray", "executor.adress=auto"), "no key in executor named 'adress' (did you mean 'address'?)"),
         (("executor.address=auto",), "executor.address is a setting of executor=ray; give that, too"),
         (("executor=ray", "executor.address=there"), "it must be auto, local, HOST:PORT or ray://HOST:PORT"),
-        (("executor=ray", "executor.address=127.0.0.1:1"), "nobody answers there ([Errno 111] Connection refused)"),
-        (("executor=ray", "executor.address=ray://localhost:1"), "nobody answers there"),
-        (("executor=ray", "executor.address=x:99999"), "nobody answers there"),
-        (("executor=ray", "executor.address=a..b:1"), "nobody answers there"),
+        (("executor=ray", "executor.address=127.0.0.1:1"), "no answer ([Errno 111] Connection refused)"),
+        (("executor=ray", "executor.address=ray://localhost:1"), "no answer ("),
+        (("executor=ray", "executor.address=x:99999"), "no answer ("),
+        (("executor=ray", "executor.address=a..b:1"), "no answer ("),
         (("executor=ray", "executor.token=missing.txt"), "executor.token = missing.txt; there is no such file"),
-        (("executor=ray", "workers=0"), "workers = 0; of a cluster they must be from 1 to 10000, or auto"),
+        (("executor=ray", "workers=0"), "workers = 0; on a cluster it must be auto or lie in [1, 10000]"),
         (("executor=ray", "workers=many"), "workers = 'many'; it must be a whole number, or auto"),
     ],
 )
@@ -212,10 +214,10 @@ def test_limits_hold_on_nodes(ours):
 
 @on_nodes
 def test_what_kills_its_worker_twice_is_lost_and_a_run_of_nothing_else_ends(ours, monkeypatch):
-    monkeypatch.setattr(cluster, "NOTICED", 2.0)
+    monkeypatch.setattr(crew, "NODE_DEATH_DELAY", 2.0)
     found = sorted(each(work, ["a", "kill", "b"], ours, LIMITS, lost))
     assert found == ["a", "b", "kill died: it took 2 workers with it"]
-    with pytest.raises(ClusterError, match="workers died one after the other without a result; the last: The actor"):
+    with pytest.raises(ClusterError, match="workers died in a row without a result; the last: The actor"):
         list(each(work, ["kill"] * 20, ours, LIMITS, lost))
 
 
@@ -231,7 +233,7 @@ def test_a_node_that_rounds_otherwise_is_named_and_not_used(nodes, ours, tmp_pat
         assert f"({odd.node_id[:8]}) is not used: fingerprint" in line and "code" not in line
     finally:
         nodes.remove_node(odd)
-    monkeypatch.setattr(cluster, "versions", lambda: {"mujoco": "9.9"})
+    monkeypatch.setattr(node_checks, "versions", lambda: {"mujoco": "9.9"})
     with pytest.raises(ClusterError, match=r"no node of the cluster can be used; .*mujoco 3\.\d+\.\d+ instead of 9\.9"):
         list(each(work, "ab", ours, LIMITS))
 

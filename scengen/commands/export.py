@@ -7,7 +7,7 @@ from pathlib import Path
 from ..export.mjcf import export
 from ..pool import Pool, PoolRow
 from ..runs.progress import ProgressBar
-from ..work.parallel import SHOWN, each
+from ..work.parallel import UNTRUSTED_LIMITS, each
 from ..work.targets import try_folder
 from . import FAILED, OK, Arguments, chosen, err, holder, one, say, warn
 from .settings import read
@@ -31,7 +31,7 @@ def command(arguments: Arguments) -> int:
     count, lost = 0, []
     with ProgressBar(err, f"export to {settings.to}", len(pool) if settings.id is None else 1) as progress_bar:
         work = partial(export, folder=Path(settings.to), robot=settings.robot)
-        for count, why in enumerate(each(work, rows, 1, SHOWN, _lost), 1):
+        for count, why in enumerate(each(work, rows, 1, UNTRUSTED_LIMITS, _lost), 1):
             lost += [why] if why else []
             progress_bar.show(count)
     for why in lost:

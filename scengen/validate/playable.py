@@ -8,7 +8,7 @@ from ..errors import Unstable
 from ..pool import PoolRow
 from ..pool.row import NO_WITNESS
 from ..sim.world import World
-from ..work.parallel import SHOWN, Workers, apart, each
+from ..work.parallel import UNTRUSTED_LIMITS, Workers, apart, each
 
 Played = tuple[str, str, Actions]
 """A scene, MJCF, its robot, and actions."""
@@ -30,7 +30,7 @@ def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[
     Raises:
         ScengenError: a scene does not compile.
     """
-    tried = each(_try, rows, workers, SHOWN, lambda row, reason: (row.id, f"playing it {reason}"))
+    tried = each(_try, rows, workers, UNTRUSTED_LIMITS, lambda row, reason: (row.id, f"playing it {reason}"))
     return (found for found in tried if found is not None)
 
 
@@ -45,7 +45,7 @@ def check_row(row: PoolRow) -> PoolRow:
     Raises:
         ScengenError: it does; or its scene does not compile.
     """
-    apart(play, (row.scene_xml, row.embodiment, row.witness), SHOWN, f"playing {row.name}")
+    apart(play, (row.scene_xml, row.embodiment, row.witness), UNTRUSTED_LIMITS, f"playing {row.name}")
     return row
 
 
@@ -55,4 +55,4 @@ def check_scene(scene_xml: str, embodiment: str) -> None:
     Raises:
         ScengenError: it does; or it does not compile.
     """
-    apart(play, (scene_xml, embodiment, NO_WITNESS), SHOWN, "compiling a scene")
+    apart(play, (scene_xml, embodiment, NO_WITNESS), UNTRUSTED_LIMITS, "compiling a scene")

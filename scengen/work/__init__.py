@@ -1,1 +1,1 @@
-"""How long work is distributed to processes, logged, and written to files."""
+"""Distribution of work to processes and Ray clusters, logs of long runs, and output files."""

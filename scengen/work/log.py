@@ -1,4 +1,4 @@
-"""Results of long work in a file, one per line: safe against a kill, and the memory of a run that goes on."""
+"""Log of a long run, one result per line: it survives a kill, and a repeated run continues from it."""
 
 import json
 from collections.abc import Mapping
@@ -13,20 +13,20 @@ from .targets import refused
 
 
 class Log:
-    """Plain records in `path`, after a first line that says what they depend on. One writer at a time."""
+    """Plain records in a file, after a first line that says what they depend on. One writer at a time."""
 
     def __init__(self, path: Path, identity: Mapping[str, Any], remedy: str = "choose another to="):
         """
         Args:
-            identity: what the records depend on; those of another identity are left alone.
-            remedy: what to do where such records are found.
+            identity: settings on which the records depend; records with another identity are not touched.
+            remedy: remedy in the error about such records.
         """
         self.path, self.identity, self.remedy = path, dict(identity), remedy
         self.records: list[dict[str, Any]] = []
         self._lock = FileLock(path.with_suffix(".lock"))
 
     def __enter__(self) -> "Log":
-        """Open or continue.
+        """Open the file, or continue it.
 
         Raises:
             BadConfig: another run is writing, or wrote something else, or the folder cannot be written.
@@ -56,7 +56,7 @@ class Log:
         self._lock.release()
 
     def add(self, record: dict[str, Any]) -> None:
-        """Store one; once this returns it survives a kill."""
+        """Store a record. It survives a kill as soon as this returns."""
         try:
             self._write(record)
         except OSError as error:
@@ -64,15 +64,15 @@ class Log:
         self.records.append(record)
 
     def _open(self) -> None:
-        """Read the file and make it ready for more; a line that a kill cut short is dropped."""
+        """Read the file and prepare it for more records. A line that a kill has cut short is dropped."""
         content = self.path.read_bytes() if self.path.exists() else b""
         size = content.rfind(b"\n") + 1
         try:
             whole = [json.loads(line) for line in content[:size].splitlines()]
             if not all(isinstance(record, dict) for record in whole):
-                raise ValueError("a record is no mapping")
+                raise ValueError("a record is not a mapping")
         except ValueError:
-            why = "is damaged; move it aside (do not delete it) to begin again, or choose another to="
+            why = "is damaged; move it aside (do not delete it) to start over, or choose another to="
             raise BadConfig(f"{self.path} {why}") from None
         if whole and whole[0] != self.identity:
             names = ", ".join(different(whole[0], self.identity))
@@ -91,7 +91,7 @@ class Log:
         """
         line, size = json.dumps(record).encode() + b"\n", self._file.tell()
         try:
-            while line:  # a disk that gets full takes a part of it first, and refuses the rest
+            while line:  # a disk that fills up takes a part first and refuses the rest
                 line = line[self._file.write(line) :]
         except OSError:
             self._file.truncate(size)

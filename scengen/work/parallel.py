@@ -1,4 +1,4 @@
-"""Work in several processes, each of which can be ended: results as they get ready, limits on time and memory."""
+"""Work in multiple processes with limits on time and memory; results come as they are ready."""
 
 import ctypes
 import multiprocessing
@@ -7,7 +7,7 @@ import pickle
 import resource
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -20,8 +20,8 @@ from ..errors import ScengenError
 A = TypeVar("A")
 B = TypeVar("B")
 
-PATIENCE = 1.0
-"""How long an idle worker that is told to end may take to do so before it is killed [s]."""
+EXIT_TIMEOUT = 1.0
+"""Time that an idle worker has to end by itself before it is killed [s]."""
 
 
 class WorkerDied(ScengenError):
@@ -30,26 +30,26 @@ class WorkerDied(ScengenError):
 
 @dataclass(frozen=True)
 class Limits:
-    """What one item may take."""
+    """Limits on the work on one item."""
 
     seconds: float
     """Wall-clock time [s]."""
     megabytes: int
-    """Memory beyond what a worker has when it starts [MB]."""
+    """Memory beyond that of a worker at its start [MB]."""
 
 
-SHOWN = Limits(300.0, 4000)
-"""Of one scenario of a pool that is shown, exported or recorded: it is not trusted. Seconds would do."""
+UNTRUSTED_LIMITS = Limits(300.0, 4000)
+"""Limits on showing, exporting or recording one scenario of a pool, which is not trusted. Seconds usually suffice."""
 
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
-"""Processor time that a container may take: microseconds in a period of microseconds, or `max`."""
+"""File with the processor time of a container: microseconds in a period of microseconds, or `max`."""
 
 
 def cores() -> int:
-    """How many cores this process may use: those that it is bound to, and no more than its container is given."""
+    """Number of cores that this process may use: those that it is bound to, and at most the quota of its container."""
     allowed = len(os.sched_getaffinity(0))
-    with suppress(OSError, ValueError):  # not in a container, or one of an older kind
+    with suppress(OSError, ValueError):  # not in a container, or in one with cgroups of version 1
         quota, period = QUOTA.read_text().split()
         allowed = allowed if quota == "max" else min(allowed, int(quota) // int(period))
     return max(1, allowed)
@@ -57,10 +57,10 @@ def cores() -> int:
 
 @runtime_checkable
 class Executor(Protocol):
-    """Workers that are no processes of this machine."""
+    """Workers other than processes of this machine."""
 
     status: str
-    """How many there are, and where, for whoever waits: `2 nodes, 64 workers`. Empty while nothing is done."""
+    """Number of nodes and workers for a progress bar: `2 nodes, 64 workers`. Empty while no work is done."""
 
     def each(
         self,
@@ -69,12 +69,12 @@ class Executor(Protocol):
         limits: Limits | None,
         lost: Callable[[A, str], B] | None,
     ) -> Iterator[B]:
-        """What the function `each` does."""
+        """Like the function `each`."""
         ...
 
 
 Workers = int | Executor
-"""Who works: so many processes of this machine, or an executor."""
+"""Number of processes on this machine, or an executor."""
 
 
 def each(
@@ -85,16 +85,16 @@ def each(
     lost: Callable[[A, str], B] | None = None,
     fork: bool = True,
 ) -> Iterator[B]:
-    """Apply `function` to every item; in this process if there is one worker only, and no limits are asked for.
+    """Apply `function` to every item. One worker without limits is this process.
 
-    Items are taken from the iterable only when a worker is free, so that it may depend on the results so far. Workers
-    die with this process, whatever kills it, and at once when the iteration is left early. One that has died is
-    replaced; what it worked on is tried once more, so that a process killed from outside changes no result.
+    Items are taken from the iterable only when a worker is free, so they may depend on the results so far. Workers end
+    with this process, even if it is killed, and as soon as the iteration is left early. A worker that dies is replaced,
+    and its item is tried once more: a process killed from outside changes no result.
 
     Args:
         function: can be pickled, like items and results. It is sent once to each worker: it may be large, and what it
-            keeps between items stays in its process.
-        limits: of every item. Workers are then copies of this process, which start in milliseconds (see `fork`).
+            stores between items stays in the process of the worker.
+        limits: limits on each item. Workers are then copies of this process, which start in milliseconds (see `fork`).
         lost: makes the result of an item that has crashed its worker, or has reached a limit, from the reason.
         fork: whether workers with limits are copies of this process; a process with threads must not be copied.
 
@@ -108,37 +108,24 @@ def each(
         yield from map(function, items)
         return
     method = "fork" if fork and limits is not None else "spawn"
-    todo, crew = iter(items), [_Worker(function, limits, method) for _ in range(max(1, workers))]
-    more = True
+    remaining, crew = iter(items), [_Worker(function, limits, method) for _ in range(max(1, workers))]
     try:
-        while True:
-            for worker in crew:
-                if more and not worker.busy:
-                    item = next(todo, _NOTHING)
-                    more = item is not _NOTHING
-                    if more:
-                        worker.give(item)
-            busy = [worker for worker in crew if worker.busy]
-            if not busy:
-                return
-            patience = max(0.0, min(worker.deadline for worker in busy) - time.monotonic())
-            ready = wait([worker.connection for worker in busy], None if limits is None else patience)
-            for worker in busy:
-                found = worker.answer(worker.connection in ready)
-                if isinstance(found, _Lost):
-                    yield made_of_lost(found.item, found.reason, lost)
-                elif found is not None:
-                    yield found[0]
+        while busy := _busy(crew, remaining):
+            for answer in _answers(busy, limits):
+                if isinstance(answer, _Lost):
+                    yield made_of_lost(answer.item, answer.reason, lost)
+                else:
+                    yield answer.value
     finally:
         for worker in crew:
             worker.end()
 
 
 def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
-    """What a function makes of one item, in a process of its own that is ended at a limit.
+    """Apply a function to one item, in a process of its own that is ended at a limit.
 
     Args:
-        what: is done, for the error: `filming 8ed4a4577fe0`.
+        what: description of the work, for the error: `filming 8ed4a4577fe0`.
 
     Raises:
         WorkerDied: the process has crashed, or has reached a limit.
@@ -152,7 +139,7 @@ def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
 
 
 def made_of_lost(item: A, reason: str, lost: Callable[[A, str], B] | None) -> B:
-    """The result of an item that no worker has brought to its end.
+    """The result of an item that no worker has finished.
 
     Raises:
         WorkerDied: there is no `lost` that makes one.
@@ -162,11 +149,21 @@ def made_of_lost(item: A, reason: str, lost: Callable[[A, str], B] | None) -> B:
     return lost(item, reason)
 
 
-_NOTHING: Any = object()
+_END: Any = object()
+"""Sentinel that is no item."""
+
+
+@dataclass(frozen=True)
+class _Result:
+    """The result of an item."""
+
+    value: Any
 
 
 @dataclass(frozen=True)
 class _Lost:
+    """An item without a result, and why."""
+
     item: Any
     reason: str
 
@@ -182,15 +179,18 @@ class _Worker:
         self.connection: Connection
 
     def give(self, item: Any) -> None:
-        """Let it work on an item."""
+        """Start to work on an item."""
         self._item, self._tries, self.busy = item, 0, True
         self._begin()
 
-    def answer(self, ready: bool) -> tuple[Any] | _Lost | None:
-        """Its result in a tuple, if it has one; None if it needs more time.
+    def answer(self, ready: bool) -> _Result | _Lost | None:
+        """The outcome of its item; None if it needs more time.
+
+        Args:
+            ready: whether its connection has an answer or is closed.
 
         Raises:
-            Exception: what the function has raised.
+            Exception: the exception that the function has raised.
         """
         if ready:
             try:
@@ -199,7 +199,7 @@ class _Worker:
                 return self._died()
             self.busy = False
             if kind == "result":
-                return (value,)
+                return _Result(value)
             if kind == "lost":
                 return _Lost(self._item, value)
             raise value
@@ -210,12 +210,12 @@ class _Worker:
         return _Lost(self._item, f"took longer than {self._limits.seconds:g} s")
 
     def end(self) -> None:
-        """End it, in the middle of its work if need be."""
+        """End the process, in the middle of its work if need be."""
         if self._process is None:
             return
         if not self.busy:
-            self.connection.close()  # an idle worker reads the end of its orders and leaves
-            self._process.join(PATIENCE)
+            self.connection.close()  # an idle worker reads the end of its orders and ends
+            self._process.join(EXIT_TIMEOUT)
         self._kill()
 
     def _begin(self) -> None:
@@ -223,7 +223,7 @@ class _Worker:
             self.connection, theirs = self._context.Pipe()
             arguments = (theirs, self._function, self._limits, os.getpid())
             self._process = self._context.Process(target=_serve, args=arguments, daemon=True)
-            # Inherited, as Ctrl-C and SIGTERM may go to the whole group before the worker says what it makes of them.
+            # Inherited: Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
             try:
                 self._process.start()
@@ -233,12 +233,12 @@ class _Worker:
             if self._limits:  # an item does not pay for the start of a process
                 with suppress(EOFError, OSError):
                     self.connection.recv_bytes()
-        with suppress(OSError):  # it has died: the answer tells
+        with suppress(OSError):  # it has died, which the answer shows
             self.connection.send(self._item)
         self.deadline = time.monotonic() + (self._limits.seconds if self._limits else float("inf"))
 
     def _died(self) -> _Lost | None:
-        self._process.join(PATIENCE)
+        self._process.join(EXIT_TIMEOUT)
         code = self._process.exitcode
         self._kill()
         self._tries += 1
@@ -256,9 +256,30 @@ class _Worker:
         self._process = None
 
 
+def _busy(crew: Sequence[_Worker], items: Iterator[Any]) -> list[_Worker]:
+    """Give items to idle workers.
+
+    Returns:
+        The workers with an item.
+    """
+    for worker in crew:
+        if not worker.busy and (item := next(items, _END)) is not _END:
+            worker.give(item)
+    return [worker for worker in crew if worker.busy]
+
+
+def _answers(busy: Sequence[_Worker], limits: Limits | None) -> Iterator[_Result | _Lost]:
+    """Wait until a worker answers, dies or reaches its limit of time, and take all answers."""
+    timeout = max(0.0, min(worker.deadline for worker in busy) - time.monotonic())
+    ready = wait([worker.connection for worker in busy], None if limits is None else timeout)
+    for worker in busy:
+        if (answer := worker.answer(worker.connection in ready)) is not None:
+            yield answer
+
+
 def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | None, parent: int) -> None:
-    """What a worker process does: items in, results out, until the parent closes the connection or dies."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
+    """Run a worker process: items in, results out, until the parent closes the connection or dies."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles interrupts
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -290,7 +311,7 @@ def _reply(function: Callable[[Any], Any], item: Any, limits: Limits | None) -> 
 
 
 def portable(error: Exception) -> bytes:
-    """An exception as bytes; one that does not survive the way becomes one of the same meaning that does."""
+    """A pickled exception; one that cannot be pickled becomes one with the same message that can."""
     try:
         pickle.loads(written := pickle.dumps(("error", error)))
         return written
@@ -300,13 +321,13 @@ def portable(error: Exception) -> bytes:
 
 
 _READY = b"ready"
-"""The first word of a process with limits."""
+"""First message of a process with limits."""
 _PR_SET_PDEATHSIG = 1
 """Option of prctl: the signal that a process gets when its parent dies (linux/prctl.h)."""
 
 
 def _close_all_but(kept: int) -> None:
-    """Close the files that a copied process has from its parent: its locks, its journal, the ends of other pipes."""
+    """Close the files that a copied process inherits from its parent: locks, the journal, ends of other pipes."""
     for name in os.listdir("/proc/self/fd"):
         if int(name) > 2 and int(name) != kept:
             try:

@@ -1,4 +1,4 @@
-"""Text as it may reach a terminal: what comes from a pool or a command line is shown, and never obeyed."""
+"""Text for a terminal: control characters from a pool or a command line are spelled out, never sent."""
 
 import unicodedata
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-_OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
-"""Unicode's classes of what a terminal acts upon, reorders text by, or cannot show."""
+_CONTROL = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
+"""Unicode categories of characters that a terminal acts upon, reorders text by, or cannot show."""
 
 
 def printable(text: str, lines: bool = False) -> str:
@@ -19,13 +19,13 @@ def printable(text: str, lines: bool = False) -> str:
     if text.isascii() and text.isprintable():
         return text
     return "".join(
-        c.encode("unicode_escape").decode() if unicodedata.category(c) in _OBEYED and not (lines and c == "\n") else c
+        c.encode("unicode_escape").decode() if unicodedata.category(c) in _CONTROL and not (lines and c == "\n") else c
         for c in text
     )
 
 
 class PlainConsole(Console):
-    """A console that takes every text as it is, in tables and titles too: no markup, no emoji, nothing to obey."""
+    """A console that prints all text literally, in tables and titles, too: no markup, emoji or control characters."""
 
     def __init__(self, **settings: Any):
         super().__init__(markup=False, emoji=False, highlight=False, **settings)

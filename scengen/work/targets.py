@@ -1,4 +1,4 @@
-"""Files and folders that are written: tried before the work, written whole or not at all, faults told with a remedy."""
+"""Output files and folders: tested before the work, written whole or not at all. Faults come with a remedy."""
 
 import errno
 import os
@@ -11,13 +11,13 @@ from pathlib import Path
 from ..errors import BadConfig, cut
 
 STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/null")
-"""Devices that make sense as a target."""
+"""Devices that are accepted as a target."""
 
 _REMEDY = {
     errno.ENOSPC: "make room and repeat the command",
     errno.EDQUOT: "make room and repeat the command",
-    errno.EFBIG: "files may not become so large here; raise the limit (ulimit -f) and repeat the command",
-    errno.EROFS: "it can only be read here; choose another place",
+    errno.EFBIG: "the file is too large here; raise the limit (ulimit -f) and repeat the command",
+    errno.EROFS: "the place is read-only; choose another place",
     errno.EACCES: "make it writable, or choose another place",
     errno.EPERM: "make it writable, or choose another place",
     errno.ENAMETOOLONG: "choose a shorter name",
@@ -25,8 +25,8 @@ _REMEDY = {
     errno.EEXIST: "a part of this path is a file; choose another place",
     errno.EISDIR: "it is a folder; name a file",
     errno.ENOENT: "choose another place",
-    errno.EIO: "the disk is at fault; choose another place",
-    errno.ELOOP: "its links lead in a circle; choose another place",
+    errno.EIO: "the disk has a fault; choose another place",
+    errno.ELOOP: "its links form a circle; choose another place",
     errno.EMFILE: "raise the limit of open files (ulimit -n), or use fewer workers",
     errno.ENOMEM: "use fewer workers, or ask for less at once",
     errno.EAGAIN: "use fewer workers",
@@ -34,13 +34,13 @@ _REMEDY = {
 
 
 def remedy(error: OSError) -> str:
-    """What is wrong and what helps, without the path; empty for a fault of another kind than those of disks."""
-    helps = _REMEDY.get(error.errno or 0)
-    return f"{(error.strerror or 'fault').lower()}; {helps}" if helps else ""
+    """Fault and remedy in words, without the path; empty if the fault is not one of disks."""
+    known = _REMEDY.get(error.errno or 0)
+    return f"{(error.strerror or 'fault').lower()}; {known}" if known else ""
 
 
 def refused(path: Path | str, error: OSError) -> BadConfig:
-    """That a path cannot be written."""
+    """The error for a path that cannot be written."""
     why = remedy(error) or f"{(error.strerror or str(error)).lower()}; choose another place"
     return BadConfig(f"{cut(str(path))} cannot be written: {why}")
 
@@ -51,10 +51,10 @@ def cache_folder() -> Path:
 
 
 def try_file(path: Path | str | None) -> None:
-    """Find out whether a file could be written, before work is put into what shall stand in it. Leaves nothing.
+    """Test whether a file can be written, before the work on its content. Nothing is left behind.
 
     Raises:
-        BadConfig: it cannot.
+        BadConfig: it cannot be written.
     """
     if path is None or str(path) in STREAMS:
         return
@@ -63,20 +63,20 @@ def try_file(path: Path | str | None) -> None:
         if path.is_dir():
             raise BadConfig(f"{cut(str(path))} is a folder; name a file")
         if os.path.lexists(path) and not stat.S_ISREG(os.stat(path).st_mode):
-            raise BadConfig(f"{cut(str(path))} is no plain file; name another one")
+            raise BadConfig(f"{cut(str(path))} is not a plain file; name another one")
         if path.exists():
             open(path, "r+b").close()
-        with _trial(path.parent) as folder:
+        with _trial_folder(path.parent) as folder:
             open(folder / path.name, "xb").close()
     except OSError as error:
         raise refused(path, error) from None
 
 
 def try_folder(path: Path | str | None) -> None:
-    """Find out whether files could be written into a folder, made if need be. Leaves nothing.
+    """Test whether files can be written into a folder, which need not exist. Nothing is left behind.
 
     Raises:
-        BadConfig: they cannot.
+        BadConfig: they cannot be written.
     """
     if path is None:
         return
@@ -84,14 +84,14 @@ def try_folder(path: Path | str | None) -> None:
     try:
         if os.path.lexists(path) and not path.is_dir():
             raise BadConfig(f"{cut(str(path))} is a file; name a folder")
-        with _trial(path):
+        with _trial_folder(path):
             pass
     except OSError as error:
         raise refused(path, error) from None
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file, its folder made if need be: the whole of it, or nothing.
+    """Write a whole file or nothing. Its folder is made if necessary.
 
     Raises:
         BadConfig: it cannot be written.
@@ -114,17 +114,17 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 @contextmanager
-def _trial(folder: Path) -> Iterator[Path]:
-    """A folder with a block written in it, of the same path below a new one where the first part that exists is.
+def _trial_folder(folder: Path) -> Iterator[Path]:
+    """A trial folder with the same path below a new one in the nearest folder that exists. A block is written in it.
 
-    Nothing is made, and nothing removed, that another process could be using.
+    Nothing is made or removed that another process could use.
     """
-    there = folder
-    while not os.path.lexists(there):
-        there = there.parent
-    with tempfile.TemporaryDirectory(prefix=".trial-", dir=there) as new:
-        like = Path(new, folder.relative_to(there))
-        like.mkdir(parents=True, exist_ok=True)
-        (like / "block").write_bytes(b"\0" * 4096)  # an empty file fits on a disk that is full
-        (like / "block").unlink()
-        yield like
+    nearest = folder
+    while not os.path.lexists(nearest):
+        nearest = nearest.parent
+    with tempfile.TemporaryDirectory(prefix=".trial-", dir=nearest) as new:
+        trial = Path(new, folder.relative_to(nearest))
+        trial.mkdir(parents=True, exist_ok=True)
+        (trial / "block").write_bytes(b"\0" * 4096)  # a full disk still takes an empty file
+        (trial / "block").unlink()
+        yield trial

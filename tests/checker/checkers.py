@@ -118,7 +118,7 @@ def _command(*command: str) -> Checker:
         from scengen.validate import playable
         from scengen.work.parallel import Limits
 
-        playable.SHOWN = export.SHOWN = Limits(SECONDS, MEGABYTES)
+        playable.UNTRUSTED_LIMITS = export.UNTRUSTED_LIMITS = Limits(SECONDS, MEGABYTES)
         return cli.run([command[0], f"pool={folder}", *command[1:]])
 
     return run

@@ -134,9 +134,9 @@ def test_a_damaged_journal_is_told_and_kept(finished, tmp_path, capsys, how):
     ("code", "says"),
     [
         (errno.ENOSPC, "make room"),
-        (errno.EROFS, "it can only be read here"),
+        (errno.EROFS, "the place is read-only"),
         (errno.EACCES, "make it writable"),
-        (errno.EIO, "the disk is at fault"),
+        (errno.EIO, "the disk has a fault"),
         (errno.EDQUOT, "make room"),
     ],
 )

@@ -125,7 +125,7 @@ def test_rejects_are_those_that_the_reasons_tell_of(mine):
 def test_a_scene_that_does_not_end_is_named_before_anybody_looks_at_it(monkeypatch):
     row = next(Pool.open(REFERENCE).rows())
     assert check_row(row) is row
-    monkeypatch.setattr("scengen.validate.playable.SHOWN", Limits(2.0, 4000))
+    monkeypatch.setattr("scengen.validate.playable.UNTRUSTED_LIMITS", Limits(2.0, 4000))
     endless = row.scene_xml.replace("<option ", '<option iterations="1000000000" tolerance="0" ')
     assert endless != row.scene_xml
     with pytest.raises(WorkerDied, match=f"playing {row.name} took longer than 2 s"):
