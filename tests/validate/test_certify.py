@@ -224,8 +224,8 @@ def test_jitter_turns_a_hinge_that_is_named_about_its_axle():
     turned = Jitter("k", 0.002, 1.0, 0.05, 0.1, 0.0, 0).disturbed(world, scenario.DISTURBED)
     (before, _), (angle, rate) = world.hinge(HINGE), turned.hinge(HINGE)
     assert 0 < abs(angle - before) <= math.radians(1.0) and rate == 0
-    assert turned.com(BOB) == pytest.approx(scenario.place(angle), abs=1e-6)
-    assert world.com(BOB) == pytest.approx(scenario.place(before), abs=1e-6)
+    assert turned.com(BOB) == pytest.approx(scenario.bob_at(angle), abs=1e-6)
+    assert world.com(BOB) == pytest.approx(scenario.bob_at(before), abs=1e-6)
     assert turned.model.body_mass[world.body(BOB)] != world.model.body_mass[world.body(BOB)]
     with pytest.raises(ValueError, match="is not a hinge"):
         Jitter("k", 0, 1.0, 0, 0, 0, 0).disturbed(world, ["gripper0_right_finger_joint1"])
