@@ -1,7 +1,7 @@
 """The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
 
-Cards stand in generated/axes; a repeated call continues, and cards that are finished are read again. Axes without a
-card keep the line that they have.
+Cards are stored in generated/axes. A repeated call continues, and finished cards are read again. Axes without a card
+keep their line.
 """
 
 import json
@@ -17,41 +17,44 @@ from scengen.ood.axis_card import NOT_SEARCHED
 PAGE = Path("docs/axes.md")
 HEAD = """# Every axis, measured
 
-Written by `make axes`; each line sums up one axis card (`scengen probe`), and each column says how much was tried.
+Written by `make axes`. Each line summarizes one axis card (`scengen probe`); each column states its sample size.
 
-* **outside**: least gap between axis and training over the parameters that it moves [widths of the training range];
-  **physics**: which of the features that the family declares leave training (sampled, 300 draws).
-* **certified**: of how many indices.
-* **verdict**: the strongest memory that the axis breaks. The four columns behind it say, for each memory, how many of
-  its control scenarios within training it solves, then how many OOD twins, and the excess with its 95 % interval.
-  **replay**: the actions that solve the training twin; **object-centric**: its path relative to the bodies that the
-  hand goes to, followed by feedback; **any**: one of 16 training solutions, none of them the twin's own. The control
-  is the scenario remembered, with the axis' own parameters redrawn within training; for **any**, and where training
-  knows one value only (marked *held out*), it is a training scenario that nobody remembers. Twins count that the
-  oracle solves in both arms. `weak`: it solves less than 30 % of its control, and tells nothing.
-  *solved by memory*: some memory solves most of the axis; what is new there is for the eye, if for anything. In a
-  task that asks for a choice (`domino_select`) the memory of the twin knows the answer: no axis that makes the choice
-  harder to see can break it, and whether a policy still chooses rightly is for `scengen evaluate` to say.
+* **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
+  **physics**: features declared by the family that leave training (sampled, 300 draws).
+* **certified**: number of certified scenarios, of how many indices.
+* **verdict**: the strongest memory that the axis breaks, *solved by memory*, or *inconclusive*. The four columns after
+  it show, for each memory, how many of its control scenarios within training and how many OOD twins it solves, and the
+  excess with its 95 % interval.
+  **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
+  hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control is
+  the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has one
+  value only (marked *held out*), it is a training scenario that no memory comes from. Only twins count that the oracle
+  solves in both arms. `weak`: the memory solves less than 30 % of its control, and is inconclusive.
+  *solved by memory*: some memory solves most of the axis, so that only vision can be tested there, if anything. In a
+  task with a choice (`domino_select`) the memory of the twin contains the answer: an axis that makes the choice harder
+  to see cannot break it. Use `scengen evaluate` to measure whether a policy still chooses correctly.
 * **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
-  the edge of training, 1 the far end of the axis. In brackets the 95 % interval, which assumes no curve; the point
-  before it is a guess. `> x`: not before x; where x is the end of the path, with what was solved there. `< 0`: the
-  replay fails as soon as its scene's own value is exchanged for the nearest end of training. Holes shorter than a
-  tenth of the axis, and beyond 1 shorter than half their distance from 0, are not looked for.
-* **energy**: energy distance between the features of the twins [training ranges], what chance gives, and the p value of
-  a test that exchanges twins; `equal` where the axis moves no feature.
+  the edge of training, 1 the far end of the axis. The 95 % interval in brackets assumes no curve; the point before it
+  is a guess. `> x`: not before x; if x is the end of the path, with the number of twins solved there. `< 0`: the replay
+  fails as soon as its scene's own value is exchanged for the nearest end of training. Holes shorter than a tenth of the
+  axis, and beyond 1 shorter than half their distance from 0, may be missed.
+* **energy**: energy distance between the features of the twins [training ranges], its value by chance, and the p value
+  of a test that exchanges twins; `equal` if the axis moves no feature.
 
 {titles}
 {rule}
 """
+"""Text before the table, with places for its titles and rule."""
 COLUMNS = (
     *("task", "axis", "outside", "physics", "certified", "verdict"),
     *("replay", "any replay", "object-centric", "any object-centric"),
     *("replay ends", "oracle ends", "energy"),
 )
+"""Titles of the table."""
 
 
 def main(*arguments: str) -> None:
-    """Make all cards, or those of some tasks, and write their lines."""
+    """Make all cards, or those of some tasks, and write the page."""
     settings = [argument for argument in arguments if "=" in argument]
     tasks = [argument for argument in arguments if "=" not in argument]
     failed = []
@@ -59,12 +62,17 @@ def main(*arguments: str) -> None:
         for axis in load_task(task).axes:
             if cli.run(("probe", f"task={task}", f"axis={axis}", "workers=2", *settings)):
                 failed.append(f"{task}/{axis}")
-    PAGE.write_text(HEAD.format(titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines()))
+    PAGE.write_text(page())
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
 
+def page() -> str:
+    """The whole page."""
+    return HEAD.format(titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines())
+
+
 def _lines() -> list[str]:
-    """A line for each card, in the order of the task files; where there is no card, the line that the page has."""
+    """A line for each card, in the order of the task files. An axis without a card keeps its line of the page."""
     written = PAGE.read_text().splitlines(keepends=True) if PAGE.is_file() else []
     lines = []
     for task in list_tasks():

@@ -1,7 +1,7 @@
 """Attack every task, and docs/attacks.md with a line for each. `python tools/attack_all.py 500 [task ...]`
 
-Reports stand in records/attacks, hits in generated/attack; a repeated call continues. Tasks that were never attacked have
-no line.
+Reports are stored in records/attacks, hits in generated/attack. A repeated call continues. Tasks that were never
+attacked have no line.
 """
 
 import json
@@ -13,31 +13,35 @@ from typing import Any
 from scengen import cli, list_tasks
 from scengen.attack.evidence import TierRate
 
-SCENARIOS, SEED = 10, 4242
+SCENARIOS = 10
+"""Number of scenarios of each task."""
+SEED = 4242
+"""Seed of the draws and of the attack."""
 FOLDER = Path("records/attacks")
+"""Folder of the reports."""
 PAGE = Path("docs/attacks.md")
 HEAD = f"""# Every task, attacked
 
-Written by `make attacks`: what the built-in adversary (`scengen attack`) came to on {SCENARIOS} training scenarios of
-each task, every plan both through the teleoperation filter and raw. It knows nothing of a task but its bodies, a
-witness, and what the family says is asked for.
+Written by `make attacks`: the results of the built-in adversary (`scengen attack`) on {SCENARIOS} training scenarios of
+each task, with every plan both through the teleoperation filter and raw. The adversary knows the bodies of a scene, a
+witness, and the kind of answer that the family declares; it knows nothing else of a task.
 
 * **random**: one to five random moves from the start (pick, push, place, press, turn, shake, throw, wait). **foreign**:
-  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in sequence. Each with its hits of
-  rollouts and the one-sided 95 % Clopper-Pearson bound of the rate.
-* **retries**: one move repeated while a height, a tilt, a place or a direction is swept, often from where the own
-  witness has come to. **own**: that witness with a phase dropped, repeated, mirrored, slowed or quickened, and a search
-  that goes on from its states. Whoever is given the solution may well solve the rest: these look for ways around, and
-  their rates bound nothing.
-* **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, given one after
-  the other without looking: share of fresh draws that they solve, and its bound. "-" where what is asked for is no
-  number, or where a wrong answer ends the episode.
-* **refuting**: hits that lack a contact which the oracle has in its witness and in forty varied runs: a way around the
-  task. There may be none; whoever finds one, please tell us. (The three of `ramp_sort` are its own witness played
+  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in pairs. Each column shows hits of
+  rollouts, and the one-sided 95 % Clopper-Pearson bound of the rate.
+* **retries**: one move is repeated while a height, a tilt, a place or a direction is swept, often from a state of the
+  scenario's own witness. **own**: that witness with a phase dropped, repeated, mirrored, slowed or accelerated, and a
+  search that continues from its states. Starting from the witness, partial success is expected: these two columns
+  search for ways around the task, and their rates are no bounds.
+* **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, and given one
+  after the other without looking at the scene: share of fresh draws that they solve, and its bound. "-" if the answer
+  is not a number, or if a wrong answer ends the episode.
+* **refuting**: hits without a contact that the oracle makes in its witness and in forty varied runs, which bypass the
+  task. There should be none; if you find one, please report it. (The three of `ramp_sort` are its own witness played
   faster: two balls do not meet in their bin.)
 
-The adversary is told where the bodies are, as no policy is in `mirror_pick_place`: a random pick at the right place is
-all that is asked for there, and its share says nothing of a policy that sees a mirrored picture.
+The adversary knows the positions of the bodies, which no policy knows in `mirror_pick_place`. There a random pick at
+the right place is all that the task requires, so its rate says nothing about a policy that sees a mirrored picture.
 
 | task | random | foreign | shortcuts | 1 fixed | 2 fixed | 3 fixed | retries | own | rollouts | refuting |
 |---|---|---|---|---|---|---|---|---|---|---|
@@ -45,7 +49,7 @@ all that is asked for there, and its share says nothing of a policy that sees a 
 
 
 def main(budget: str, *tasks: str) -> None:
-    """Attack all tasks, or some, and write their lines."""
+    """Attack all tasks, or some, and write the page."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     refuted = []
     for task in tasks or list_tasks():
@@ -56,13 +60,18 @@ def main(budget: str, *tasks: str) -> None:
         report = json.loads(target.read_text())
         report["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
         target.write_text(json.dumps(report, indent=1, sort_keys=True) + "\n")
-    told = [path for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
-    PAGE.write_text(HEAD + "".join(line(json.loads(path.read_text())) for path in told))
+    PAGE.write_text(page())
     sys.exit(f"refuted, or not attacked: {', '.join(refuted)}" if refuted else 0)
 
 
+def page() -> str:
+    """The whole page, from the reports."""
+    paths = [path for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
+    return HEAD + "".join(line(json.loads(path.read_text())) for path in paths)
+
+
 def line(report: Mapping[str, Any]) -> str:
-    """One task in the table."""
+    """The line of one task in the table."""
     blind, given = (("random",), ("foreign",), ("shortcut",)), (("retry",), ("witness", "search"))
     fixed = {len(prior["values"]): _share(prior) for prior in report["priors"]}
     cells = [

@@ -1,6 +1,6 @@
 """Every task under other versions of MuJoCo, and docs/drift.md. `python tools/drift_all.py 10 POOLS [task ...]`
 
-Pools lie in POOLS/<task>; one that is missing is generated there. Results stand in records/drift; tasks that were never
+Pools are in POOLS/<task>; missing ones are generated. Results are stored in records/drift. Tasks that were never
 compared have no line.
 """
 
@@ -16,43 +16,46 @@ from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.pool.manifest import MANIFEST
 
 VERSIONS = ("3.3.7", "3.4.0", "3.5.0")
+"""Compared versions of MuJoCo."""
 LEVEL = "recheck"
+"""Level of the checks."""
 FOLDER = Path("records/drift")
+"""Folder of the results."""
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
-Written by `make drift`: what `scengen drift` came to on training scenarios of every task. Each version of MuJoCo has
-an environment of its own, made by venv and pip and kept in `~/.cache/scengen`; everything else in it, Python, numpy,
-numba, robosuite's files, scengen itself, is that of the running environment. Only MuJoCo differs.
+Written by `make drift`: the results of `scengen drift` on training scenarios of every task. Each version of MuJoCo has
+an environment of its own, made by venv and pip and kept in `~/.cache/scengen`. Everything else in it (Python, numpy,
+numba, robosuite's files, scengen itself) is that of the running environment, so only MuJoCo differs.
 
-* **same bits**: the witness ends in the same bits, and every check that was made again says what the certificate
-  says.
-* **same verdict**: every check says the same; the witness ends in other bits.
-* **flipped**: a check says otherwise: `witness`, the recorded actions no longer reach the goal; `solved`, the oracle
-  does not either; or a check of the scene (`overlap`, `rest`, `idle`, ...). Which, is told in brackets.
+* **same bits**: the witness ends in the same bits, and every repeated check agrees with the certificate.
+* **same verdict**: every repeated check agrees with the certificate; the witness ends in other bits.
+* **flipped**: a check contradicts the certificate: `witness`, the recorded actions no longer reach the goal; `solved`,
+  the oracle no longer reaches it either; or a check of the scene (`overlap`, `rest`, `idle`, ...). The flipped checks
+  are given in brackets.
 
-The version that made the pools is the control: all its scenarios have the same bits, or the machine is another one.
-Level `recheck`: all checks that need no oracle; where the witness fails the oracle is asked whether the scenario can
-still be solved, so that `witness` without `solved` means that the recording alone does not survive. Such a scenario
-is certified again under the new version, with a witness of its own. A pool is `declined` by `scengen verify` under
-any MuJoCo but its own, whatever stands here: certificates speak of the version that made them.
+The version that made the pools is the control: if its scenarios do not all have the same bits, the machine is another
+one. Level `recheck` makes all checks that need no oracle. If the witness fails, the oracle is tried to find out whether
+the scenario can still be solved: `witness` without `solved` means that only the recording fails, and the scenario can
+be certified under the new version with a new witness. Whatever this page says, `scengen verify` reports a pool as
+`declined` under any MuJoCo but its own: certificates refer to the version that made them.
 
 """
 LOCK = """
 ## scengen.lock
 
-Beside every pool `scengen generate` writes `scengen.lock`: the versions of the packages that the code of its verdicts
-imports, as lines that pip takes as requirements and as constraints, and in comments Python, platform, processor and
-the hash of the code. It repeats the manifest, which counts and whose hash does not depend on it: a file that
-contradicts the manifest is refuted, one that names other packages than a verdict touches is told of and not
-recommended. Where a version here is another one, `scengen verify` says so, with the way back: `pip install --no-deps
--r POOL/scengen.lock` in an environment with scengen (`--no-deps`, as in `make setup`: robosuite asks for packages
-that nothing here uses). A run that is continued with other packages than it was begun with is refused.
+`scengen generate` writes `scengen.lock` beside every pool: the versions of the packages that the code of its verdicts
+imports, as lines that pip accepts as requirements and as constraints, and in comments Python, platform, processor and
+the hash of the code. The file repeats the manifest, which is authoritative and whose hash does not depend on the file.
+A file that contradicts the manifest is refuted; a file that lists packages which no verdict uses is reported, and its
+use is not recommended. If a version on this machine differs, `scengen verify` says so and how to restore it: `pip
+install --no-deps -r POOL/scengen.lock` in an environment with scengen (`--no-deps`, as in `make setup`: robosuite
+requires packages that scengen does not use). A run that was begun with other packages is not continued.
 """
 
 
 def main(n: str, pools: str, *tasks: str) -> None:
-    """Compare all tasks, or some, and write their lines."""
+    """Compare all tasks, or some, and write the page."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     missing = [task for task in tasks or list_tasks() if not compared(task, n, Path(pools, task))]
     told = [json.loads(path.read_text()) for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
@@ -61,7 +64,11 @@ def main(n: str, pools: str, *tasks: str) -> None:
 
 
 def compared(task: str, n: str, pool: Path) -> bool:
-    """Compare one task, and keep what the page needs; whether that came to an end."""
+    """Compare one task, and store the part of the result that the page needs.
+
+    Returns:
+        Whether there is a result.
+    """
     if not (pool / MANIFEST).is_file():
         cli.run(("generate", f"task={task}", f"n={n}", f"pool={pool}"))
     with TemporaryDirectory() as folder:
@@ -76,7 +83,7 @@ def compared(task: str, n: str, pool: Path) -> bool:
 
 
 def shortened(result: dict[str, Any]) -> dict[str, Any]:
-    """A result without the checks that say what the certificate says, and without the place of the pool."""
+    """A result without the checks that agree with the certificate, and without the folder of the pool."""
     for one in result["scenarios"]:
         del one["pool"]
         for judgement in one["mujoco"].values():
@@ -100,8 +107,8 @@ def page(told: list[dict[str, Any]]) -> str:
     if any(each[FLIPPED] for each in every.values()):
         lines += [
             "\n## What flipped, with its margins\n",
-            "The last column is the certificate's: how many jittered runs of the oracle succeeded, when the witness",
-            "reached the goal, and whether it had survived other numerics under MuJoCo's own version.\n",
+            "The last column shows the margins of the certificate: successful jittered runs of the oracle, the time at",
+            "which the witness reached the goal, and other numerics under which the witness failed.\n",
             "| MuJoCo | scenario | check | now | the certificate |",
             "|---|---|---|---|---|",
             *(f"| {' | '.join(each)} |" for one in told for each in flips(one)),
@@ -114,7 +121,7 @@ def _row(task: str, count: int, told: list[str]) -> str:
 
 
 def _bound(told: dict[str, Any]) -> float:
-    """One-sided 95 % Clopper-Pearson bound of the share that flips, among those of which something can be said."""
+    """One-sided 95 % Clopper-Pearson bound of the share of flipped scenarios, among those with a known outcome."""
     return TierRate("", False, sum(told[name] for name in OUTCOMES if name != UNKNOWN), told[FLIPPED]).bound
 
 

@@ -1,12 +1,12 @@
-"""How good the adversary is: `python tools/mutation_score.py [budget] [task ...]`.
+"""Mutation score of the adversary: `python tools/mutation_score.py [budget] [task ...]`.
 
-Every mutant of tests/attack/mutants.py is attacked until something succeeds that the sound family refuses. Beside it:
-which written cheats exploit the mutant, hits of random macros alone with as many rollouts, and how many varied runs of
-the oracle would be taken for a way around the task. Results stand in generated/mutation_score.jsonl; a repeated call
-continues there.
+Every mutant of tests/attack/mutants.py is attacked until an attempt succeeds that the sound family refuses. For
+comparison: the written cheats that exploit the mutant, the hits of random macros with the same number of rollouts, and
+the number of varied runs of the oracle that would be taken for a way around the task. Results are stored in
+generated/mutation_score.jsonl, and a repeated call continues there.
 
 `python tools/mutation_score.py hits [budget] [task ...]` counts, for each mutant that a written cheat exploits, all
-successes that the sound family refuses: those of the adversary beside those of random macros with as many rollouts.
+successes that the sound family refuses, of the adversary and of random macros with the same number of rollouts.
 """
 
 import json
@@ -32,22 +32,24 @@ from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
-PAGE = Path("generated/mutation_score.jsonl")
+RESULTS = Path("generated/mutation_score.jsonl")
+"""File of the results."""
 SCENARIOS = 3
-IDLE = 3
-"""Mutants that no written cheat exploits get this share of the rollouts."""
-VARIED = 40
-"""Varied runs of the oracle for each task ..."""
-WIDER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=0.04)
-"""... under half as much jitter again as a certificate has."""
+"""Number of scenarios for each mutant."""
+UNEXPLOITED_DIVISOR = 3
+"""Divisor of the number of rollouts for mutants that no written cheat exploits."""
+VARIED_RUNS = 40
+"""Number of varied runs of the oracle for each task."""
+WIDER_JITTER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=0.04)
+"""Jitter of these runs: 1.5 times that of a certificate."""
 
 
 def main(budget: str = "300", *tasks: str) -> None:
     """Score all mutants, or those of some tasks, and print the score."""
-    PAGE.parent.mkdir(exist_ok=True)
-    records = [json.loads(line) for line in PAGE.read_text().splitlines()] if PAGE.is_file() else []
+    RESULTS.parent.mkdir(exist_ok=True)
+    records = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
     done = {(record["task"], record["mutant"]) for record in records}
-    with open(PAGE, "a") as page:
+    with open(RESULTS, "a") as page:
         for mutant in mutants():
             if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
                 continue
@@ -81,7 +83,7 @@ def compare(budget: str = "60", *tasks: str) -> None:
 
 
 def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> int:
-    """Successes that the sound family refuses, in so many rollouts."""
+    """Number of successes that the sound family refuses, in `budget` rollouts."""
     priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     hits = 0
     for number, subject in enumerate(subjects):
@@ -93,14 +95,14 @@ def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Seq
 
 
 def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
-    """What became of one mutant."""
+    """The result of one mutant."""
     start = time.process_time()
     if mutant.narrow:
         return guessed(mutant)
     with mutant.weakened():
         subjects = mutant.subjects(SCENARIOS)
         cheats = exploits(mutant, subjects[:2])
-        used, found = hunted(mutant, subjects, budget if cheats else budget // IDLE, TIERS)
+        used, found = hunted(mutant, subjects, budget if cheats else budget // UNEXPLOITED_DIVISOR, TIERS)
         plain = found
         if found and found.tier == "shortcut":
             _, plain = hunted(mutant, subjects, budget, [tier for tier in TIERS if tier != "shortcut"])
@@ -119,7 +121,7 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
 
 
 def guessed(mutant: Mutant) -> dict[str, Any]:
-    """What became of a task whose ranges are too narrow: fixed answers, by statics and in rollouts."""
+    """The result of a task whose ranges are too narrow: fixed answers, by statics and in rollouts."""
     start = time.process_time()
     priors = fitted(mutant.asked, AttackSettings())
     above = [p for p in priors if p.fresh is not None and p.fresh > BARS.get(len(p.values), 1.0)]
@@ -160,7 +162,11 @@ def exploits(mutant: Mutant, subjects: Sequence[Subject]) -> list[str]:
 
 
 def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> tuple[int, Hit | None]:
-    """Attack until a hit that the sound family refuses: how many rollouts that took, and the hit."""
+    """Attack until a hit that the sound family refuses.
+
+    Returns:
+        The number of rollouts, and the hit; None if there was none.
+    """
     used = 0
     priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     for number, subject in enumerate(subjects):
@@ -179,14 +185,14 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
 
 
 def flagged(task: str) -> dict[str, Any]:
-    """How many varied runs of the oracle lack a contact that is taken for causal, and which."""
+    """The number of varied runs of the oracle that lack a contact which counts as causal, and these contacts."""
     runs, taken, lacking = 0, 0, set()
     subjects = drawn(load_task(task), "id", 4, 7)
     for subject in subjects:
         player = player_of(subject)
         causal = CausalContacts(player)
-        for k in range(VARIED // len(subjects)):
-            jitter = Jitter.within(WIDER, f"varied/{subject.scenario.id}", k)
+        for k in range(VARIED_RUNS // len(subjects)):
+            jitter = Jitter.within(WIDER_JITTER, f"varied/{subject.scenario.id}", k)
             world = jitter.disturbed(player.world, player.scenario.DISTURBED)
             rollout = run(subject.scenario, world, subject.scenario.oracle, subject.horizon, SETTLE_TIME, jitter)
             if rollout.solved:

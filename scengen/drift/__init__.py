@@ -1,1 +1,1 @@
-"""A pool under several versions of MuJoCo: environments that differ in nothing else, and what becomes of verdicts."""
+"""Comparison of a pool's verdicts under several versions of MuJoCo, in environments that differ in nothing else."""

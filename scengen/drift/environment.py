@@ -1,7 +1,7 @@
-"""Environments that differ from the running one in MuJoCo alone: made by venv and pip, kept for the next time.
+"""Environments that differ from the running one in MuJoCo alone: made by venv and pip, and kept.
 
-Of its own an environment has pip and MuJoCo. Everything else, scengen, numpy, numba, tasks of other packages, is that
-of the running environment, through a .pth file: what is compared is one and the same code under another MuJoCo.
+An environment has pip and MuJoCo of its own. Everything else (scengen, numpy, numba, tasks of other packages) is that
+of the running environment, through a .pth file. So the same code is compared under another MuJoCo.
 """
 
 import hashlib
@@ -25,11 +25,13 @@ from ..errors import BadConfig, ScengenError, cut, nearest
 from ..work.targets import cache_folder, refused
 
 READY = "ready"
-"""The file that is written last: without it an environment is unfinished and made again."""
+"""Name of the file that is written last. An environment without it is unfinished and is made again."""
 SHARED = "scengen_shared.pth"
+"""Name of the .pth file that leads to the running environment."""
 VERSION = re.compile(r"\d+\.\d+\.\d+[\w.]*", re.ASCII)
-NEWEST = 12
-"""How many of the versions that there are, the newest, an error lists."""
+"""Pattern of a whole version."""
+LISTED_VERSIONS = 12
+"""Number of available versions, the newest ones, that an error lists."""
 
 
 @dataclass(frozen=True)
@@ -37,25 +39,27 @@ class Environment:
     """A Python that imports another MuJoCo."""
 
     mujoco: str
+    """Version of MuJoCo."""
     folder: Path
 
     @property
     def python(self) -> Path:
+        """Path of the interpreter."""
         return self.folder / "bin" / "python"
 
     def lines(self, module: str, request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-        """Run a module of scengen there, and read what it writes: objects in JSON, one a line.
+        """Run a module of scengen in the environment, and read its output: objects in JSON, one per line.
 
         Args:
-            request: what it reads from its standard input, as JSON.
+            request: the module's standard input, as JSON.
 
         Raises:
-            ScengenError: it does not end well; its last line on standard error says why.
+            ScengenError: the module fails; the error is that on the module's standard error.
         """
         numba = str(self.folder / "numba")  # code compiled against another MuJoCo has the same name in the cache
         with tempfile.TemporaryFile("w+", errors="replace") as errors:
             with subprocess.Popen(
-                [self.python, "-P", "-m", module],  # -P: the folder in which the command was given is no place of code
+                [self.python, "-P", "-m", module],  # -P: do not import code from the working folder
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -68,7 +72,7 @@ class Environment:
                     process.stdin.close()
                     for line in process.stdout:
                         yield json.loads(line)
-                except BaseException:  # whoever reads has had enough, or was interrupted
+                except BaseException:  # the reader stopped, or was interrupted
                     process.kill()
                     raise
             if process.returncode:
@@ -78,20 +82,20 @@ class Environment:
 
 
 def _last_word(said: str) -> str:
-    """What a program that failed has said in the end: its error, if that has several lines the first of them."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["it ended without a word"]
+    """The error of a failed program: the last line of its output that names an exception, or else its last line."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["it ended without a message"]
     named = [line for line in lines if re.match(r"[\w.]+(Error|Exception): ", line)]
     return (named or lines)[-1]
 
 
 def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
-    """The environment with that version of MuJoCo, made unless there is one.
+    """The environment with a version of MuJoCo. It is made if it does not exist.
 
     Args:
-        told: is given a line when something is made, which takes seconds and the package index.
+        told: called with a line if the environment is made, which takes seconds and needs the package index.
 
     Raises:
-        BadConfig: there is no such version, or no place to keep it.
+        BadConfig: there is no such version, or the environment cannot be written.
     """
     if not VERSION.fullmatch(mujoco):
         raise BadConfig(f"mujoco = {cut(mujoco)}; give whole versions, as in mujoco=[3.4.0,3.5.0]")
@@ -114,10 +118,10 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
 
 
 def _shared() -> str:
-    """The .pth file through which an environment finds the code and the packages of the running one.
+    """Content of the .pth file through which an environment finds the code and packages of the running one.
 
-    The folder of this scengen stands first: another one may be installed. `addsitedir` follows the .pth files of those
-    folders in turn, through which editable packages are found.
+    The folder of this scengen comes first because another one may be installed. `addsitedir` follows the .pth files of
+    the folders in turn, so that editable packages are found.
     """
     scengen = Path(__file__).resolve().parents[2]
     packages = [path for path in dict.fromkeys(sys.path) if Path(path).name in ("site-packages", "dist-packages")]
@@ -138,11 +142,11 @@ def _make(folder: Path, mujoco: str, shared: str) -> None:
 
 
 def _why_not(mujoco: str, said: str) -> str:
-    """Why pip has not installed a version, in a line."""
+    """Reason why pip did not install a version, in a line."""
     listed = re.search(r"\(from versions: ([^)]*)\)", said)
     known = listed[1].split(", ") if listed and listed[1] != "none" else []
     if known:
-        newest = ", ".join(known[-NEWEST:])
+        newest = ", ".join(known[-LISTED_VERSIONS:])
         return f"there is no mujoco {mujoco} for this Python{nearest(mujoco, known)}; the newest are {newest}"
     lines = [line for line in said.splitlines() if line.startswith("ERROR")] or [" ".join(said.split())]
-    return f"pip cannot install mujoco {mujoco}: {cut(lines[0], 300)}; see whether pip install mujoco works"
+    return f"pip cannot install mujoco {mujoco}: {cut(lines[0], 300)}; check whether pip install mujoco works"

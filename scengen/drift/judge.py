@@ -1,7 +1,7 @@
-"""What the checks of a pool say under the MuJoCo of this process, whichever made it: run in each environment.
+"""The checks of a pool under the MuJoCo of this process, whichever version made the pool. It runs in each environment.
 
-Verification declines a pool that another MuJoCo has made: its claims are about that one. Here the question is another
-one, how much of a verdict depends on the version, and every check is made although one before it has failed.
+Verification declines a pool that another MuJoCo has made, because its claims are about that version. This module
+measures how much of a verdict depends on the version, so every check is made even if an earlier one failed.
 """
 
 import json
@@ -33,7 +33,7 @@ from ..validate.stored import settings_of_manifest, task_of_manifest
 from ..work.parallel import Limits, each
 
 ORACLES = ("shortcuts", "solved", "robust")
-"""Checks that ask tempting plans and the oracle, and not the witness."""
+"""Checks of the shortcuts and the oracle, which do not use the witness."""
 
 
 @dataclass(frozen=True)
@@ -42,41 +42,44 @@ class RepeatedCheck:
 
     name: str
     passed: bool | None
-    """None: not made, or nothing to check."""
+    """Whether the check passed; None if it was not made, or if there was nothing to check."""
     reason: str
+    """Reason why the check failed."""
     settings: Mapping[str, Any]
     numbers: Mapping[str, Any]
+    """Measured numbers."""
     stored: Mapping[str, Any]
-    """Its numbers in the certificate."""
+    """Numbers of the check in the certificate."""
     flipped: bool
-    """It was made, and does not say what the certificate says."""
+    """Whether the check was made and contradicts the certificate."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What has become of one scenario."""
+    """The results of one scenario."""
 
     id: str
     name: str
     final_state: str
-    """Hash of the physics state in which the witness ends; empty if it was not replayed."""
+    """Hash of the physics state at the end of the witness; empty if the witness was not replayed."""
     same_bits: bool
-    """The witness ends in the state that the certificate tells of."""
+    """Whether the witness ends in the state that the certificate states."""
     scene: str
-    """In what the scene that the family builds differs from that of the pool by more than rounding."""
+    """Difference between the scene that the family builds and that of the pool, beyond rounding; empty if none."""
     checks: tuple[RepeatedCheck, ...] = ()
+    """Checks in the order in which they were made."""
     unknown: str = ""
-    """Why nothing can be said: a limit was reached, a process died, or the row is none."""
+    """Reason why the result is unknown: a limit was reached, a process died, or the row is invalid."""
 
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges rows of one pool."""
+    """Judges the rows of one pool."""
 
     task: Task
     settings: CertifySettings
     level: str
-    """One of `validate.recheck.LEVELS`."""
+    """Level of the checks, one of `validate.recheck.LEVELS`."""
 
     def __call__(self, row: PoolRow) -> Judgement:
         try:
@@ -93,7 +96,7 @@ class Judge:
         found: list[Check] = []
         made = {"replay": ("compiles",), "recheck": BEFORE_WITNESS, "full": (*BEFORE_WITNESS, *ORACLES)}
         for name in made[self.level]:
-            found.append(_made(trial, name))
+            found.append(_checked(trial, name))
             if name == "compiles" and not found[-1].passed:
                 return Judgement(row.id, str(row.name), "", False, "", _compared(found, stored))
         scene = difference(row.scene_xml, trial.text, exact=False)
@@ -102,11 +105,11 @@ class Judge:
         found.append(Check("witness", witness.solved, witness.reason, {"horizon": row.horizon}, numbers))
         if witness.solved:
             trial.solution = witness
-            found += [_made(trial, name) for name in WITH_WITNESS if self.level != "replay"]
+            found += [_checked(trial, name) for name in WITH_WITNESS if self.level != "replay"]
         elif self.level != "full":
-            found.append(_made(trial, "solved"))  # whether it was the recording alone that does not survive
+            found.append(_checked(trial, "solved"))  # the oracle shows whether only the recording fails
         if self.level == "full" and self.settings.attack and trial.solution is not None:
-            found.append(_made(trial, "attack"))
+            found.append(_checked(trial, "attack"))
         same = witness.digest == row.certificate.final_state
         return Judgement(row.id, str(row.name), witness.digest, same, scene, _compared(found, stored))
 
@@ -115,9 +118,10 @@ def judge(folder: str, search: Sequence[str], level: str, first: int | None, wor
     """Judge the scenarios of a pool, in any order.
 
     Args:
-        folder: of the pool.
+        folder: folder of the pool.
         search: overrides that add folders of other packages, see `task_files.search_path`.
-        first: how many scenarios, from the first; None for all.
+        level: level of the checks, one of `validate.recheck.LEVELS`.
+        first: number of scenarios, from the first; None for all.
 
     Raises:
         ScengenError: the pool is damaged, or its task is unknown here.
@@ -129,11 +133,12 @@ def judge(folder: str, search: Sequence[str], level: str, first: int | None, wor
 
 
 def lost(row: PoolRow, reason: str) -> Judgement:
-    """What is said of a scenario of which nothing can be."""
+    """The judgement of a scenario with an unknown result."""
     return Judgement(row.id, str(row.name), "", False, "", unknown=reason)
 
 
-def _made(trial: Trial, name: str) -> Check:
+def _checked(trial: Trial, name: str) -> Check:
+    """A check of a trial; not made if it needs an oracle and the machine has none."""
     try:
         return trial.check(name)
     except NoOracle:
@@ -141,26 +146,27 @@ def _made(trial: Trial, name: str) -> Check:
 
 
 def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[RepeatedCheck, ...]:
-    told = []
+    """The checks, each beside its entry in the certificate."""
+    repeated = []
     for check in found:
         before = stored[check.name]
         flipped = check.passed is not None and check.passed != before.passed
-        told.append(
+        repeated.append(
             RepeatedCheck(
                 check.name, check.passed, check.reason, check.settings, check.numbers, before.numbers, flipped
             )
         )
-    return tuple(told)
+    return tuple(repeated)
 
 
 def main() -> int:
     """Read a request, judge its pools, and write a line for every scenario; see `scengen.commands.drift`."""
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # nothing that a task prints may come between them
+    os.dup2(2, 1)  # so that output of a task does not mix with the answers
     native.silence()
 
-    def answer(told: Mapping[str, Any]) -> None:
-        answers.write(json.dumps(told) + "\n")
+    def answer(content: Mapping[str, Any]) -> None:
+        answers.write(json.dumps(content) + "\n")
         answers.flush()
 
     request = json.load(sys.stdin)

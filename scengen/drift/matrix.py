@@ -1,4 +1,4 @@
-"""The drift matrix: for every version of MuJoCo, task and check how much of a pool's verdicts is left."""
+"""The drift matrix: the change of a pool's verdicts, by version of MuJoCo, task and check."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,15 +10,20 @@ from rich.table import Table
 from ..pool import Pool
 from ..samplers.task import leaves
 
-SAME_BITS, SAME_VERDICT, FLIPPED, UNKNOWN = "same bits", "same verdict", "flipped", "unknown"
+SAME_BITS = "same bits"
+"""Outcome: every repeated check agrees with the certificate, and the witness ends in the same bits."""
+SAME_VERDICT = "same verdict"
+"""Outcome: every repeated check agrees with the certificate, but the witness ends in other bits."""
+FLIPPED = "flipped"
+"""Outcome: a check contradicts the certificate."""
+UNKNOWN = "unknown"
+"""Outcome: no result, which is not counted against the version."""
 OUTCOMES = (SAME_BITS, SAME_VERDICT, FLIPPED, UNKNOWN)
-"""Of one scenario under one version. Same bits: every check that is made again says what the certificate says, and the
-witness ends in the same bits. Same verdict: so do the checks, but the bits are others. Flipped: a check says otherwise.
-Unknown: nothing can be said, which stands against nothing."""
+"""Outcomes of one scenario under one version."""
 
 
 def outcome(judgement: Mapping[str, Any]) -> str:
-    """One of `OUTCOMES`.
+    """The outcome of a judgement, one of `OUTCOMES`.
 
     Args:
         judgement: a `judge.Judgement` as plain data.
@@ -31,18 +36,18 @@ def outcome(judgement: Mapping[str, Any]) -> str:
 
 
 def flipped(judgement: Mapping[str, Any]) -> list[str]:
-    """The checks that do not say what the certificate says, in the order in which they were made."""
+    """The checks that contradict the certificate, in the order in which they were made."""
     return [check["name"] for check in judgement["checks"] if check["flipped"]]
 
 
 def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level: str, n: int | None) -> dict[str, Any]:
-    """The result of a comparison as plain data: what `json=` writes.
+    """The result of a comparison as plain data, as `json=` writes it.
 
     Args:
-        pools: what was judged, in the order of the result.
-        found: by version `fingerprint`, and `judged`: by folder the judgements.
-        level: how much was simulated, see `validate.recheck.LEVELS`.
-        n: how many scenarios of each pool; None for all.
+        pools: judged pools, in the order of the result.
+        found: by version, the `fingerprint` and the judgements (`judged`) by folder.
+        level: level of the checks, see `validate.recheck.LEVELS`.
+        n: number of scenarios of each pool; None for all.
     """
     scenarios = []
     for pool in pools:
@@ -73,12 +78,12 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
 
 
 def _entry(judgement: Mapping[str, Any]) -> dict[str, Any]:
-    """A judgement with its outcome, without what the scenario's own entry says."""
+    """A judgement with its outcome, without id and name, which the scenario's own entry states."""
     return {"outcome": outcome(judgement), **{k: v for k, v in judgement.items() if k not in ("id", "name")}}
 
 
 def _certified(certificate: Any, horizon: float) -> dict[str, Any]:
-    """By how much a certificate held: what stands beside a check that has flipped."""
+    """The margins of a certificate, which are reported beside a flipped check."""
     numbers = {check.name: dict(check.numbers) for check in certificate.checks}
     robust = {name: numbers["robust"].get(name) for name in ("solved", "runs")}
     seconds = numbers["witness"].get("seconds")
@@ -86,7 +91,7 @@ def _certified(certificate: Any, horizon: float) -> dict[str, Any]:
 
 
 def _by_task(scenarios: Sequence[Mapping[str, Any]], versions: Sequence[str]) -> dict[str, Any]:
-    """Numbers of scenarios by task, version and outcome, and how often each check has flipped."""
+    """Numbers of scenarios by task, version and outcome, and numbers of flips by check."""
     found: dict[str, Any] = {}
     for one in scenarios:
         row = found.setdefault(
@@ -99,21 +104,21 @@ def _by_task(scenarios: Sequence[Mapping[str, Any]], versions: Sequence[str]) ->
 
 
 def total(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What stands for several tasks under one version."""
+    """The sum of several tasks under one version."""
     checks = sum((Counter(row["checks"]) for row in rows), Counter[str]())
     return {**{name: sum(row[name] for row in rows) for name in OUTCOMES}, "checks": checks}
 
 
 def under(result: Mapping[str, Any], version: str) -> dict[str, Any]:
-    """What stands for all tasks of a result under one version."""
+    """The sum of all tasks of a result under one version."""
     return total([row[version] for row in result["tasks"].values()])
 
 
 def cell(told: Mapping[str, Any]) -> str:
-    """One entry of the matrix: `9 / 1 / 0` scenarios of the first three outcomes, the checks that flipped, the unknown.
+    """One entry of the matrix: numbers of scenarios by outcome (`9 / 1 / 0`), flipped checks, unknown scenarios.
 
     Args:
-        told: of a task, or `total`.
+        told: counts of a task, or `total`.
     """
     checks = ", ".join(f"{name} {times}" for name, times in told["checks"].items())
     numbers = " / ".join(str(told[name]) for name in OUTCOMES[:3])
@@ -121,23 +126,23 @@ def cell(told: Mapping[str, Any]) -> str:
 
 
 def flips(result: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str, str]]:
-    """Every check that has flipped, with its margins.
+    """Every flipped check, with its margins.
 
     Yields:
-        Version, scenario, check; the check's numbers in the certificate and now; by how much the certificate held.
+        Version, scenario, check; the check's numbers in the certificate and now; the margins of the certificate.
     """
     for one in result["scenarios"]:
         for version, judgement in one["mujoco"].items():
             for check in judgement["checks"]:
                 if check["flipped"]:
-                    yield version, one["name"], check["name"], margin(check), spared(one["certificate"])
+                    yield version, one["name"], check["name"], change(check), margins(one["certificate"])
 
 
-def margin(check: Mapping[str, Any]) -> str:
-    """What a check measured in the certificate and measures now, with its bars, and why it says otherwise.
+def change(check: Mapping[str, Any]) -> str:
+    """The numbers of a check in the certificate and now, with its bars, and the reason why it flipped.
 
     Args:
-        check: a `judge.RepeatedCheck` as plain data.
+        check: a `judge.RepeatedCheck`, as plain data.
     """
     before, now = dict(leaves(check["stored"])), dict(leaves(check["numbers"]))
     names = [name for name in now if name in before and before[name] != now[name] and _number(now[name])]
@@ -146,8 +151,8 @@ def margin(check: Mapping[str, Any]) -> str:
     return "; ".join([check["reason"] or "passes", *moved, *bars])
 
 
-def spared(certificate: Mapping[str, Any]) -> str:
-    """By how much a certificate held, in words."""
+def margins(certificate: Mapping[str, Any]) -> str:
+    """The margins of a certificate, in words."""
     robust, numerics = certificate["robust"], certificate["numerics"]
     told = [f"{robust['solved']} of {robust['runs']} jittered runs", _time(certificate)]
     fell = [name.replace("_", " ") for name, kept in numerics.items() if kept.get("witness") != "success"]
@@ -167,22 +172,22 @@ def _short(value: Any) -> str:
 
 
 def remarks(result: Mapping[str, Any]) -> Iterator[str]:
-    """What has to be known to read the matrix: which version is the control, and what it shows."""
+    """Notes to the matrix: the version that is the control, and differences that are not due to MuJoCo."""
     made: dict[str, set[str]] = {}
     for pool in result["pools"].values():
         made.setdefault(pool["versions"]["mujoco"], set()).add(pool["fingerprint"])
     for version, fingerprints in sorted(made.items()):
         if version not in result["mujoco"]:
-            yield f"made with mujoco {version}, which is not among the versions: name it too, as the control"
+            yield f"made with mujoco {version}, which is not among the versions: add it, as the control"
         elif fingerprints != {result["mujoco"][version]["fingerprint"]}:
-            yield f"made with mujoco {version} on a machine that rounds otherwise: bits differ for that reason too"
+            yield f"made with mujoco {version} on a machine that rounds differently: bits differ for that reason too"
     scenes = Counter(version for one in result["scenarios"] for version, told in one["mujoco"].items() if told["scene"])
     for version, times in scenes.items():
-        yield f"under mujoco {version} {times} scenes are built otherwise, by more than rounding"
+        yield f"under mujoco {version} {times} scenes are built differently, by more than rounding"
 
 
 def tables(result: Mapping[str, Any]) -> list[Table]:
-    """The matrix, and the checks that have flipped with their margins, if there are any."""
+    """The matrix, and the flipped checks with their margins, if there are any."""
     told = f"{' / '.join(OUTCOMES[:3])} under each MuJoCo, level {result['level']}"
     found = Table("task", *result["mujoco"], title=told, title_justify="left")
     for task, row in result["tasks"].items():
@@ -190,7 +195,9 @@ def tables(result: Mapping[str, Any]) -> list[Table]:
     if len(result["tasks"]) > 1:
         found.add_section()
         found.add_row("all", *(cell(under(result, version)) for version in result["mujoco"]))
-    margins = Table("mujoco", "scenario", "check", "now", "the certificate", title="flipped", title_justify="left")
+    flipped_checks = Table(
+        "mujoco", "scenario", "check", "now", "the certificate", title="flipped", title_justify="left"
+    )
     for line in flips(result):
-        margins.add_row(*line)
-    return [found, margins] if margins.row_count else [found]
+        flipped_checks.add_row(*line)
+    return [found, flipped_checks] if flipped_checks.row_count else [found]

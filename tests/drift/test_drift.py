@@ -104,7 +104,7 @@ def test_the_control_is_named_where_it_is_missing(made, same, changed, result):
     assert f"made with mujoco {HERE}" in told and "control" in told
     elsewhere = matrix([made], {HERE: {"fingerprint": "other", "judged": {str(made.folder): same}}}, "recheck", None)
     (told,) = remarks(elsewhere)
-    assert "rounds otherwise" in told
+    assert "rounds differently" in told
 
 
 def test_a_row_that_is_none_is_unknown_and_no_flip(made):

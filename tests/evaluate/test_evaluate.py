@@ -144,7 +144,7 @@ def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkey
         (("policy=idle", "seeds=7"), "holds 6 scenarios; say seeds=6"),
         (("policy=idle", "rollouts=0"), "rollouts = 0; it must be at least 1"),
         (("policy=idle", "action_repeat=0"), "action_repeat = 0; it must be a whole number of control periods"),
-        (("policy=oracle", "action_repeat=4"), "action_repeat = 4; oracle acts at 100 Hz: leave it out"),
+        (("policy=oracle", "action_repeat=4"), "action_repeat = 4; policy oracle acts at 100 Hz: leave it out"),
         (("policy=idle", "observations=[rgb_cam]"), "no observation named 'rgb_cam'"),
     ],
 )
