@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin
 
 from .errors import BadConfig, UnknownName, cut
 
@@ -50,7 +51,7 @@ def _default(field: Field[Any]) -> Any:
 
 def _options(kind: Any) -> tuple[Any, ...]:
     """The types of a union, or the type itself."""
-    return kind.__args__ if hasattr(kind, "__args__") and not hasattr(kind, "__origin__") else (kind,)
+    return get_args(kind) if get_origin(kind) is UnionType else (kind,)
 
 
 def _value(where: str, kind: Any, value: Any, exact: bool) -> Any:
@@ -63,26 +64,40 @@ def _value(where: str, kind: Any, value: Any, exact: bool) -> Any:
     if str in options and isinstance(value, (int, float)) and not isinstance(value, bool) and not exact:
         return str(value)
     for option in options:
-        plain = getattr(option, "__origin__", option)
-        if is_dataclass(option) and isinstance(value, Mapping):
-            return typed(where, option, value, exact)  # type: ignore[arg-type]
-        if plain is tuple and isinstance(value, (list, tuple)):
-            return tuple(_value(f"{where}[{i}]", option.__args__[0], each, exact) for i, each in enumerate(value))
-        if isinstance(value, plain) and not (isinstance(value, bool) and plain is not bool):
-            if plain is list:
-                return [_value(f"{where}[{i}]", option.__args__[0], each, exact) for i, each in enumerate(value)]
-            if plain is Mapping:
-                of = option.__args__[1]
-                return value if of is Any else {k: _value(f"{where}.{k}", of, v, exact) for k, v in value.items()}
-            if plain is not str or "\0" not in value:
-                return value
+        if _fits(option, value):
+            return _converted(where, option, value, exact)
     wanted = " or ".join(_spelled(option) for option in options if option is not type(None))
     raise BadConfig(f"{cut(where)} = {cut(repr(value))}; it must be {wanted}")
+
+
+def _fits(option: Any, value: Any) -> bool:
+    """Whether a value can become one of a type, as far as its outermost level shows."""
+    plain = get_origin(option) or option
+    if option is type(None):
+        return False
+    if is_dataclass(option):
+        return isinstance(value, (Mapping, plain))
+    if plain is tuple:
+        return isinstance(value, (list, tuple))
+    if plain is str:
+        return isinstance(value, str) and "\0" not in value
+    return isinstance(value, plain) and not (isinstance(value, bool) and plain is not bool)
+
+
+def _converted(where: str, option: Any, value: Any, exact: bool) -> Any:
+    """A value that fits a type, with everything in it."""
+    plain, inner = get_origin(option) or option, get_args(option)
+    if is_dataclass(option):
+        return typed(where, option, value, exact) if isinstance(value, Mapping) else value  # type: ignore[arg-type]
+    if plain in (list, tuple):
+        return plain(_value(f"{where}[{i}]", inner[0], each, exact) for i, each in enumerate(value))
+    if plain is Mapping and inner[1] is not Any:
+        return {key: _value(f"{where}.{key}", inner[1], each, exact) for key, each in value.items()}
+    return value
 
 
 def _spelled(option: Any) -> str:
     if is_dataclass(option):
         return "a group of settings"
-    plain = getattr(option, "__origin__", option)
-    inner = getattr(option, "__args__", None) or (str,)
-    return _SPELLED.get(plain, "a list of words" if inner[0] is str else "a list")
+    inner = get_args(option) or (str,)
+    return _SPELLED.get(get_origin(option) or option, "a list of words" if inner[0] is str else "a list")

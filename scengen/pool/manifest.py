@@ -137,7 +137,10 @@ class Manifest:
         except (ScengenError, ValueError, KeyError, TypeError, OSError) as error:
             why = " ".join(str(error).split())[:160]
             raise PoolError(f"{path} is damaged; restore it or generate the pool again ({why})") from None
-        raise PoolError(f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}; {_REMEDY}")
+        newer = isinstance(version, int) and version > FORMAT
+        remedy = "install a newer scengen" if newer else "generate it again with the command and seed that made it"
+        told = f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}"
+        raise PoolError(f"{told}; {remedy} (docs/pools.md, Formats)")
 
     def plain(self) -> dict[str, Any]:
         """Plain data, as a pool stores it."""
@@ -191,9 +194,6 @@ class Manifest:
     def rates(self) -> Sequence[Mapping[str, Any]]:
         """Entries of the rates of the attack; empty if there was no attack."""
         return self.attack["rates"] if self.attack else ()
-
-
-_REMEDY = "generate it again with the command and seed that made it (docs/pools.md, Formats)"
 
 
 def without_numbers(reason: str) -> str:

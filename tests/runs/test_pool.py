@@ -323,13 +323,15 @@ def test_a_manifest_that_lacks_a_part_is_damaged(mine, gone):
         Pool.open(mine)
 
 
-@pytest.mark.parametrize("number", [1, 99])
-def test_a_pool_of_another_format_is_one_clear_error(mine, number):
+@pytest.mark.parametrize(
+    ("number", "remedy"), [(1, "generate it again with the command and seed"), (99, "install a newer scengen")]
+)
+def test_a_pool_of_another_format_is_one_clear_error(mine, number, remedy):
     manifest = json.loads((mine / "manifest.json").read_text())
     (mine / "manifest.json").write_text(json.dumps({**manifest, "format": number}))
     with pytest.raises(
         PoolError,
-        match=f"has pool format {number}, this scengen reads {FORMAT}; generate it again with the command and seed",
+        match=f"has pool format {number}, this scengen reads {FORMAT}; {remedy}",
     ):
         Pool.open(mine)
 
