@@ -47,7 +47,7 @@ def strike_last_tile_with_starter(self, world: World) -> Plan:
 
 def staircase(self, world: World) -> Plan:
     """Let the ball go too low, catch it as it comes back, 5 mm higher, and again."""
-    arm, s = world.arm, self.start + 0.03
+    arm, s = world.arm, self.release_place + 0.03
     yield from pick(arm, world.com("ball"), closing=self.axes[:, 1], lift=0.12)
     yield from carry(arm, "ball", self.resting(s) + 0.12 * UP, pace=COARSE)
     yield from carry(arm, "ball", self.resting(s) + 0.01 * UP)

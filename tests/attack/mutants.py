@@ -209,11 +209,11 @@ BARS: Mapping[int, float] = {1: 0.10, 3: 0.20}
 # --- limits: constants made wide ----------------------------------------------------------------
 
 WIDE: Mapping[str, Mapping[str, float]] = {
-    "domino_single": {"SLAB_MOVES": 0.004},
-    "domino_select": {"SLAB_MOVES": 0.004, "CARRIED": 0.30},
-    "ball_cage_escape": {"STILL": 5.0, "GIVE": math.radians(60.0)},
-    "seesaw_balance": {"LEVEL": math.radians(10.5), "STAYS": 0.40},
-    "tool_retrieve": {"LIFTED": -0.001},
+    "domino_single": {"SLAB_DISPLACEMENT": 0.004},
+    "domino_select": {"SLAB_DISPLACEMENT": 0.004, "CARRY_TOLERANCE": 0.30},
+    "ball_cage_escape": {"REST_SPEED": 5.0, "TILT_TOLERANCE": math.radians(60.0)},
+    "seesaw_balance": {"MAX_TILT": math.radians(10.5), "TARGET_TOLERANCE": 0.40},
+    "tool_retrieve": {"MIN_LIFT": -0.001},
     "packing": {"FLAT_TOLERANCE": math.radians(60.0), "FLOOR_TOLERANCE": 0.03},
 }
 
