@@ -7,24 +7,24 @@
         |____|             -.  []
     --------------        ----------
 
-Bottleneck: the block is out of reach in whatever way the hand comes. It leaves the cup only if that is turned beyond
-level, by the angle of friction on its wall, and what turns it is its handle:
+Bottleneck: the block is out of reach of the hand from every direction. It leaves the cup only if the cup is turned
+beyond level by the angle of friction on its wall, and only the handle allows that turn:
 
-* Its thin wall lets the fingers close so far that the jaw's springs hardly press (`pinch`): friction there bears less
-  than the weight of cup and block. The handle is thick.
+* The wall is so thin that the jaw's springs hardly press when the fingers close on it (`pinch`): friction there bears
+  less than the weight of cup and block. The handle is thick.
 * Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
-* Pushed it slides: its friction on the table is less than the distance of its centre of mass from the edge, over its
+* A pushed cup slides: its friction on the table is less than the distance of its centre of mass from the edge over its
   height, also towards the handle.
 
 Decisions, where the paper (App. B, T24) is silent:
 
-* It gives no lengths. The block is as thick as the fingers are long: a palm over the mouth, "blocking the object from
-  exiting" as in the paper's failures (App. J), does block it.
-* In the region means: out of the cup, upright or upside down, touching the table alone, at rest, for 0.3 s, 30 steps
-  as in the paper's T12 and T13. Where the cup is then does not matter, but on the table it must be. Pouring the block
-  straight into the region would count, and so would shaking it out of a cup held level by its handle: the same insight.
-* How slippery the wall is nobody can see; a cup that is turned slowly tells. There is no `answer` to guess: whoever
-  turns it farther than needed has not failed.
+* It gives no lengths. The block is as thick as the fingers are long, so a palm over the mouth blocks it: "blocking the
+  object from exiting" is among the paper's failures (App. J).
+* In the region means: out of the cup, upright or upside down, touching the table alone, at rest, for 0.3 s, 30 steps as
+  in the paper's T12 and T13. The cup may then be anywhere on the table. Pouring the block straight into the region
+  counts, and so does shaking it out of a cup held level by its handle: the insight is the same.
+* The friction of the wall is not visible; a cup that is turned slowly shows it. There is no `answer` to guess, because
+  turning the cup farther than needed is no failure.
 """
 
 import math
@@ -46,42 +46,32 @@ from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP_BELOW, TIP_SPAN_C
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
+from ..skills import motion
 from ..skills.grip import take
 from ..skills.jaw import grasp, pick, put
-from ..skills.motion import (
-    CLOSED,
-    COARSE,
-    FINE,
-    OPEN,
-    STEADY,
-    closing_along,
-    go_to,
-    push,
-    retreat,
-    turn_to,
-    until,
-    wait,
-)
+from ..skills.motion import COARSE, FINE, OPEN, STEADY, closing_along, go_to, retreat
 
 MUG = Cup(
     base=0.043, rim=0.043, wall=0.002, bead=0.0, handle=0.046, bar=0.014, mass=0.09, friction=0.10, handle_friction=0.9
 )
-"""86 mm wide, more than the jaw opens, and smooth as glazed china or polished metal; the handle is rubber."""
-AIR = 0.005
-"""Least space between hand and things [m]: jitter takes 2 mm, moves are exact to 3 mm."""
-TAPER = 0.35
+"""A cup 86 mm wide, more than the jaw opens, smooth as glazed china or polished metal; the handle is rubber."""
+MIN_CLEARANCE = 0.005
+"""Least clearance between the hand and other bodies [m]: jitter takes 2 mm, moves are exact to 3 mm."""
+FINGER_TAPER = 0.35
 """Slope of the fingers' outer sides, which come nearer to each other towards the tips: measured in a cup."""
-POUR_AT, POUR_HEIGHT = 0.41, 0.16
-"""Where the hand is that pours: how far from the robot's first axis, since it cannot point back at the robot from
-farther out, and how high over the table [m]. That leaves 2 cm under the cup: a block that falls 8 cm tumbles so wildly
-that a nanometre in the beginning decides where it comes to rest, and no replay outside this MuJoCo hits it."""
-LEVEL, STEEPEST = math.radians(85.0), math.radians(130.0)
-"""Tilt of the cup up to which it is turned fast, and the farthest to which a hand at `POUR_AT` turns it [rad]."""
-FAST, SLOW = 1.2, 0.3
-"""How fast the cup is turned [rad/s]."""
-ASIDE: Vec3 = np.array([-0.13, 0.25, 0.0])
-"""Where the empty cup is put down if the square is on the right [m]."""
-CALM = 0.02
+POUR_DISTANCE = 0.41
+"""Distance from the robot's first axis at which the hand pours [m]; farther out it cannot point back at the robot."""
+POUR_HEIGHT = 0.16
+"""Height above the table at which the hand pours [m]. That leaves 2 cm under the cup: a block that falls 8 cm tumbles
+so chaotically that a nanometre at the start decides where it comes to rest, and a replay outside of this MuJoCo
+misses."""
+MAX_POUR_TILT = math.radians(130.0)
+"""Largest tilt of the cup to which a hand at `POUR_DISTANCE` turns it [rad]."""
+TURN_RATE = 1.2
+"""Rate at which the cup turns while the block cannot slide yet, and back [rad/s]."""
+POUR_RATE = 0.3
+"""Rate at which the cup turns while it pours [rad/s]."""
+REST_SPEED = 0.02
 """Speed below which the block counts as at rest [m/s]."""
 
 
@@ -94,7 +84,7 @@ class CupExtract(Scenario):
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     handle: float = param(180.0, "deg", 0.0, 360.0, period=360.0)
-    """Where the handle points; 180: towards the robot."""
+    """Direction of the handle; 180 is towards the robot."""
     goal_x: float = param(-0.10, "m", -0.4, 0.4)
     goal_y: float = param(-0.25, "m", -0.4, 0.4)
     cup: Cup = MUG
@@ -119,10 +109,10 @@ class CupExtract(Scenario):
 
     def success(self, world: World) -> bool:
         placed = over(world, "block", self.goal, self.patch.size / 2) and rests_on(world, "block", "table")
-        return placed and still(world, "block", CALM) and not self.within(world)
+        return placed and still(world, "block", REST_SPEED) and not self.within(world)
 
     def within(self, world: World) -> bool:
-        """Whether the middle of the block is inside the cup, however that is turned."""
+        """Whether the middle of the block is inside the cup, in any pose of the cup."""
         x, y, z = world.rot("cup").T @ (world.com("block") - world.pos("cup"))
         return math.hypot(x, y) <= self.cup.rim and 0.0 <= z <= self.cup.height
 
@@ -133,7 +123,7 @@ class CupExtract(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Take the cup by its handle, pour, put it aside, place the block."""
+        """Take the cup by its handle, pour the block out, put the cup aside, place the block."""
         yield from self.take_cup(world)
         yield from self.pour(world)
         yield from self.put_down(world, self.aside)
@@ -144,27 +134,27 @@ class CupExtract(Scenario):
         rot = world.rot("cup")
         yield from pick(world.arm, world.pos("cup") + rot @ self.cup.grip, rot[:, 1], lift=0.06)
 
-    def pour(self, world: World, tilt: float = STEEPEST) -> Plan:
-        """Turn the handle to the robot, then the mouth away and down, until the block is out or at a tilt [rad]."""
+    def pour(self, world: World, tilt: float = MAX_POUR_TILT) -> Plan:
+        """Turn the handle to the robot, then the mouth away and down, until the block is out or up to a tilt [rad]."""
         arm, bearing = world.arm, polar(world.arm.hand - BASE)[0]
-        spot = BASE * [1.0, 1.0, 0.0] + POUR_AT * heading(math.degrees(bearing)) + (TABLE_TOP + POUR_HEIGHT) * UP
+        spot = BASE * [1.0, 1.0, 0.0] + POUR_DISTANCE * heading(math.degrees(bearing)) + (TABLE_TOP + POUR_HEIGHT) * UP
         upright = about_z(math.remainder(bearing - polar(-world.rot("cup")[:, 0])[0], math.tau)) @ arm.hand_rot
         yield from go_to(arm, spot, upright, STEADY)
-        for angle, rate in ((LEVEL, FAST), (tilt, SLOW)):
-            over = about_z(bearing) @ about_y(angle) @ about_z(-bearing) @ upright
-            turned = turn_to(arm, over, rate)
-            yield from until(turned, lambda a=angle: world.tilt("cup") >= a or not self.within(world))
-        yield from turn_to(arm, upright, FAST, within=0.1)
+        for angle, rate in ((math.radians(85.0), TURN_RATE), (tilt, POUR_RATE)):
+            tilted = about_z(bearing) @ about_y(angle) @ about_z(-bearing) @ upright
+            turned = motion.turn_to(arm, tilted, rate)
+            yield from motion.until(turned, lambda a=angle: world.tilt("cup") >= a or not self.within(world))
+        yield from motion.turn_to(arm, upright, TURN_RATE, within=0.1)
 
     def put_down(self, world: World, spot: Vec3) -> Plan:
-        """Put the held cup down upright [m] and let go."""
+        """Put the held cup down upright at a place [m] and let go."""
         com = world.com("cup") - world.pos("cup")
         yield from put(world.arm, "cup", spot + com, "table", hover=0.06)
         yield from retreat(world.arm)
 
     def place_block(self, world: World) -> Plan:
-        """Once the block is at rest take it, put it in the middle of the square, let go."""
-        yield from wait(world.arm, lambda: still(world, "block", CALM), 2.0)
+        """When the block is at rest, take it, put it in the middle of the square, let go."""
+        yield from motion.wait(world.arm, lambda: still(world, "block", REST_SPEED), 2.0)
         stands = world.com("block")[2]
         yield from take(world.arm, "block")
         yield from put(world.arm, "block", [self.goal_x, self.goal_y, stands], "table", hover=0.06)
@@ -182,26 +172,26 @@ class CupExtract(Scenario):
         }
 
     def _reach_in(self, world: World) -> Plan:
-        """Fingers as far apart as the mouth allows, down as far as the palm allows, close, lift, to the square."""
+        """Enter the cup with the fingers as far apart and as deep as it allows, close, lift, move to the square."""
         arm, across = world.arm, world.rot("cup")[:, 1]
         mouth = world.pos("cup") + (self.cup.height + TIP_BELOW + 0.02) * UP
         yield from go_to(arm, mouth, closing_along(arm, across), STEADY, OPEN)
-        narrow = 2 * (self.cup.rim - self.cup.wall - AIR) - TIP_SPAN_CLOSED
-        yield from until(grasp(arm, 1.0), lambda: arm.gap <= narrow)
-        yield from go_to(arm, mouth - (TIP_BELOW + 0.02 + PALM_ABOVE - AIR) * UP, pace=FINE, grip=0.0)
+        narrow = 2 * (self.cup.rim - self.cup.wall - MIN_CLEARANCE) - TIP_SPAN_CLOSED
+        yield from motion.until(grasp(arm, 1.0), lambda: arm.gap <= narrow)
+        yield from go_to(arm, mouth - (TIP_BELOW + 0.02 + PALM_ABOVE - MIN_CLEARANCE) * UP, pace=FINE, grip=0.0)
         yield from grasp(arm)
         yield from retreat(arm, 0.15)
         yield from go_to(arm, self.goal + 0.08 * UP)
 
     def _by_the_rim(self, world: World) -> Plan:
-        """Pinch the wall where the handle is, as deep as the palm allows, lift, pour."""
+        """Pinch the wall at the handle, as deep as the palm allows, lift, pour."""
         arm, out = world.arm, -world.rot("cup")[:, 0]
         at = world.pos("cup") + (self.cup.rim - self.cup.wall / 2) * out
-        yield from pick(arm, at + (self.cup.height - PALM_ABOVE + AIR) * UP, out, lift=0.06)
+        yield from pick(arm, at + (self.cup.height - PALM_ABOVE + MIN_CLEARANCE) * UP, out, lift=0.06)
         yield from self.pour(world, math.radians(100.0))
 
     def _level(self, world: World) -> Plan:
-        """Turn the cup until it lies in the air over the square, and back."""
+        """Turn the cup only until it is level, and back."""
         yield from self.take_cup(world)
         yield from self.pour(world, math.radians(90.0))
         yield from self.put_down(world, self.aside)
@@ -212,16 +202,16 @@ class CupExtract(Scenario):
         yield from self.put_down(world, self.goal)
 
     def _knock(self, world: World) -> Plan:
-        """Push the cup at its rim with closed fingers, over its handle, as fast as the hand goes."""
+        """Push the cup at its rim with closed fingers, over its handle, at full speed."""
         arm, along = world.arm, world.rot("cup")[:, 0]
         beside = world.pos("cup") - (self.cup.rim + 0.03) * along + (self.cup.height - 0.002) * UP
-        yield from go_to(arm, beside + 0.05 * UP, closing_along(arm, world.rot("cup")[:, 1]), COARSE, CLOSED)
+        yield from go_to(arm, beside + 0.05 * UP, closing_along(arm, world.rot("cup")[:, 1]), COARSE, motion.CLOSED)
         yield from go_to(arm, beside, pace=FINE)
-        yield from push(arm, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.20)
+        yield from motion.push(arm, 0.3 * along, lambda: float((arm.hand - beside) @ along) > 0.20)
         yield from retreat(arm)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without a handle nothing lifts the cup; covered, nothing leaves it."""
+        """Remove the handle, so that nothing lifts the cup; cover the cup, so that nothing leaves it."""
         covered = self.build()
         lid = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "mass": 0.0, "priority": PRIORITY + 1}
         solid(covered.body("cup"), "lid", [self.cup.rim, 0.001], [0.0, 0.0, self.cup.height + 0.001], **lid)
@@ -233,21 +223,24 @@ class CupExtract(Scenario):
         cup, block = self.cup, self.block
         yield require(cup.has_handle, "the cup has no handle", handle=cup.handle)
         beside = cup.grip[0] - cup.rim - PALM_ACROSS
-        yield require(beside >= AIR, "the palm does not fit between handle and cup", room=beside)
+        yield require(beside >= MIN_CLEARANCE, "the palm does not fit between handle and cup", room=beside)
         narrowest = 2 * min(cup.base, cup.rim)
         yield require(narrowest > OPENING, "the jaw can span the cup", width=narrowest, jaw=OPENING)
-        room = cup.height - cup.floor - block.height - PALM_ABOVE - TIP_BELOW
-        yield require(room >= AIR, "the fingers come down to the block", room=room)
-        air = min(cup.base, cup.rim) - max(cup.wall, cup.bead) - block.width / math.sqrt(2)
-        yield require(air >= AIR, "the block sticks in the cup", room=air)
+        above = cup.height - cup.floor - block.height - PALM_ABOVE - TIP_BELOW
+        yield require(above >= MIN_CLEARANCE, "the fingers come down to the block", room=above)
+        around = min(cup.base, cup.rim) - max(cup.wall, cup.bead) - block.width / math.sqrt(2)
+        yield require(around >= MIN_CLEARANCE, "the block sticks in the cup", room=around)
         weight, bears = GRAVITY * (cup.mass + block.mass), pinch(max(cup.wall, cup.bead)) * cup.friction
         yield require(bears < 0.9 * weight, "the jaw can carry the cup by its wall", bears=bears, weight=weight)
         yield require(
-            cup.friction < TAPER, "fingers opened in the cup can carry it", friction=cup.friction, taper=TAPER
+            cup.friction < FINGER_TAPER,
+            "fingers opened in the cup can carry it",
+            friction=cup.friction,
+            taper=FINGER_TAPER,
         )
         com = cup.mass / (cup.mass + block.mass) * float(cup.inertial()[0][0])
         slides = (cup.base - com) / cup.height  # towards the handle, where its weight is
-        yield require(cup.friction < 0.85 * slides, "a push tips the cup", friction=cup.friction, most=slides)
+        yield require(cup.friction < 0.85 * slides, "a motion.push tips the cup", friction=cup.friction, most=slides)
         turn = about_z(math.radians(self.handle))
         ends = [self.foot + turn @ [cup.grip[0] + cup.bar / 2, 0.0, 0.0], self.foot + turn @ [-cup.rim, 0.0, 0.0]]
         yield on_table("the cup", ends)
@@ -257,8 +250,9 @@ class CupExtract(Scenario):
         yield within_reach("the handle or the square", self.foot + turn @ cup.grip, self.goal + 0.1 * UP)
 
     def features(self) -> Mapping[str, float]:
-        """Where the handle is seen from the robot's first axis, tilt at which the block slides, depth in lengths of the
-        fingers, shape of the handle, torque of the cup's weight about the jaw over what the pads press [m]."""
+        """Direction of the handle relative to the robot's first axis [rad], tilt at which the block slides [rad], depth
+        in lengths of the fingers, shape of the handle, torque of the weight about the jaw over the force of the pads
+        [m], bearing of the square [rad]."""
         com, _ = self.cup.inertial()
         moment = GRAVITY * float(self.cup.mass * (self.cup.grip - com)[0] + self.block.mass * self.cup.grip[0])
         towards, _ = polar(self.foot - BASE)
@@ -275,7 +269,7 @@ class CupExtract(Scenario):
 
     @property
     def foot(self) -> Vec3:
-        """Where the cup stands [m]."""
+        """Initial position of the cup's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
     @property
@@ -285,11 +279,11 @@ class CupExtract(Scenario):
 
     @property
     def sliding_tilt(self) -> float:
-        """Tilt of the cup at which the block slides [rad]: two of its edges lie on the wall as in a groove."""
+        """Tilt of the cup at which the block slides [rad]: two edges of the block lie on the wall as in a groove."""
         aslant = math.asin(self.block.width / 2 / (self.cup.rim - self.cup.wall))
         return math.pi / 2 + math.atan(self.cup.friction / math.cos(aslant))
 
     @property
     def aside(self) -> Vec3:
-        """Where the empty cup is put down: on the side that the square is not on [m]."""
-        return np.array([ASIDE[0], math.copysign(ASIDE[1], -self.goal_y), TABLE_TOP])
+        """Place for the empty cup, on the side away from the square [m]."""
+        return np.array([-0.13, math.copysign(0.25, -self.goal_y), TABLE_TOP])

@@ -8,18 +8,19 @@
                           |__________.____|   a lip: now a jaw beside the table can close on it,
     ---------------------------------.        one finger above and one below; farther out the plate falls
 
-Bottleneck: what has to be grasped is made first, by a push that must end in time. Too short, and no finger comes under
-the plate; too far, or too fast, and it is on the floor, which the paper names as how policies fail (App. J).
+Bottleneck: a push must first create the grasp, and must end in time. If it is too short, no finger fits under the
+plate. If it is too far or too fast, the plate falls on the floor, which the paper names as a failure of policies (App.
+J).
 
 Decisions, where the paper (App. B, T01) says no more than "a thin rectangular plate":
 
-* Both sides are longer than the jaw opens, so that it cannot be taken across either; 5 mm of its 2, 3 and 5 mm.
-* The edge is the nearest of the two side edges: beside the far one and the near one no level hand can be.
+* Both sides are longer than the jaw opens, so the plate cannot be grasped across either; 5 mm of its 2, 3 and 5 mm.
+* The edge is the nearest of the two side edges: no level hand reaches beside the far or the near edge.
 * "Above the table": its lowest corner by 5 cm, held by the robot and by nothing else for 0.3 s, 30 steps as in the
-  paper's T12 and T13. No other rule: whoever brings the plate up in another way has lifted it.
-* A plate below the table top is lost. It is not looked for on the floor.
-* Where to stop is the statics of a lever: the plate tips when its centre of mass is over the edge. One side may be
-  of a heavier stuff, which is to be seen, and then that is earlier than half of the width.
+  paper's T12 and T13. There is no other rule: a plate that is brought up in another way counts as lifted.
+* A plate below the table top is lost. The robot does not search the floor.
+* The statics of a lever say where to stop: the plate tips when its centre of mass is over the edge. One side may be of
+  a heavier material, which is visible; then it tips before half of the width is out.
 """
 
 import math
@@ -43,33 +44,25 @@ from ..sim.world import World
 from ..skills.jaw import grasp, pick
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, STEADY, Pace, facing_down, go_to, retreat, steer
 
-LIFTED = 0.05
-"""How far the plate's lowest corner must be above the table top [m]: five times the thickest one in the task file."""
-AZIMUTH, TILT = math.radians(30.0), math.radians(15.0)
-"""Where the hand that pinches points: from the robot's direction towards the table, and below the level [rad]. With it
-the arm is 0.2 rad and more away from its limits along 0.2 m of either edge; straight at the table it does not come."""
-LIP = 0.036
+MIN_LIFT = 0.05
+"""Height of the plate's lowest corner above the table top at which the plate counts as lifted [m]: five times the
+thickest plate in the task file."""
+MIN_OVERHANG = 0.036
 """Least overhang that can be pinched [m]: palm and fingers of that hand reach 12 and 14 mm past the grip site towards
-the table, which leaves 4 mm of air beside the edge, and half of the pads is 11 mm wide."""
-SPARE = 0.008
-"""How much more the plate is to stand out before it tips [m]: it coasts, and the jaw moves it as it closes."""
-CORNER = (0.014, 0.018)
-"""Where it is pinched: distance from the side towards the robot and from the outer side [m]. The palm is 31 mm behind
-the grip site and must pass outside the corner."""
-PUSHING, SLOWLY, LAST = 0.06, 0.03, 0.02
-"""How fast it is pushed, how fast at the end [m/s], and over what distance that is [m]."""
-HOVER, LEVELLING = 0.4, 8.0
-"""How high the finger tips are above the table, as a share of the plate's thickness, and how fast an error in it adds
-up to a correction [1/s]: tips that press on the table stick and slip, and higher ones climb the plate."""
-SQUARING, STEERING, INSIDE = 3.0, 4.0, 0.012
-"""The fingers push beside the plate's middle, by this share of the way to its corner for each radian that it is askew;
-how fast they go there [1/s], and how far from the corner they stay as long as it is nearly square [m]."""
-BACK, REACHING = 0.07, Pace(0.15, 0.003, 2.5)
-"""How far from the lip the open jaw comes down beside the table [m], and how it goes on from there."""
-ASTRIDE = 0.025
-"""How far inside a corner a jaw can come down with its fingers on both sides of it [m]: there it is 50 mm wide."""
-PATIENCE = 10.0
-"""When a push is given up [s]."""
+the table, which leaves 4 mm of clearance beside the edge, and half of the pads is 11 mm wide."""
+TIPPING_MARGIN = 0.008
+"""Overhang that remains until the plate tips [m]: it coasts, and the jaw moves it as it closes."""
+GRIP_INSET = 0.014
+"""Distance of the pinch from the plate's side towards the robot [m]."""
+GRIP_DEPTH = 0.018
+"""Distance of the pinch from the plate's outer side [m]. The palm is 31 mm behind the grip site and must pass outside
+of the corner."""
+PUSH_SPEED = 0.06
+"""Speed of the push [m/s]."""
+END_SPEED = 0.03
+"""Speed of the last stretch of the push [m/s]."""
+PUSH_TIMEOUT = 10.0
+"""Time after which a push is given up [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,13 +72,13 @@ class EdgeSlide(Scenario):
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)
-    """Which edge is the nearest one. 0 is refuted."""
+    """Side of the nearest edge. 0 is refuted."""
     x: float = param(-0.10, "m", -0.4, 0.4)
-    """Of the plate's middle."""
+    """Position of the plate's middle along the edge."""
     away: float = param(0.18, "m", 0.03, 0.4)
-    """Of the plate's middle from that edge."""
+    """Distance of the plate's middle from the edge."""
     yaw: float = param(0.0, "deg", -60.0, 60.0)
-    """0: square to the edge."""
+    """Angle of the plate to the edge; 0 is square to it."""
     plate: Board = Board()
 
     # --- scene ----------------------------------------------------------------------------
@@ -98,22 +91,22 @@ class EdgeSlide(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return held(world, "plate") and self.lowest(world) >= TABLE_TOP + LIFTED
+        return held(world, "plate") and self.lowest(world) >= TABLE_TOP + MIN_LIFT
 
     def failure(self, world: World) -> str | None:
         return "the plate fell off the table" if fallen(world, "plate") else None
 
     def underside(self, world: World) -> Vec3:
-        """Corners of the plate's underside now, shape (4, 3) [m]."""
-        return world.pos("plate") + self._flat @ world.rot("plate").T
+        """Present positions of the corners of the plate's underside [m], shape (4, 3)."""
+        return world.pos("plate") + self._underside @ world.rot("plate").T
 
     def lowest(self, world: World) -> float:
-        """Height of the plate's lowest corner now, whichever side is up [m]."""
+        """Present height of the plate's lowest corner, whichever side is up [m]."""
         upper = self.plate.thickness * world.rot("plate")[2, 2]
         return float(self.underside(world)[:, 2].min() + min(0.0, upper))
 
     def overhang(self, world: World) -> float:
-        """How far the plate's outer side is out over the edge now, if it is square to it [m]."""
+        """Present overhang of the plate's outer side over the edge, if the plate is square to it [m]."""
         return self.plate.tipping_overhang - TABLE_HALF + float(world.com("plate") @ self.out)
 
     # --- oracle ---------------------------------------------------------------------------
@@ -123,15 +116,15 @@ class EdgeSlide(Scenario):
         yield from self.slide_out(world, self.aim)
         yield from self.pinch(world)
 
-    def slide_out(self, world: World, overhang: float, speed: float = PUSHING, last: float = SLOWLY) -> Plan:
-        """Push the plate from behind with closed fingers until it stands out by so much, step back, go up.
+    def slide_out(self, world: World, overhang: float, speed: float = PUSH_SPEED, last: float = END_SPEED) -> Plan:
+        """Push the plate from behind with closed fingers to an overhang, step back, move up.
 
         Args:
-            overhang: at which the push ends [m].
-            speed: of the push [m/s].
-            last: of its last stretch [m/s].
+            overhang: overhang at which the push ends [m].
+            speed: speed of the push [m/s].
+            last: speed of its last stretch [m/s].
         """
-        arm, rot = world.arm, facing_down()  # the other way round joint 7 ends
+        arm, rot = world.arm, facing_down()  # with the other yaw joint 7 reaches its limit
         behind = min(float(corner @ self.out) for corner in self.underside(world))
         start = self.contact(world) * self.along + (behind - 0.03) * self.out + (TABLE_TOP + TIP_BELOW + 0.002) * UP
         yield from go_to(arm, start + 0.08 * UP, rot, COARSE, CLOSED)
@@ -140,42 +133,50 @@ class EdgeSlide(Scenario):
         yield from go_to(arm, arm.hand - 0.03 * self.out, rot, STEADY)
         yield from retreat(arm, 0.20)
 
-    def _push(self, world: World, left: Callable[[], float], rot: Mat3, speed: float, last: float) -> Plan:
-        """Push until nothing is `left` [m], the fingers beside the plate's middle so that it becomes square.
+    def _push(self, world: World, remaining: Callable[[], float], rot: Mat3, speed: float, last: float) -> Plan:
+        """Push until nothing remains [m], with the fingers beside the plate's middle so that it becomes square.
+
+        The speed is `last` over the last 2 cm. The finger tips are kept above the table by 0.4 of the plate's
+        thickness: tips that press on the table stick and slip, and higher ones climb the plate. The error in height
+        adds up at 8 per second.
 
         Raises:
-            GaveUp: that took too long.
+            GaveUp: the push took longer than `PUSH_TIMEOUT`.
         """
-        arm, setpoint, end = world.arm, world.arm.hand, world.time + PATIENCE
-        while left() > 0.0:
+        arm, setpoint, end = world.arm, world.arm.hand, world.time + PUSH_TIMEOUT
+        while remaining() > 0.0:
             if world.time > end:
-                raise GaveUp(f"the plate was not over the edge after {PATIENCE:g} s")
-            sideways = STEERING * (self.contact(world) - float(setpoint @ self.along))
-            rise = LEVELLING * (TABLE_TOP + TIP_BELOW + HOVER * self.plate.thickness - arm.hand[2])
-            velocity = (speed if left() > LAST else last) * self.out + sideways * self.along + rise * UP
+                raise GaveUp(f"the plate was not over the edge after {PUSH_TIMEOUT:g} s")
+            sideways = 4.0 * (self.contact(world) - float(setpoint @ self.along))
+            rise = 8.0 * (TABLE_TOP + TIP_BELOW + 0.4 * self.plate.thickness - arm.hand[2])
+            velocity = (speed if remaining() > 0.02 else last) * self.out + sideways * self.along + rise * UP
             setpoint = setpoint + velocity * Loop.PERIOD
             yield steer(arm, setpoint, velocity, between(arm.hand_rot, rot), CLOSED)
 
     def contact(self, world: World) -> float:
-        """Where along the edge the fingers are to push now [m]."""
+        """Position along the edge at which the fingers are to push now [m].
+
+        It is beside the plate's middle by three times the angle by which the plate is askew [rad], as a share of the
+        way to 12 mm from the corner.
+        """
         across, half = world.rot("plate")[:, 1], self.plate.length / 2
         askew = math.atan2(float(np.cross(self.out, across)[2]), float(across @ self.out))
-        beside = float(world.com("plate") @ self.along) + np.clip(-SQUARING * askew, -1.0, 1.0) * (half - INSIDE)
+        beside = float(world.com("plate") @ self.along) + np.clip(-3.0 * askew, -1.0, 1.0) * (half - 0.012)
         inner = sorted(self.underside(world), key=lambda corner: float(corner @ across))[:2]
         ends = sorted(float(corner @ self.along) for corner in inner)
-        return float(np.clip(beside, *ends))
+        return float(np.clip(beside, ends[0], ends[1]))
 
     def pinch(self, world: World, lift: float = 0.16) -> Plan:
-        """Come down beside the table, take the outer corner on the robot's side, lift [m]."""
-        arm, rot, (near, inwards) = world.arm, self.grip, CORNER
+        """Come down beside the table, grasp the outer corner on the robot's side, lift it [m]."""
+        arm, rot = world.arm, self.grip
         outermost = max(float(corner @ self.out) for corner in self.underside(world))
         nearest = min(corner[0] for corner in self.underside(world) if corner @ self.out > outermost - 0.02)
         height = TABLE_TOP + self.plate.thickness / 2
-        at = np.array([nearest + near, 0.0, height]) + (outermost - inwards) * self.out
-        back = at - BACK * rot[:, 2]
+        at = np.array([nearest + GRIP_INSET, 0.0, height]) + (outermost - GRIP_DEPTH) * self.out
+        back = at - 0.07 * rot[:, 2]
         yield from go_to(arm, back + 0.05 * self.out + 0.18 * UP, rot, COARSE, OPEN)
         yield from go_to(arm, back, rot, STEADY)
-        yield from go_to(arm, at, rot, REACHING)
+        yield from go_to(arm, at, rot, Pace(0.15, 0.003, 2.5))
         yield from grasp(arm, time_to_grip(self.plate.thickness))
         yield from retreat(arm, lift, Pace(0.20, 0.01))
 
@@ -192,25 +193,31 @@ class EdgeSlide(Scenario):
             "push_fast": Shortcut(lambda world: self._slide_and_pinch(world, tipping - 0.010, 0.28, 0.28)),
         }
 
-    def _slide_and_pinch(self, world: World, overhang: float, speed: float = PUSHING, last: float = SLOWLY) -> Plan:
+    def _slide_and_pinch(
+        self, world: World, overhang: float, speed: float = PUSH_SPEED, last: float = END_SPEED
+    ) -> Plan:
+        """Slide the plate out to another overhang or at other speeds, then pinch and lift."""
         yield from self.slide_out(world, overhang, speed, last)
         yield from self.pinch(world)
 
     def _close_from_above(self, world: World) -> Plan:
-        """As if it were a block: over its middle, down, close across the shorter side, lift."""
+        """Come down on the middle of the plate as on a block, close across the shorter side, lift."""
         axis = 0 if self.plate.length < self.plate.width else 1
         at = world.com("plate") + (self.plate.thickness / 2 + TIP_BELOW) * UP
         yield from pick(world.arm, at, world.rot("plate")[:, axis], lift=0.16)
 
     def _squeeze_corner(self, world: World) -> Plan:
-        """A corner is narrow enough: down astride it, close, lift. The fingers slide off its two sides."""
+        """Come down with the fingers on both sides of a corner, close, lift. The fingers slide off its two sides.
+
+        The place is 25 mm inside the corner, where the corner is 50 mm wide.
+        """
         into, across = (world.rot("plate") @ np.array([1.0, sign, 0.0]) / math.sqrt(2) for sign in (1.0, -1.0))
         corner = world.com("plate") - world.rot("plate") @ [self.plate.length / 2, self.plate.width / 2, 0.0]
-        at = np.array([*corner[:2], TABLE_TOP + TIP_BELOW + 0.001]) + ASTRIDE * into
+        at = np.array([*corner[:2], TABLE_TOP + TIP_BELOW + 0.001]) + 0.025 * into
         yield from pick(world.arm, at, across, lift=0.16)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """With more table beyond the edge nothing overhangs, and there is no place for a finger under it."""
+        """Extend the table beyond the edge: the plate does not overhang, and no finger fits under it."""
         scene = self.build()
         wider = scene.body("table").add_geom(name="table_leaf", type=BOX, size=[TABLE_HALF, 0.10, 0.025])
         wider.pos = (TABLE_HALF + 0.10) * self.out
@@ -228,23 +235,23 @@ class EdgeSlide(Scenario):
         yield require(
             plate.friction < wedge, "a corner can be squeezed from above", friction=plate.friction, wedge=wedge
         )
-        room = plate.tipping_overhang - SPARE - LIP
+        room = plate.tipping_overhang - TIPPING_MARGIN - MIN_OVERHANG
         yield require(room > 0.0, "the plate falls before there is a lip to pinch", room=room)
         friction = plate.friction * pinch(plate.thickness)
         yield require(friction > 2 * weight, "the plate slips out of the pinch", friction=friction, weight=weight)
-        near, inwards = CORNER
-        lever = math.hypot(plate.length / 2 - near, plate.tipping_overhang - inwards)
+        lever = math.hypot(plate.length / 2 - GRIP_INSET, plate.tipping_overhang - GRIP_DEPTH)
         resists = PAD * pinch(plate.thickness)
         yield require(resists > lever * weight, "the plate turns in the pinch", resists=resists, turns=lever * weight)
         lip = np.array([self.x, self.side * TABLE_HALF, TABLE_TOP])
         yield within_reach("the plate or its lip", self.spot, lip)
 
     def features(self) -> Mapping[str, float]:
-        """Where the plate tips, what share of that is left for the push to end in, and how far it is pushed [m]."""
+        """Overhang at which the plate tips [m], share of it in which the push may end, way of the push [m], yaw
+        [rad]."""
         tipping = self.plate.tipping_overhang
         return {
             "tipping_overhang": tipping,
-            "window_over_overhang": (tipping - LIP) / tipping,
+            "window_over_overhang": (tipping - MIN_OVERHANG) / tipping,
             "way": self.aim + self.away - tipping,
             "askew": math.radians(self.yaw),
         }
@@ -253,9 +260,9 @@ class EdgeSlide(Scenario):
 
     @property
     def aim(self) -> float:
-        """Overhang at which the oracle ends its push [m]: two thirds of the way from the least to the most."""
-        longest = self.plate.tipping_overhang - SPARE
-        return LIP + 2 / 3 * (longest - LIP)
+        """Overhang at which the oracle ends its push [m]: two thirds of the way from the least to the largest."""
+        longest = self.plate.tipping_overhang - TIPPING_MARGIN
+        return MIN_OVERHANG + 2 / 3 * (longest - MIN_OVERHANG)
 
     @property
     def out(self) -> Vec3:
@@ -264,33 +271,39 @@ class EdgeSlide(Scenario):
 
     @property
     def along(self) -> Vec3:
-        """Level unit vector along the edge, to the right of `out`."""
+        """Level unit vector along the edge, to the right of `out`, shape (3,)."""
         return np.array([float(self.side), 0.0, 0.0])
 
     @property
     def turn(self) -> float:
-        """Of the plate about the vertical [rad]; its strip is towards the edge."""
+        """Yaw of the plate [rad]; its strip is towards the edge."""
         return math.radians(self.side * self.yaw) + (0.0 if self.side > 0 else math.pi)
 
     @property
     def spot(self) -> Vec3:
-        """Where the plate's middle lies [m]."""
+        """Initial position of the plate's middle [m]."""
         return np.array([self.x, self.side * (TABLE_HALF - self.away), TABLE_TOP])
 
     @property
     def outline(self) -> Outline:
-        """Of the plate at the start."""
+        """Outline of the plate at the start."""
         return corners(self.spot, self.turn, self.plate.size)
 
     @property
-    def _flat(self) -> Vec3:
-        """Corners of the plate's underside in its own axes, shape (4, 3) [m]."""
+    def _underside(self) -> Vec3:
+        """Corners of the plate's underside in its own axes [m], shape (4, 3)."""
         return np.column_stack([corners([0.0, 0.0], 0.0, self.plate.size), np.zeros(4)])
 
     @property
     def grip(self) -> Mat3:
-        """Orientation of the hand that pinches: from the robot's side towards the table, closing up and down."""
-        level = math.cos(AZIMUTH) * np.array([1.0, 0.0, 0.0]) - math.sin(AZIMUTH) * self.out
-        ahead = math.cos(TILT) * level - math.sin(TILT) * UP
-        closing = -self.side * (math.cos(TILT) * UP + math.sin(TILT) * level)  # the other way up joint 5 stops it
+        """Orientation of the hand that pinches: from the robot's side towards the table, closing up and down.
+
+        It points 30 deg from straight ahead towards the table, and 15 deg below the horizontal. So the arm stays 0.2
+        rad and more away from its limits along 0.2 m of either edge. Straight towards the table the hand cannot get
+        there.
+        """
+        azimuth, tilt = math.radians(30.0), math.radians(15.0)
+        level = math.cos(azimuth) * np.array([1.0, 0.0, 0.0]) - math.sin(azimuth) * self.out
+        ahead = math.cos(tilt) * level - math.sin(tilt) * UP
+        closing = -self.side * (math.cos(tilt) * UP + math.sin(tilt) * level)  # else joint 5 is at its limit
         return np.stack([closing, np.cross(ahead, closing), ahead], axis=1)

@@ -1,4 +1,4 @@
-"""T23 tool-retrieve: fetch a cube that the arm cannot reach, with a hook that it can.
+"""T23 tool-retrieve: fetch a cube that the arm cannot reach, with a hook that it can reach.
 
                              _ tip
       base            cube [] |      seen from above; the cube's bearing is seen from the robot's first axis
@@ -6,18 +6,19 @@
                 ==============+      the hook lies at the robot's side, its tip towards the cube's bearing
               held here
 
-Bottleneck: order. The hook lengthens the arm and occupies the jaw, and only an empty jaw can take the cube: fetch the
-hook, pass it behind the cube on the side where its tip can catch, draw the cube in, put the hook down, then grasp.
+Bottleneck: the order. The hook lengthens the arm and occupies the jaw, and only an empty jaw can grasp the cube. The
+robot must fetch the hook, pass it behind the cube on the side where its tip can catch, draw the cube in, put the hook
+down, then grasp the cube.
 
 Out of reach. The robot's own table is enough: the arm swings about a shoulder 0.445 m above it, and a band of 2 cm
-before the far edge, the corners aside, is beyond it. Scenarios are refuted unless *no part of the gripper* can touch
-the cube in any posture, by a bound that ignores joint limits (`ik.GRIPPER_REACH`), so no search has to be believed.
+before the far edge, except the corners, is beyond it. Scenarios are refuted unless *no part of the gripper* can touch
+the cube in any posture. The bound ignores joint limits (`ik.GRIPPER_REACH`), so it does not depend on a search.
 
 The goal. The paper's "lift the cube above the table" has no numbers. Here: 4 cm above its height on the table, as in
-robosuite's Lift; held by the robot and by nothing else, the hook let go ("set the hook down, then grasp the cube and
-lift"), for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule: a policy may push, sweep or throw.
-Where the cube stands is no secret either, since a hook swept along the far edge brings it from anywhere; so there is no
-`answer` to guess. A hook that falls off the table is not fetched again, but may have done what it was for.
+robosuite's Lift; held by the robot and by nothing else, with the hook released ("set the hook down, then grasp the cube
+and lift"), for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule: a policy may push, sweep or
+throw. The place of the cube is not a secret either, because a hook swept along the far edge brings it from anywhere. So
+there is no `answer` to guess. A hook that falls off the table is lost, but may have done its work before.
 """
 
 import math
@@ -42,40 +43,40 @@ from ..skills.hook import HOOK_CLEARANCE, nearest_pull, pull, put_down, shortest
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, OPEN, facing_down, go_to, push, retreat
 
-LIFTED = 0.04
-"""How far the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
-L, J, T = range(3)
-"""Kinds of hooks (paper, App. C: "J-shape and T-shape"; its T23 has an L)."""
-WIDER = 0.022
-"""By how much the opening of a J is wider than the tip of an L is long [m]: a cube lies in it, not at it."""
-ARM = 0.72
-"""Farthest distance of a top-down grasp at table height from the robot's first axis that plans use [m]; inverse
+MIN_LIFT = 0.04
+"""Height of the cube's centre above its height on the table at which it counts as lifted [m]: robosuite Lift,
+`_check_success`."""
+L_HOOK = 0
+"""Number of the L hook among the kinds: the paper's T23 has an L, its App. C says "J-shape and T-shape"."""
+J_HOOK = 1
+"""Number of the J hook."""
+T_HOOK = 2
+"""Number of the T hook."""
+MAX_DISTANCE = 0.72
+"""Largest distance from the robot's first axis of a grasp from above at table height that plans use [m]; inverse
 kinematics allows 0.76."""
-DRAWN_TO = 0.60
-"""Where the cube is drawn to, if the handle is short enough: its distance from the robot's first axis [m]."""
-OUTWARDS, STRETCHED = math.radians(40.0), 0.03
-"""Tilt of a hand that reaches out for the cube, with which inverse kinematics comes closest near full stretch [rad],
-and how far short of full stretch it stops [m]: beyond it the arm is singular and creeps."""
+PULL_END_DISTANCE = 0.60
+"""Distance from the robot's first axis to which the cube is drawn, if the handle is short enough [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ToolRetrieve(Scenario):
-    """A cube near the far edge of the table, and an L hook at the robot's side."""
+    """A cube near the far edge of the table, and a hook at the robot's side."""
 
     HOLD = 0.3
 
     distance: float = param(0.925, "m", 0.5, 1.1)
-    """From the robot's first axis to the cube's centre, along the table."""
+    """Distance from the robot's first axis to the cube's centre, along the table."""
     bearing: float = param(0.0, "deg", -60.0, 60.0)
     """Direction from the robot's first axis to the cube; 0 is straight ahead."""
     cube_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
     hook_x: float = param(-0.05, "m", -0.4, 0.4)
     hook_y: float = param(-0.18, "m", -0.4, 0.4)
     hook_yaw: float = param(0.0, "deg", -90.0, 90.0, period=360.0)
-    """0: the handle points away from the robot, its end towards it."""
+    """Yaw of the hook; at 0 the handle points away from the robot, with its end towards the robot."""
     cube: Cube = Cube()
-    kind: int = param(L, "0 = L, 1 = J, 2 = T", L, T)
-    """What the hook is bent into. All have handle, cross section, mass and friction of `hook`."""
+    kind: int = param(L_HOOK, "0 = L, 1 = J, 2 = T", L_HOOK, T_HOOK)
+    """Kind of the hook. All kinds have handle, cross section, mass and friction of `hook`."""
     hook: LHook = LHook()
 
     # --- scene ----------------------------------------------------------------------------
@@ -90,7 +91,7 @@ class ToolRetrieve(Scenario):
 
     def success(self, world: World) -> bool:
         raised = world.com("cube")[2] - TABLE_TOP - self.half
-        return raised >= LIFTED and held(world, "cube") and "hook" not in world.touching_bodies(ROBOT)
+        return raised >= MIN_LIFT and held(world, "cube") and "hook" not in world.touching_bodies(ROBOT)
 
     def failure(self, world: World) -> str | None:
         return "the cube fell off the table" if fallen(world, "cube") else None
@@ -98,23 +99,23 @@ class ToolRetrieve(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Fetch the hook, draw the cube in, put the hook down beside it, take the cube."""
+        """Fetch the hook, draw the cube in, put the hook down beside it, grasp and lift the cube."""
         yield from self.take_hook(world)
         yield from self.draw_in(world)
         yield from put_down(world.arm, self.tool, "hook")
         yield from self.lift_cube(world)
 
     def take_hook(self, world: World) -> Plan:
-        """Grasp the handle."""
+        """Grasp the hook by its handle."""
         yield from take_handle(world.arm, self.tool, "hook", self.stretch)
 
     def draw_in(self, world: World, mirror: float = 1.0) -> Plan:
-        """Put the tip behind the cube and pull; with `mirror` = -1 the tip ends up behind nothing."""
-        to = max(DRAWN_TO, nearest_pull(self.stretch) - self.half)
-        yield from pull(world.arm, self.tool, "hook", "cube", self.half, to, mirror)
+        """Put the tip behind the cube and pull; with `mirror` = -1 the tip passes the cube on the wrong side."""
+        end = max(PULL_END_DISTANCE, nearest_pull(self.stretch) - self.half)
+        yield from pull(world.arm, self.tool, "hook", "cube", self.half, end, mirror)
 
     def lift_cube(self, world: World) -> Plan:
-        """Grasp the cube across the faces that need the least turn of the hand."""
+        """Grasp the cube across the faces for which the hand turns least, and lift it."""
         closing = world.arm.hand_rot[:, 0]
         faces = max(world.rot("cube")[:, :2].T, key=lambda normal: abs(float(normal @ closing)))
         yield from pick(world.arm, world.com("cube"), closing=faces)
@@ -122,26 +123,30 @@ class ToolRetrieve(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """A T has no side to be turned away."""
+        """Plans that skip a step; a T has a tip on either side, so none can be turned away."""
         return {
             "reach_for_the_cube": Shortcut(self._reach),
-            **({"pull_with_the_tip_turned_away": Shortcut(self._pull_past)} if self.kind != T else {}),
+            **({"pull_with_the_tip_turned_away": Shortcut(self._pull_past)} if self.kind != T_HOOK else {}),
             "pick_the_cube_with_the_hook": Shortcut(self._pick_with_hook),
             "grasp_the_cube_with_the_hook_in_the_jaw": Shortcut(self._grasp_with_hook),
         }
 
     def _reach(self, world: World) -> Plan:
-        """Stretch the arm towards the cube as far as it goes, hand tilted outwards, close, lift."""
+        """Stretch the arm towards the cube, hand tilted outwards, close, lift.
+
+        With the tilt of 40 deg inverse kinematics comes closest near full stretch. The hand stops 3 cm short of full
+        stretch, beyond which the arm is singular and creeps.
+        """
         out = (world.com("cube") - SHOULDER) / np.linalg.norm(world.com("cube") - SHOULDER)
-        tilted = about_z(polar(world.com("cube") - BASE)[0]) @ about_y(-OUTWARDS) @ facing_down()
-        nearest = SHOULDER + (REACH - STRETCHED) * out
+        tilted = about_z(polar(world.com("cube") - BASE)[0]) @ about_y(-math.radians(40.0)) @ facing_down()
+        nearest = SHOULDER + (REACH - 0.03) * out
         yield from go_to(world.arm, nearest - 0.1 * out + 0.05 * UP, tilted, COARSE, OPEN)
         yield from go_to(world.arm, nearest, tilted)
         yield from grasp(world.arm)
         yield from go_to(world.arm, nearest - 0.1 * out + 0.1 * UP, pace=COARSE)
 
     def _pull_past(self, world: World) -> Plan:
-        """Draw with the handle on the wrong side of the cube, then reach for where the cube still is."""
+        """Draw with the handle on the wrong side of the cube, then reach for the cube, which has not moved."""
         yield from self.take_hook(world)
         yield from self.draw_in(world, mirror=-1.0)
         yield from put_down(world.arm, self.tool, "hook")
@@ -155,7 +160,7 @@ class ToolRetrieve(Scenario):
         yield from release(world.arm)
 
     def _grasp_with_hook(self, world: World) -> Plan:
-        """Draw the cube in, bring the hand down on it with the hook still in the jaw, close, lift, let go."""
+        """Draw the cube in, come down on it with the hook still in the jaw, close, lift, let go."""
         yield from self.take_hook(world)
         yield from self.draw_in(world)
         yield from retreat(world.arm, 0.08)
@@ -167,7 +172,7 @@ class ToolRetrieve(Scenario):
         yield from release(arm)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
-        """Without the hook nothing reaches the cube; without its tip nothing pulls it."""
+        """Remove the hook, so that nothing reaches the cube; remove its tip, so that nothing pulls the cube."""
         bare, straight = self.build(), self.build()
         bare.delete(bare.body("hook"))
         for i in range(1, len(self.tool.bars)):
@@ -182,15 +187,16 @@ class ToolRetrieve(Scenario):
         yield on_table("the cube", corners(self.spot, math.radians(self.cube_yaw), self.cube.size))
         gap, hand_at = self.out_of_touch, self._behind - self.stretch
         yield require(gap > 0, "the arm may touch the cube without the hook", gap=gap, reach=ik.GRIPPER_REACH)
-        yield require(hand_at <= ARM, "the hook is too short", hand_at=hand_at, arm=ARM)
+        yield require(hand_at <= MAX_DISTANCE, "the hook is too short", hand_at=hand_at, arm=MAX_DISTANCE)
         both, tip = self.cube.edge + self.hook.width, self.hook.tip
         yield require(both > OPENING, "the jaw can hold hook and cube together", both=both, jaw=OPENING)
         yield require(tip >= self.half, "the tip ends before the cube's middle", tip=tip, half=self.half)
         _, away = polar(at + turn @ [self.tool.inside - self.stretch, 0.0, 0.0] - BASE)
-        yield require(away <= ARM, "the handle is out of reach", distance=away, arm=ARM)
+        yield require(away <= MAX_DISTANCE, "the handle is out of reach", distance=away, arm=MAX_DISTANCE)
 
     def features(self) -> Mapping[str, float]:
-        """How far out of touch the cube is [m], as a share of the handle too, and how far the tip reaches past it."""
+        """Distance of the cube from the gripper's reach [m], the same over the handle, length of the tip over the
+        edge."""
         return {
             "out_of_touch": self.out_of_touch,
             "shortfall_over_handle": self.out_of_touch / self.hook.length,
@@ -201,20 +207,29 @@ class ToolRetrieve(Scenario):
 
     @property
     def spot(self) -> Vec3:
-        """Where the centre of the cube's foot stands [m]."""
+        """Initial position of the cube's foot [m]."""
         away = self.distance * heading(self.bearing)
         return np.array([BASE[0] + away[0], BASE[1] + away[1], TABLE_TOP])
 
     @property
     def tool(self) -> Hook:
-        """The hook, bent into its kind at the end of the handle."""
+        """Hook of its kind, with the handle of `hook`."""
         hook = self.hook
-        body = {"width": hook.width, "height": hook.height, "mass": hook.mass, "friction": hook.friction}
-        if self.kind == J:
-            radius = (hook.tip + WIDER + hook.width) / 2
-            return JHook(length=hook.length - hook.width, radius=radius, mirrored=hook.mirrored, **body)
-        if self.kind == T:
-            return THook(length=hook.length, tip=hook.tip, **body)
+        width, height, mass, friction = hook.width, hook.height, hook.mass, hook.friction
+        if self.kind == J_HOOK:
+            # the opening is 22 mm wider than the tip of an L is long: the cube lies in it instead of at it
+            length, radius = hook.length - hook.width, (hook.tip + 0.022 + hook.width) / 2
+            return JHook(
+                length=length,
+                radius=radius,
+                mirrored=hook.mirrored,
+                width=width,
+                height=height,
+                mass=mass,
+                friction=friction,
+            )
+        if self.kind == T_HOOK:
+            return THook(length=hook.length, tip=hook.tip, width=width, height=height, mass=mass, friction=friction)
         return hook
 
     @property
@@ -224,16 +239,17 @@ class ToolRetrieve(Scenario):
 
     @property
     def out_of_touch(self) -> float:
-        """How far at least any point of the gripper stays away from the cube [m]; not positive if it may touch."""
+        """Least distance of the gripper from the cube in any posture [m]; not positive if it may touch."""
         turn = about_z(math.radians(self.cube_yaw))
         return ik.box_shortfall(self.spot + self.half * UP, turn, self.half, ik.GRIPPER_REACH)
 
     @property
     def stretch(self) -> float:
-        """Distance from where the handle is held to the face that pulls [m]."""
+        """Distance from the grip on the handle to the face that pulls [m]."""
         return shortest_stretch(self.tool, self._behind)
 
     @property
     def _behind(self) -> float:
-        """How far out the face that pulls is when it has passed the cube, whichever way the cube is turned [m]."""
+        """Distance from the robot's first axis at which the pulling face is behind the cube, for any yaw of the cube
+        [m]."""
         return self.distance + self.half * math.sqrt(2) + HOOK_CLEARANCE + self.tool.depth

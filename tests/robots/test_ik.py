@@ -12,7 +12,7 @@ from scengen import load_task
 from scengen.geometry import UP, about_y, about_z, between
 from scengen.robots import ik, panda
 from scengen.skills.motion import facing_down
-from scengen.tasks.tool_retrieve import ARM, ToolRetrieve
+from scengen.tasks.tool_retrieve import MAX_DISTANCE, ToolRetrieve
 
 NAMES = panda.Names()
 LIMITS = [(-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698)]
@@ -88,7 +88,7 @@ def test_residual_and_turn_are_those_of_the_posture_that_is_returned_and_it_keep
     assert (low <= nearest.angles).all() and (nearest.angles <= high).all()
 
 
-@pytest.mark.parametrize(("away", "reached"), [(ARM, True), (0.76, True), (0.80, False)])
+@pytest.mark.parametrize(("away", "reached"), [(MAX_DISTANCE, True), (0.76, True), (0.80, False)])
 def test_a_hand_that_points_down_reaches_760_mm_and_not_800_mm(away, reached):
     place = panda.BASE + np.array([away, 0, -0.092])
     nearest = ik.reach(place, facing_down())

@@ -38,7 +38,7 @@ RINGS = {
     "take a block": (indirect_push.MIN_DISTANCE, indirect_push.MAX_DISTANCE),
     "take what has fallen": (stack_collapse_recovery.MIN_DISTANCE, stack_collapse_recovery.MAX_DISTANCE),
     "meet a ball": (launched_ball.MIN_DISTANCE, launched_ball.MAX_DISTANCE),
-    "grasp a hook": (hook.MIN_HAND_DISTANCE, tool_retrieve.ARM),
+    "grasp a hook": (hook.MIN_HAND_DISTANCE, tool_retrieve.MAX_DISTANCE),
 }
 """Nearest and farthest distance from the first axis at which a hand points down [m]."""
 
@@ -77,7 +77,7 @@ def test_a_hand_that_points_down_keeps_its_margin_between_the_stated_distances(m
 
 
 def test_a_grasp_from_above_ends_where_inverse_kinematics_is_said_to():
-    """`tool_retrieve.ARM`: 0.76 m is allowed, with nothing to spare."""
+    """`tool_retrieve.MAX_DISTANCE`: 0.76 m is allowed, with nothing to spare."""
     assert down(0.76, 0.0, spare=0.0) < 1e-3 < down(0.80, 0.0, spare=0.0)
 
 

@@ -22,7 +22,7 @@ from scengen.params import with_values
 from scengen.physics import GRAVITY
 from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW, pinch
 from scengen.sim.world import ROBOT
-from scengen.tasks.cup_extract import AIR, TAPER, CupExtract
+from scengen.tasks.cup_extract import FINGER_TAPER, MIN_CLEARANCE, CupExtract
 
 TASK = load_task("cup_extract")
 NOMINAL = CupExtract()
@@ -66,7 +66,7 @@ def test_the_fingers_end_above_the_block_and_the_palm_on_the_rim():
     w = load(TASK, NOMINAL)
     assert play_shortcut(TASK, NOMINAL, "reach_in", w).reason == "everything came to rest without reaching the goal"
     assert not w.touched(ROBOT, "block")
-    assert NOMINAL.cup.height - NOMINAL.cup.floor - NOMINAL.block.height > PALM_ABOVE + TIP_BELOW + AIR
+    assert NOMINAL.cup.height - NOMINAL.cup.floor - NOMINAL.block.height > PALM_ABOVE + TIP_BELOW + MIN_CLEARANCE
 
 
 def test_in_a_shallow_cup_the_fingers_would_take_the_block():
@@ -189,7 +189,7 @@ def test_every_refutation_has_its_own_reason():
                 {"cup.height": 0.090},
                 {"block.width": 0.055},
                 {"cup.wall": 0.005, "cup.friction": 0.3},
-                {"cup.friction": TAPER + 0.001, "cup.mass": 0.2},
+                {"cup.friction": FINGER_TAPER + 0.001, "cup.mass": 0.2},
                 {"cup.friction": 0.27, "cup.height": 0.14, "cup.mass": 0.2},
                 {"x": 0.37},
                 {"goal_y": -0.36},

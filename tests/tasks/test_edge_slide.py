@@ -23,7 +23,7 @@ from scengen import load_task
 from scengen.assets.board import Board
 from scengen.assets.prop import TABLE_TOP
 from scengen.sim.world import ROBOT
-from scengen.tasks.edge_slide import LIFTED, LIP, SPARE, EdgeSlide
+from scengen.tasks.edge_slide import MIN_LIFT, MIN_OVERHANG, TIPPING_MARGIN, EdgeSlide
 from scengen.validate.rollout import AT_REST
 
 TASK = load_task("edge_slide")
@@ -139,7 +139,7 @@ def test_its_lowest_corner_must_be_50_mm_above_the_table_whichever_side_is_up(so
         reach = [np.abs(solved.data.geom_xmat[g].reshape(3, 3)[2]) @ solved.model.geom_size[g] for g in geoms]
         return min(solved.data.geom_xpos[g][2] - r for g, r in zip(geoms, reach, strict=True))
 
-    pose[2] += TABLE_TOP + LIFTED - short - lowest()
+    pose[2] += TABLE_TOP + MIN_LIFT - short - lowest()
     mujoco.mj_kinematics(solved.model, solved.data)
     assert NOMINAL.success(solved) == counts
     solved.restore(state)
@@ -163,7 +163,7 @@ class Overhanging(EdgeSlide):
     """To have made a lip is enough."""
 
     def success(self, world):
-        return self.overhang(world) > LIP / 2
+        return self.overhang(world) > MIN_OVERHANG / 2
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_an_invalid_scenario_is_not_certified(scenario, check, says):
 
 
 def test_the_window_closes_where_the_plate_falls_before_it_can_be_pinched():
-    widest = 0.05 - LIP - SPARE
+    widest = 0.05 - MIN_OVERHANG - TIPPING_MARGIN
     for off_centre, opens in ((widest - 0.001, True), (widest + 0.001, False)):
         plate = Board(width=0.10, off_centre=off_centre)
         assert (EdgeSlide(plate=plate).infeasible() is None) == opens

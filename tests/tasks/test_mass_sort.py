@@ -22,7 +22,7 @@ from scengen.attack.priors import fit
 from scengen.params import parameters
 from scengen.sim.world import IDLE
 from scengen.skills import jaw
-from scengen.tasks.mass_sort import APART, ORDERS, MassSort, Spot
+from scengen.tasks.mass_sort import MIN_MASS_DIFFERENCE, ORDERS, MassSort, Spot
 from scengen.validate.rebuilt import world_of
 
 TASK = load_task("mass_sort")
@@ -181,4 +181,4 @@ def test_a_scene_in_the_order_in_which_the_cubes_lie_would_be_solved_blindly():
 
 
 def test_masses_that_are_refuted_as_too_near_differ_by_less_than_ten_errors_of_a_weighing():
-    assert 9.81 * APART > 0.02 * 9.81 * SCENE.light * 10
+    assert 9.81 * MIN_MASS_DIFFERENCE > 0.02 * 9.81 * SCENE.light * 10

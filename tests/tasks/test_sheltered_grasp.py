@@ -24,7 +24,7 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.assets.rack import TierRack
 from scengen.robots.jaw import PALM_ACROSS, PALM_ALONG
 from scengen.sim.world import ROBOT, World
-from scengen.tasks.sheltered_grasp import AIR, AT, RAISED, TRAY, ShelteredGrasp
+from scengen.tasks.sheltered_grasp import GRIP_HEIGHT, LIFT_HEIGHT, MIN_CLEARANCE, TRAY, ShelteredGrasp
 
 TASK = load_task("sheltered_grasp")
 NOMINAL = ShelteredGrasp()
@@ -208,10 +208,10 @@ def test_an_invalid_scenario_is_not_certified(scenario, check, says):
 
 
 def test_a_storey_must_admit_the_palm_by_its_own_numbers():
-    least = AT + PALM_ACROSS + AIR + RAISED
+    least = GRIP_HEIGHT + PALM_ACROSS + MIN_CLEARANCE + LIFT_HEIGHT
     assert ShelteredGrasp(rack=TierRack(height=least + 1e-4)).infeasible() is None
     assert ShelteredGrasp(rack=TierRack(height=least - 1e-4)).infeasible() is not None
-    narrow = 2 * (PALM_ALONG + AIR + NOMINAL.along)
+    narrow = 2 * (PALM_ALONG + MIN_CLEARANCE + NOMINAL.along)
     assert ShelteredGrasp(rack=TierRack(width=narrow + 1e-4)).infeasible() is None
     assert ShelteredGrasp(rack=TierRack(width=narrow - 1e-4)).infeasible() is not None
 

@@ -28,7 +28,7 @@ from scengen.params import with_values
 from scengen.robots.panda import BASE
 from scengen.sim.world import ROBOT
 from scengen.skills.hook import nearest_pull, put_down, slide
-from scengen.tasks.tool_retrieve import ARM, DRAWN_TO, LIFTED, ToolRetrieve
+from scengen.tasks.tool_retrieve import MAX_DISTANCE, MIN_LIFT, PULL_END_DISTANCE, ToolRetrieve
 
 TASK = load_task("tool_retrieve")
 NOMINAL = ToolRetrieve()
@@ -48,7 +48,7 @@ def solved():
 
 
 def test_the_cube_is_drawn_from_beyond_the_arm_to_within_it(solved):
-    assert away(NOMINAL.spot) > 0.9 and away(solved.com("cube")) < ARM
+    assert away(NOMINAL.spot) > 0.9 and away(solved.com("cube")) < MAX_DISTANCE
 
 
 def test_without_the_hook_the_cube_stays_and_without_its_tip_it_is_not_lifted():
@@ -74,7 +74,7 @@ def test_a_tip_that_is_turned_away_passes_by_the_cube():
 def test_whoever_keeps_the_hook_has_the_cube_within_reach_and_cannot_take_it(name):
     w = load(TASK, NOMINAL)
     assert play_shortcut(TASK, NOMINAL, name, w).outcome == "timeout"
-    assert away(w.com("cube")) < ARM and w.com("cube")[2] < TABLE_TOP + NOMINAL.half + LIFTED
+    assert away(w.com("cube")) < MAX_DISTANCE and w.com("cube")[2] < TABLE_TOP + NOMINAL.half + MIN_LIFT
 
 
 @pytest.mark.parametrize("split", ["bent_hook", "double_hook"])
@@ -102,7 +102,7 @@ def sweep(scenario, world):
     """Take the hook, sweep it along the far edge, draw it in: blind to the cube, until it is lifted."""
     yield from scenario.take_hook(world)
     across = [(bearing, 1.0, 0.03) for bearing in np.linspace(-22.0, 18.0, 8)]
-    nearest = max(DRAWN_TO, nearest_pull(scenario.stretch))
+    nearest = max(PULL_END_DISTANCE, nearest_pull(scenario.stretch))
     for bearing, inside, beside in ((-22.0, 0.8, 0.15), (-22.0, 1.0, 0.15), *across, (18.0, nearest, 0.03)):
         yield from slide(world.arm, scenario.hook, "hook", math.radians(bearing), inside, beside)
     yield from put_down(world.arm, scenario.hook, "hook")
@@ -166,7 +166,7 @@ class Drawn(ToolRetrieve):
     """To have the cube within reach is enough."""
 
     def success(self, world):
-        return away(world.com("cube")) < ARM
+        return away(world.com("cube")) < MAX_DISTANCE
 
 
 @pytest.mark.parametrize(
