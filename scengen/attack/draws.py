@@ -120,6 +120,7 @@ _MAKERS = {
     "throw": _throw,
     "wait": _wait,
 }
+"""The function that draws each kind of macro."""
 
 
 def _arm(player: Player, key: Key) -> Arm:

@@ -12,6 +12,7 @@ from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ABOVE, SPAN
 from ..sim.world import Arm, World
 
 TABLE = "table"
+"""Name of the body of the table."""
 MAX_PARTS = 6
 """Maximum number of geoms of one body that are considered, the largest ones: a curved floor consists of dozens."""
 MIN_HALF_LENGTH = 0.008

@@ -158,7 +158,8 @@ def two_arms(repeats: int) -> dict[str, float]:
         return steps
 
     alone, both, raw = play(one, single), play(two, double), _bare(two, double)
-    alone(), both()  # warm
+    alone()  # the first calls warm up
+    both()
     found = [(_seconds(both), _seconds(alone), _seconds(raw)) for _ in range(repeats)]
     return {
         "two_arms_to_raw": statistics.median(pair / bare for pair, _, bare in found),

@@ -43,6 +43,11 @@ class AxisSettings:
         given = getattr(self, name)
         return self.n if given is None else given
 
+    @property
+    def memory_trials(self) -> behaviour.MemoryTrials:
+        """Trials of the memories."""
+        return behaviour.MemoryTrials(self.n, self.count("any_n"), self.seed, self.workers)
+
 
 @dataclass(frozen=True)
 class AxisCard:

@@ -38,22 +38,26 @@ def make_axis_card(
     """
     evidence = features.sampled(task, settings.axis)  # first: it takes no rollouts, and may find no feasible index
     made = _certified(task, certify_settings, settings, folder, progress)
+    card = _card(task, settings, evidence, made, folder, progress)
+    write(folder / "card.json", json.dumps(card.plain(), indent=1) + "\n")
+    return card, write_page(task, card, made.pool if made else None, settings.seed, folder / "card.html")
+
+
+def _card(
+    task: Task,
+    settings: AxisSettings,
+    evidence: features.Evidence,
+    made: generate.Summary | None,
+    folder: Path,
+    progress: Callable[[str, int, int], None],
+) -> AxisCard:
+    """The card: evidence on features, certified scenarios, and what else is measured for it."""
     controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
-    baselines, oracle = behaviour.measure(
-        task,
-        settings.axis,
-        folder,
-        controls,
-        settings.n,
-        settings.count("any_n"),
-        settings.seed,
-        settings.workers,
-        progress,
-    )
+    baselines, oracle = behaviour.measure(task, settings.axis, folder, controls, settings.memory_trials, progress)
     boundaries, why_no_path = _boundaries(task, settings, folder, progress)
     energy, energy_of_parameters = _energies(task, settings)
     axis = task.axes[settings.axis]
-    card = AxisCard(
+    return AxisCard(
         task=task.name,
         axis=settings.axis,
         why=axis.why,
@@ -73,8 +77,6 @@ def make_axis_card(
         energy=energy,
         energy_of_parameters=energy_of_parameters,
     )
-    write(folder / "card.json", json.dumps(card.plain(), indent=1) + "\n")
-    return card, write_page(task, card, made.pool if made else None, settings.seed, folder / "card.html")
 
 
 def _certified(

@@ -90,15 +90,24 @@ def verdict(baselines: Iterable[Baseline]) -> str:
     return SOLVED_BY_MEMORY if solved else INCONCLUSIVE
 
 
+@dataclass(frozen=True)
+class MemoryTrials:
+    """The trials of the memories on one split."""
+
+    n: int
+    """Number of twins. A twin whose training scenario the oracle does not solve has no memory and is left out."""
+    any_n: int
+    """Number of twins that are also tried with all memories of the library: `2 * LIBRARY_SIZE` rollouts each."""
+    seed: int = 0
+    workers: Workers = 1
+
+
 def measure(
     task: Task,
     split: str,
     folder: Path,
     controls: Path,
-    n: int,
-    any_n: int,
-    seed: int = 0,
-    workers: Workers = 1,
+    trials: MemoryTrials,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> tuple[list[Baseline], Rate | None]:
     """Play all memories on the first twins of a split, continuing the runs in both folders.
@@ -106,13 +115,12 @@ def measure(
     Args:
         folder: folder of the outcomes in OOD twins.
         controls: folder of the outcomes in training scenarios, which all axes of a task share.
-        n: number of twins. A twin whose training scenario the oracle does not solve has no memory and is left out.
-        any_n: number of twins that are also tried with all memories of the library: `2 * LIBRARY_SIZE` rollouts each.
         progress: called with the name of the step, the number of twins done, and their total.
 
     Returns:
         The baselines in the order of `BASELINES`, and the oracle's success rate on the split.
     """
+    n, any_n, seed = trials.n, trials.any_n, trials.seed
 
     def play(work: Callable[..., dict], where: Path, which: str, count: int, what: str, library: bool) -> list[dict]:
         shifts = {name: str(dist) for name, dist in task.shifts(which).items()}
@@ -122,7 +130,7 @@ def measure(
             todo = sorted(set(range(count)) - {r["index"] for r in log.records})
             if todo and library:
                 _library(task, seed)  # before the workers: they are copies of this process
-            for record in each(partial(work, task, which, seed), todo, workers, TWIN_LIMITS, _lost):
+            for record in each(partial(work, task, which, seed), todo, trials.workers, TWIN_LIMITS, _lost):
                 log.add(record)
                 progress(what, len(log.records), count)
             return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])

@@ -8,7 +8,7 @@ import pytest
 
 from scengen import cli, load_task
 from scengen.ood import behaviour, features
-from scengen.ood.behaviour import INCONCLUSIVE, SOLVED_BY_MEMORY, Baseline, measure, verdict
+from scengen.ood.behaviour import INCONCLUSIVE, SOLVED_BY_MEMORY, Baseline, MemoryTrials, measure, verdict
 from scengen.ood.solution_memory import remember
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
@@ -73,21 +73,21 @@ def test_the_cuts_of_a_memory_are_where_the_hand_turns_to_another_body():
 
 @pytest.mark.slow
 def test_a_stout_first_tile_breaks_replay_and_a_light_one_does_not(tmp_path):
-    baselines, oracle = measure(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, 4, 0)
+    baselines, oracle = measure(TASK, "stout_starter", tmp_path / "stout", tmp_path / ID, MemoryTrials(4, 0))
     assert oracle.value == 1.0 and (baselines[0].training.value, baselines[0].here.value) == (1.0, 0.0)
     assert [r.finding for r in baselines if r.name.startswith("any")] == ["not tried", "not tried"]
-    baselines, _ = measure(TASK, "light_tiles", tmp_path / "light", tmp_path / ID, 2, 1)
+    baselines, _ = measure(TASK, "light_tiles", tmp_path / "light", tmp_path / ID, MemoryTrials(2, 1))
     assert baselines[0].here.value == 1.0 and {r.name: r.excess.twins for r in baselines}["any_object_centric"] == 1
 
 
 def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
-    first = measure(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0)
+    first = measure(TASK, "light_tiles", tmp_path, tmp_path / ID, MemoryTrials(1, 0))
 
     def never(*_):
         raise AssertionError
 
     monkeypatch.setattr(behaviour, "_library", never)
-    assert measure(TASK, "light_tiles", tmp_path, tmp_path / ID, 1, 0) == first
+    assert measure(TASK, "light_tiles", tmp_path, tmp_path / ID, MemoryTrials(1, 0)) == first
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
         (("axis=diagonal", "n=1"), "n = 1; it must be at least 2"),
         (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be from 0 to n = 50"),
         (("axis=diagonal", "n=10", "certify_n=20"), "certify_n = 20; it must be from 0 to n = 10"),
-        ((), "axis needs axis=..."),
+        ((), "probe needs axis=..."),
     ],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
