@@ -15,7 +15,7 @@ from .settings import read
 
 def command(arguments: Arguments) -> int:
     settings = read("record", arguments, RecordSettings)
-    parts = _apart(settings)
+    parts = _split_up(settings)
     if len(parts) > 1:
         say(f"{len(parts)} recordings, one for each {_kind(settings)}: {', '.join(parts)}")
     statuses = []
@@ -27,12 +27,12 @@ def command(arguments: Arguments) -> int:
 
 
 def _kind(settings: RecordSettings) -> str:
-    """What all scenarios of a recording share: a data set has one robot, a file of robomimic one environment."""
+    """Property that all scenarios of a recording share: a data set has one robot, a robomimic file one environment."""
     return "task" if settings.format == ROBOMIMIC else "embodiment"
 
 
-def _apart(settings: RecordSettings) -> Mapping[str, RecordSettings]:
-    """The recordings to make, each below `to` if they are more than one."""
+def _split_up(settings: RecordSettings) -> Mapping[str, RecordSettings]:
+    """The recordings to make by the shared property, below `to` if there are multiple."""
     found: dict[str, list[str]] = defaultdict(list)
     for folder in settings.folders:
         for value in Pool.open(folder).kinds(_kind(settings))[0] or [""]:
@@ -46,7 +46,11 @@ def _apart(settings: RecordSettings) -> Mapping[str, RecordSettings]:
 
 
 def _record(settings: RecordSettings, arguments: Arguments) -> int:
-    """Make one recording, and tell of it."""
+    """Make one recording, and print its summary.
+
+    Returns:
+        Exit status.
+    """
     with ProgressBar(err, f"record to {settings.to}", 0, settings.workers) as progress_bar:
         try:
             summary = record(settings, progress_bar.of, search_path(arguments))
@@ -54,12 +58,12 @@ def _record(settings: RecordSettings, arguments: Arguments) -> int:
             warn(f"scengen: interrupted; nothing was written to {settings.to}")
             return INTERRUPTED
     say(
-        f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} a second, "
-        f"{len(settings.eyes)} cameras to {settings.to}"
+        f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} per second, "
+        f"{len(settings.camera_names)} cameras to {settings.to}"
     )
     called = names(map(Pool.open, settings.folders), [*summary.failed, *summary.lost])
     for scenario in summary.failed:
         warn(f"FAILED {called[scenario]}: the witness does not reach the goal here; its episode has success = false")
     for scenario, why in summary.lost.items():
-        warn(f"UNKNOWN {called[scenario]}: {why}; it was left out")
+        warn(f"UNKNOWN {called[scenario]}: {why}; it is left out")
     return FAILED if summary.failed or summary.lost else OK

@@ -1,4 +1,4 @@
-"""Where a camera stands and how it maps space to pixels."""
+"""Calibration of cameras: intrinsics and extrinsics."""
 
 from typing import Any
 
@@ -11,18 +11,19 @@ from ..robots import panda
 from ..sim.world import World
 
 WORLD = "world"
-"""The frame in which extrinsics are given; for a camera on a hand that of `robot0_eef_pos` and `robot0_eef_quat`, which
-is called `robot0_eef`, or the same of `robot1`."""
+"""Frame of extrinsics. For a camera on a hand it is `robot0_eef`, the frame of `robot0_eef_pos` and `robot0_eef_quat`,
+or likewise `robot1_eef`."""
 TO_OPENCV = np.diag([1.0, -1.0, -1.0])
-"""MuJoCo's cameras look along -z with y up; OpenCV's, which vision tools expect, along z with y down."""
+"""Rotation from OpenCV's camera axes to MuJoCo's. MuJoCo's cameras look along -z with y up; OpenCV's, which vision
+tools expect, along z with y down."""
 
 
 def calibration(world: World, name: str, width: int, height: int, orientation: Orientation = UPRIGHT) -> dict[str, Any]:
     """Intrinsics and extrinsics of a camera, rounded to a micrometre, as plain data.
 
-    `intrinsics` is the 3 x 3 matrix K in pixels; the middle of the first pixel lies at (0.5, 0.5). `extrinsics` is the
-    4 x 4 matrix that takes points from the camera's frame (x right, y down, z ahead) to `frame` [m]. Where pictures are
-    turned or mirrored, K takes points to the pixels in which they are seen: the camera stands where it stood.
+    `intrinsics` is the 3 x 3 matrix K in pixels; the middle of the first pixel is (0.5, 0.5). `extrinsics` is the 4 x 4
+    matrix that maps points from the camera's frame (x right, y down, z ahead) to `frame` [m]. If pictures are turned or
+    mirrored, K maps points to the pixels of the turned picture, and the extrinsics do not change.
     """
     model, data = world.model, world.data
     mujoco.mj_camlight(model, data)  # the control loop leaves cameras one physics step behind

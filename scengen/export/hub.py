@@ -131,7 +131,15 @@ class DatasetCard:
         pools = self.pools
         tallies = [Tally.of(one for (one,) in published.pool.columns("certificate")) for published in pools]
         overview = [
-            [f"`{p.name}`", p.split, len(p.pool), p.pool.manifest.funnel["proposed"], p.settings, tally.robust, p.verified]
+            [
+                f"`{p.name}`",
+                p.split,
+                len(p.pool),
+                p.pool.manifest.funnel["proposed"],
+                p.settings,
+                tally.robust,
+                p.verified,
+            ]
             for p, tally in zip(pools, tallies, strict=True)
         ]
         checks = [

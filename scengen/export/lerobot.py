@@ -1,15 +1,15 @@
-"""A LeRobot data set, format v3.0, written with pyarrow and PyAV alone.
+"""A LeRobot data set, format v3.0, written with pyarrow and PyAV only.
 
-    meta/info.json                          what the columns are, and how many episodes and rows there are
+    meta/info.json                          columns, and numbers of episodes and rows
     meta/stats.json                         statistics of every column
     meta/tasks.parquet                      instructions
-    meta/episodes/chunk-000/file-000.parquet   one row an episode: which rows and frames are its own, and what it shows
-    meta/cameras/<camera>.json              intrinsics and extrinsics; not LeRobot's, the paper's
-    data/chunk-000/file-000.parquet         the rows of many episodes
-    videos/<key>/chunk-000/file-000.mp4     their pictures, one frame a row
+    meta/episodes/chunk-000/file-000.parquet   one row per episode: its rows, its frames, and its scenario
+    meta/cameras/<camera>.json              intrinsics and extrinsics; an addition of the paper's to LeRobot's format
+    data/chunk-000/file-000.parquet         rows of many episodes
+    videos/<key>/chunk-000/file-000.mp4     their pictures, one frame per row
 
-A video holds many episodes; an episode's frames begin at its `from_timestamp`. Files are closed at LeRobot's usual
-sizes, after the episode in which they reach them.
+A video holds many episodes; the frames of an episode begin at its `from_timestamp`. A file ends after the episode in
+which it reaches LeRobot's usual size.
 """
 
 import json
@@ -30,59 +30,69 @@ from ..pictures.video import CODEC, PIXELS, Movie
 from .stats import Shades, Stats, describe
 
 VERSION = "v3.0"
-FILES = 1000
-"""Files in a folder "chunk-..."."""
-DATA_SIZE, VIDEO_SIZE = 100, 200
-"""A file is full at this size [MiB]."""
-FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-DATA, VIDEO, EPISODES = f"data/{FILE}.parquet", f"videos/{{video_key}}/{FILE}.mp4", f"meta/episodes/{FILE}.parquet"
-KEY_EVERY = 2
-"""Every second frame is stored whole, as LeRobot does, so that training reaches single frames quickly."""
-IMAGES = "observation.images."
-"""What LeRobot puts before a camera's name."""
+"""Version of LeRobot's format."""
+FILES_PER_CHUNK = 1000
+"""Largest number of files in a folder "chunk-..."."""
+DATA_FILE_SIZE = 100
+"""Size at which a file of rows is full [MiB]."""
+VIDEO_FILE_SIZE = 200
+"""Size at which a video file is full [MiB]."""
+FILE_PATH = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+"""Pattern of the paths of all files, without prefix and ending."""
+DATA_PATH = f"data/{FILE_PATH}.parquet"
+"""Pattern of the paths of files of rows."""
+VIDEO_PATH = f"videos/{{video_key}}/{FILE_PATH}.mp4"
+"""Pattern of the paths of videos."""
+EPISODES_PATH = f"meta/episodes/{FILE_PATH}.parquet"
+"""Pattern of the paths of tables of episodes."""
+KEYFRAME_INTERVAL = 2
+"""Number of frames per keyframe, as in LeRobot, so that training reaches single frames quickly."""
+IMAGES_PREFIX = "observation.images."
+"""LeRobot's prefix of the names of cameras."""
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A column: its element type and shape; () for a number."""
+    """A column: its element type and its shape, () for a number."""
 
     dtype: str
     shape: tuple[int, ...] = ()
     names: tuple[str, ...] | None = None
-    """What each entry of a vector is; of a grid, what its axes are."""
+    """Names of the entries of a vector, or of the axes of a grid."""
 
     def arrow(self) -> pa.DataType:
-        """The type that Hugging Face's `datasets` expects: lists of known length, and plain lists for grids."""
+        """The Arrow type that Hugging Face's `datasets` expects: lists of fixed length, and plain lists for grids."""
         kind = pa.from_numpy_dtype(np.dtype(self.dtype))
         if len(self.shape) == 1:
             return pa.list_(kind, self.shape[0])
         return pa.list_(pa.list_(kind)) if self.shape else kind
 
     def datasets(self) -> dict[str, Any]:
-        """The same in the words of `datasets`."""
+        """The column in the format of `datasets`."""
         value = {"dtype": self.dtype, "_type": "Value"}
         if len(self.shape) == 1:
             return {"feature": value, "length": self.shape[0], "_type": "Sequence"}
         return {"shape": list(self.shape), "dtype": self.dtype, "_type": "Array2D"} if self.shape else value
 
     def info(self) -> dict[str, Any]:
-        """The same in the words of LeRobot, which calls a number a list of one."""
+        """The column in LeRobot's format, in which a number has the shape (1,)."""
         names = None if self.names is None else list(self.names)
         return {"dtype": self.dtype, "shape": list(self.shape or (1,)), "names": names}
 
 
-OWN = {
+INDEX_FEATURES = {
     "timestamp": Feature("float32"),
     "frame_index": Feature("int64"),
     "episode_index": Feature("int64"),
     "index": Feature("int64"),
     "task_index": Feature("int64"),
 }
-"""Columns of every LeRobot data set: time since the episode's start [s], row in the episode, row in the whole ..."""
+"""Columns of every LeRobot data set: time since the episode's start [s], row in the episode, episode, row in the data
+set, instruction."""
 
 
-class DataSet:
-    """A data set that is being written."""
+class DatasetWriter:
+    """A LeRobot data set that is being written."""
 
     def __init__(
         self,
@@ -96,14 +106,16 @@ class DataSet:
         """Begin in an empty folder.
 
         Args:
-            features: columns besides `OWN`.
-            cameras: names of cameras, each of which gives one picture a row.
+            features: columns besides `INDEX_FEATURES`.
+            cameras: names of cameras; each gives one picture per row.
             size: width and height of the pictures [pixels].
         """
         self.folder, self.fps, self.robot = folder, fps, robot
-        self.features = {**features, **OWN}
+        self.features = {**features, **INDEX_FEATURES}
         self.rows, self.tasks, self._table = 0, dict[str, int](), list[dict[str, Any]]()
-        self._videos = {f"{IMAGES}{name}": _Video(folder, f"{IMAGES}{name}", fps, size) for name in cameras}
+        self._videos = {
+            f"{IMAGES_PREFIX}{name}": _Video(folder, f"{IMAGES_PREFIX}{name}", fps, size) for name in cameras
+        }
         self._size = size
         self._cameras: dict[str, dict[str, Any]] = {}
         self._columns: dict[str, list[Any]] = defaultdict(list)
@@ -115,31 +127,32 @@ class DataSet:
 
     @property
     def episodes(self) -> int:
-        """How many were written so far."""
+        """Number of episodes written so far."""
         return len(self._table)
 
     def calibrate(self, camera: str, calibration: dict[str, Any], scenario: str) -> None:
-        """Say how a camera stands in the next episode, and how its pictures are turned.
+        """Set the calibration of a camera in the next episode.
 
         Raises:
-            BadConfig: that was different before; a data set has one calibration for each camera.
+            BadConfig: it was different before. A data set has one calibration for each camera.
         """
         if self._cameras.setdefault(camera, calibration) != calibration:
             raise BadConfig(
-                f"{camera} stands elsewhere in scenario {scenario} than before it, or is turned; record it by itself"
+                f"{camera} has another pose or orientation in scenario {scenario} than in earlier ones; "
+                "record this scenario separately"
             )
 
     def add(self, values: Mapping[str, Any], pictures: Mapping[str, Picture]) -> None:
-        """Append a row to the present episode."""
+        """Append a row to the current episode."""
         frame = len(self._columns["index"])
         own = (np.float32(frame / self.fps), frame, self.episodes, self.rows + frame)
-        for name, value in {**values, **dict(zip(OWN, own, strict=False))}.items():
+        for name, value in {**values, **dict(zip(INDEX_FEATURES, own, strict=False))}.items():
             self._columns[name].append(value)
         for name, picture in pictures.items():
-            self._videos[f"{IMAGES}{name}"].add(picture)
+            self._videos[f"{IMAGES_PREFIX}{name}"].add(picture)
 
     def end_episode(self, instruction: str, about: Mapping[str, Any]) -> None:
-        """Write the present episode. `about`: further columns in the table of episodes."""
+        """Write the current episode. `about` holds further columns of the table of episodes."""
         task = self.tasks.setdefault(instruction, len(self.tasks))
         length = len(self._columns["index"])
         self._columns["task_index"] = [task] * length
@@ -150,10 +163,10 @@ class DataSet:
             "episode_index": self.episodes,
             "tasks": [instruction],
             "length": length,
-            **_whereabouts("data", self._file),
+            **_file_columns("data", self._file),
             "dataset_from_index": self.rows,
             "dataset_to_index": self.rows + length,
-            **_whereabouts("meta/episodes", 0),
+            **_file_columns("meta/episodes", 0),
             **about,
         }
         self._write(columns)
@@ -165,9 +178,9 @@ class DataSet:
         self.rows += length
 
     def finish(self, source: Mapping[str, Any]) -> None:
-        """Write everything under meta. `source`: where the data came from."""
+        """Write all files under meta. `source` describes the origin of the data."""
         self._close()
-        path = EPISODES.format(chunk_index=0, file_index=0)
+        path = EPISODES_PATH.format(chunk_index=0, file_index=0)
         _write_table(self.folder / path, pa.Table.from_pylist(self._table))
         _write_table(self.folder / "meta" / "tasks.parquet", _task_table(self.tasks))
         for name, calibration in self._cameras.items():
@@ -185,13 +198,13 @@ class DataSet:
         self._close()
 
     def _write(self, columns: Mapping[str, np.ndarray]) -> None:
-        path = self.folder / DATA.format(**_numbers(self._file))
+        path = self.folder / DATA_PATH.format(**_chunk_and_file(self._file))
         if self._writer is None:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._writer = pq.ParquetWriter(path, self._schema)
         arrays = [pa.array(columns[f.name].tolist(), f.type) for f in self._schema]
         self._writer.write_table(pa.table(arrays, schema=self._schema))
-        if path.stat().st_size >= DATA_SIZE * 2**20:
+        if path.stat().st_size >= DATA_FILE_SIZE * 2**20:
             self._writer.close()
             self._file, self._writer = self._file + 1, None
 
@@ -216,13 +229,13 @@ class DataSet:
             "total_episodes": self.episodes,
             "total_frames": self.rows,
             "total_tasks": len(self.tasks),
-            "chunks_size": FILES,
-            "data_files_size_in_mb": DATA_SIZE,
-            "video_files_size_in_mb": VIDEO_SIZE,
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": DATA_FILE_SIZE,
+            "video_files_size_in_mb": VIDEO_FILE_SIZE,
             "fps": self.fps,
             "splits": {"train": f"0:{self.episodes}"},
-            "data_path": DATA,
-            "video_path": VIDEO if self._videos else None,
+            "data_path": DATA_PATH,
+            "video_path": VIDEO_PATH if self._videos else None,
             "features": {name: f.info() for name, f in self.features.items()}
             | {name: self._video_info() for name in self._videos},
         }
@@ -239,7 +252,7 @@ class DataSet:
 
 
 class _Video:
-    """The pictures of one camera, in as many files as their size asks for."""
+    """The pictures of one camera, in files of limited size."""
 
     def __init__(self, folder: Path, key: str, fps: int, size: tuple[int, int]):
         self.folder, self.key, self.fps, self.size = folder, key, fps, size
@@ -249,23 +262,23 @@ class _Video:
 
     def add(self, picture: Picture) -> None:
         if self._movie is None:
-            path = self.folder / VIDEO.format(video_key=self.key, **_numbers(self._file))
-            self._movie, self._first = Movie(path, self.fps, *self.size, key_every=KEY_EVERY), 0
+            path = self.folder / VIDEO_PATH.format(video_key=self.key, **_chunk_and_file(self._file))
+            self._movie, self._first = Movie(path, self.fps, *self.size, key_every=KEYFRAME_INTERVAL), 0
         self._movie.add(picture)
-        self.shades.see(picture)
+        self.shades.add(picture)
 
     def end_episode(self) -> dict[str, Any]:
-        """Where the episode's frames are: columns of the table of episodes."""
+        """End the episode, and return the columns of the table of episodes that locate its frames."""
         assert self._movie is not None
         self.all += self.shades
         self.shades = Shades()
         where = {
-            **_whereabouts(f"videos/{self.key}", self._file),
+            **_file_columns(f"videos/{self.key}", self._file),
             f"videos/{self.key}/from_timestamp": self._first / self.fps,
             f"videos/{self.key}/to_timestamp": self._movie.frames / self.fps,
         }
         self._first = self._movie.frames
-        if self._movie.path.stat().st_size >= VIDEO_SIZE * 2**20:
+        if self._movie.path.stat().st_size >= VIDEO_FILE_SIZE * 2**20:
             self.close()
             self._file += 1
         return where
@@ -276,17 +289,17 @@ class _Video:
             self._movie = None
 
 
-def _numbers(file: int) -> dict[str, int]:
-    chunk, number = divmod(file, FILES)
+def _chunk_and_file(file: int) -> dict[str, int]:
+    chunk, number = divmod(file, FILES_PER_CHUNK)
     return {"chunk_index": chunk, "file_index": number}
 
 
-def _whereabouts(what: str, file: int) -> dict[str, int]:
-    return {f"{what}/{name}": number for name, number in _numbers(file).items()}
+def _file_columns(what: str, file: int) -> dict[str, int]:
+    return {f"{what}/{name}": number for name, number in _chunk_and_file(file).items()}
 
 
 def _task_table(tasks: Mapping[str, int]) -> pa.Table:
-    """Instructions and their numbers. LeRobot wants the former as pandas' index, and pandas asks the schema for it."""
+    """Instructions and their numbers. LeRobot needs the instructions as pandas' index, which the schema declares."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
         for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

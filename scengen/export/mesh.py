@@ -1,4 +1,4 @@
-"""An asset as one closed mesh: the union of all that things collide with."""
+"""An asset as one closed mesh: the union of its collision geometry."""
 
 import mujoco
 import numpy as np
@@ -9,17 +9,18 @@ from ..assets.prop import Prop
 from ..errors import BadConfig
 
 FORMATS = (".glb", ".obj", ".off", ".ply", ".stl")
+"""Endings of the names of mesh files."""
 SEGMENTS = 48
-"""Corners of a full circle; all lie on it."""
+"""Number of corners that replace a full circle; all lie on the circle."""
 OVERLAP = 1e-5
-"""By how much parts are made to stand out on all sides [m], so that those which only touch become one."""
+"""Distance by which parts are enlarged on all sides [m], so that parts that only touch become one."""
 
 
 def united(prop: Prop) -> Manifold:
-    """The solid that an asset is in the simulation, joints at their reference, in its own axes.
+    """The solid of an asset in the simulation, with joints at their reference, in the asset's axes.
 
     Raises:
-        BadConfig: it is only looked at, as a mark on the table is.
+        BadConfig: the asset has no collision geometry, such as a mark on the table.
     """
     model = prop.spec().compile()
     data = mujoco.MjData(model)
@@ -34,7 +35,7 @@ def united(prop: Prop) -> Manifold:
         parts.append(grown.translate(middle.tolist()))
     if not parts:
         raise BadConfig(
-            f"{type(prop).__name__} is only looked at; nothing of it is solid, so that there is no mesh of it"
+            f"{type(prop).__name__} is a visual mark without collision geometry, so it has no mesh; name another asset"
         )
     return Manifold.batch_boolean(parts, OpType.Add)
 
@@ -50,7 +51,7 @@ def encode(prop: Prop, ending: str) -> bytes:
     try:
         import trimesh
     except ImportError:
-        raise BadConfig("no trimesh for mesh files; say pip install 'scengen[mesh]'") from None
+        raise BadConfig("no trimesh for mesh files; run pip install 'scengen[mesh]'") from None
     found = united(prop).to_mesh64()
     points, faces = np.asarray(found.vert_properties)[:, :3], np.asarray(found.tri_verts, np.int64)
     written = trimesh.Trimesh(points, faces, process=False).export(file_type=ending[1:])

@@ -1,4 +1,4 @@
-"""Scenes as files that plain MuJoCo opens from anywhere."""
+"""Scenes as files that plain MuJoCo can open from any folder."""
 
 import shutil
 import xml.etree.ElementTree as ET
@@ -13,21 +13,21 @@ from ..robots import panda
 from ..sim import scene_text
 from ..sim.world import compose
 
-DECLARING = {"name", "class"}
-"""Attributes by which MJCF gives an element or a set of defaults its name."""
-TEXTUAL = {"file", "data"}
-"""Attributes that may hold any text, and no name."""
+NAME_ATTRIBUTES = {"name", "class"}
+"""MJCF attributes that define the name of an element or of a class of defaults."""
+TEXT_ATTRIBUTES = {"file", "data"}
+"""MJCF attributes that hold any text, but no name."""
 
 
 def export(row: PoolRow, folder: Path, robot: bool) -> None:
     """Write one scenario into `folder`/<id>: scene.xml, and with the robot scene_with_robot.xml.
 
-    The robot's meshes are copied once, into `folder`/meshes; paths are relative, so that `folder` can be moved. In
-    scene_with_robot.xml the robot stands as after a reset, in the key frame "home". Names are as in `without_slashes`;
-    but for them scene.xml is the certified scene.
+    The robot's meshes are copied once, into `folder`/meshes. Paths are relative, so that `folder` can be moved. In
+    scene_with_robot.xml the key frame "home" has the robot's pose after a reset. Names are those of `without_slashes`;
+    apart from them scene.xml is the certified scene.
 
     Raises:
-        BadConfig: the folder cannot be written, or the scene does not stand alone.
+        BadConfig: the folder cannot be written, or the scene refers to other files.
     """
     target = folder / row.id
     scene_text.check(row.scene_xml)
@@ -61,26 +61,26 @@ def _written(root: ET.Element) -> str:
 
 
 def without_slashes(root: ET.Element) -> None:
-    """Spell `plate.rim` what a scene calls `plate/rim`, where it is declared and wherever it is referred to.
+    """Rename `plate/rim` to `plate.rim`, and likewise all names with a slash, with all references to them.
 
-    dm_control refuses names with a slash: in its own models that is where an attached model's name ends.
+    dm_control refuses names with a slash, which in its own models separates the name of an attached model.
 
     Raises:
-        BadConfig: the scene has both.
+        BadConfig: the scene has both names.
     """
-    declared = {value for element in root.iter() for key, value in element.items() if key in DECLARING}
+    declared = {value for element in root.iter() for key, value in element.items() if key in NAME_ATTRIBUTES}
     spelled = {name: name.replace("/", ".") for name in declared}
     if len(set(spelled.values())) < len(declared):
         twice, _ = Counter(spelled.values()).most_common(1)[0]
-        raise BadConfig(f"the scene has names that are both spelled {twice!r} without a slash; rename one of them")
+        raise BadConfig(f"the scene has two names that become {twice!r} without a slash; rename one of them")
     for element in root.iter():
         for key, value in element.items():
-            if key not in TEXTUAL:
+            if key not in TEXT_ATTRIBUTES:
                 element.set(key, spelled.get(value, value))
 
 
 def _add_home(spec: mujoco.MjSpec) -> None:
-    """A key frame with the robot as after a reset: MuJoCo's viewer then starts where episodes start."""
+    """Add a key frame with the robot's pose after a reset, at which MuJoCo's viewer can start as episodes do."""
     model = spec.compile()
     qpos = model.qpos0.copy()
     for names in panda.arms(model):

@@ -1,9 +1,9 @@
-"""Recordings: witnesses played again and written as a LeRobot data set or for robomimic, with the paper's streams.
+"""Recordings: witnesses replayed and written as a LeRobot data set or for robomimic, with the paper's streams.
 
-LeRobot gives a data set one rate, `fps`. A row is what was seen at one moment and what was done from then to the next
-row: with 25 rows a second, in four control periods. Nothing of the witness gets lost: `actions` holds what the
-controller received in all control periods of the row. These actions have passed the teleoperation filter; an
-environment takes them as they are. robomimic's data has a row for every control period (`scengen.export.robomimic`).
+A LeRobot data set has one rate, `fps`. A row holds the observations at one moment and the actions until the next row:
+with 25 rows per second, those of four control periods. The whole witness is kept: `actions` holds the actions that the
+controller received in all control periods of the row. These actions have passed the teleoperation filter; give them to
+an environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
 """
 
 import shutil
@@ -36,22 +36,28 @@ from ..work.parallel import Workers
 from ..work.targets import refused, try_file, try_folder
 from .cameras import calibration
 from .hdf5 import check_target
-from .lerobot import DataSet, Feature
+from .lerobot import DatasetWriter, Feature
 from .replay import DatasetRow, Snapshot, WitnessReplay
 
 NONE = "none"
-LEROBOT, ROBOMIMIC = "lerobot", "robomimic"
+"""Value of `cameras` for a recording without pictures."""
+LEROBOT = "lerobot"
+"""Value of `format` for a LeRobot data set."""
+ROBOMIMIC = "robomimic"
+"""Value of `format` for robomimic's file."""
 FULL_RATE = round(1 / Loop.PERIOD)
-"""Control periods in a second."""
+"""Number of control periods in a second."""
 PAPER_RATE = 25
-"""The paper's rate for pictures."""
-ABOUT = (
+"""The paper's rate of pictures [1/s]."""
+EPISODE_COLUMNS = (
     *("id", "task", "code", "split", "axes", "shifted", "params", "seed", "index", "id_twin", "horizon"),
     *("scene_sha256", "witness_sha256"),
 )
-"""Columns of a pool that every episode carries, as `scengen/<column>` in LeRobot's table of episodes."""
-STATE, ENVIRONMENT = "observation.state", "observation.environment_state"
-"""LeRobot's names of the robot's own pose and of `object-state`."""
+"""Columns of a pool that are also columns `scengen/<column>` of LeRobot's table of episodes."""
+STATE = "observation.state"
+"""LeRobot's name of the robot's own pose."""
+ENVIRONMENT = "observation.environment_state"
+"""LeRobot's name of `object-state`."""
 
 
 @dataclass(frozen=True)
@@ -71,34 +77,34 @@ class RecordSettings:
 
     @cached_property
     def folders(self) -> list[str]:
-        """The pools to record."""
+        """Folders of the pools to record."""
         return collection.folders(self.pool)
 
     @property
-    def eyes(self) -> list[str]:
-        """Names of the cameras to film with."""
+    def camera_names(self) -> list[str]:
+        """Names of the cameras to record."""
         named = self.cameras if isinstance(self.cameras, list) else [self.cameras]
         return [] if named == [NONE] else named
 
     @property
     def unfinished(self) -> Path:
-        """Where the data set is until everything is in it."""
+        """Path of the data set until it is complete."""
         return Path(f"{self.to}.unfinished")
 
     @property
     def rate(self) -> int:
-        """Rows a second."""
+        """Number of rows per second."""
         return self.fps or (PAPER_RATE if self.format == LEROBOT else FULL_RATE)
 
     @property
     def privileged(self) -> bool:
-        """Whether the rows tell where everything is: unless policies are meant to look for themselves."""
+        """Whether the rows hold `object-state`. By default LeRobot data sets with pictures do not."""
         if self.environment_state is None:
-            return self.format == ROBOMIMIC or not self.eyes
+            return self.format == ROBOMIMIC or not self.camera_names
         return self.environment_state
 
     def check(self) -> None:
-        """Raise `ScengenError` for settings that make no sense."""
+        """Raise `ScengenError` for invalid settings."""
         if self.format not in (LEROBOT, ROBOMIMIC):
             raise UnknownName("format of recordings", self.format, [LEROBOT, ROBOMIMIC])
         at_least(self, n=1, fps=1, width=2, height=2, workers=1)
@@ -106,52 +112,54 @@ class RecordSettings:
         if self.format == ROBOMIMIC:
             check_target(self.to)
             if self.rate != FULL_RATE:
-                told = f"robosuite plays these actions, and certificates hold for {FULL_RATE} a second: leave it out"
-                raise BadConfig(f"fps = {self.fps}; {told}")
+                accepted = f"robomimic's data have {FULL_RATE} rows per second, for replay in robosuite: leave it out"
+                raise BadConfig(f"fps = {self.fps}; {accepted}")
         else:
             check_size(self.width, self.height)
         if Path(self.to).exists():
-            raise BadConfig(f"{self.to} exists already; delete it, or name another one")
+            raise BadConfig(f"{self.to} exists already; delete it, or give another name")
         if self.unfinished.exists():
             raise BadConfig(
-                f"{self.unfinished} is left from a recording that was killed, or one is under way; delete it"
+                f"{self.unfinished} exists: another recording is being written, or was interrupted; then delete it"
             )
         (try_file if self.format == ROBOMIMIC else try_folder)(self.to)
 
 
 @dataclass(frozen=True)
 class RecordSummary:
-    """What a recording came to."""
+    """Result of a recording."""
 
     episodes: int
+    """Number of episodes."""
     rows: int
+    """Number of rows."""
     failed: tuple[str, ...]
-    """Scenarios whose witness did not reach the goal here; their episodes say so."""
+    """Ids of the scenarios whose witness did not reach the goal; their episodes are marked as failures."""
     lost: Mapping[str, str]
-    """Scenarios that were left out, and why: they cannot be played within the limits."""
+    """Reasons by id of the scenarios that were left out, because they cannot be replayed within the limits."""
 
 
 def record(settings: RecordSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> RecordSummary:
-    """Write the recording that the settings describe; it appears when it is complete.
+    """Write the recording that the settings describe. It appears when it is complete.
 
     Args:
-        progress: told how many episodes are done and how many there are.
+        progress: function that gets the number of finished episodes and the number of all.
         search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
-        ScengenError: a pool or a setting is not as it must be, or pictures cannot be made here.
+        ScengenError: a pool or a setting is invalid, or OpenGL is missing for pictures.
     """
     settings.check()
     pools = [Pool.open(folder).check() for folder in settings.folders]
     robot, count = _robot(pools), sum(map(len, pools))
-    for name in settings.eyes:
+    for name in settings.camera_names:
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
     names = sorted({name for pool in pools for name in pool.kinds("task")[0]})
     tasks = {name: compose.load_task(name, search) for name in names}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
-        raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them apart")
+        raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them separately")
     streams = streams_of(robot)
     if settings.privileged:
         bodies = all_bodies(bodies_of(task, _scenes(pools, name)) for name, task in tasks.items())
@@ -166,7 +174,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                 if row.id in lost:
                     continue
                 with ExitStack() as stack:
-                    world = World.load(row.scene_xml, row.embodiment, visual=bool(settings.eyes))
+                    world = World.load(row.scene_xml, row.embodiment, visual=bool(settings.camera_names))
                     scenario = tasks[row.task].scenario(row.params)
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
                     observe = partial(Snapshot.of, world, writer.streams, pictures)
@@ -183,13 +191,13 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
 
 
 def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
-    """Texts of the scenes of a task."""
+    """Texts of the scenes of a task in some pools."""
     holding = [pool for pool in pools if task in pool.kinds("task")[0]]
     return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
 
 
 def _begin(settings: RecordSettings) -> None:
-    """Make the unfinished file or folder, which nobody else may have begun."""
+    """Make the unfinished file or folder. It must not exist, as another recording may be writing it."""
     path = settings.unfinished
     try:
         if settings.format == ROBOMIMIC:
@@ -213,19 +221,19 @@ def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
 
 
 class Writer(Protocol):
-    """A format that is being written; used in a `with` statement."""
+    """Writer of one format, to be used in a `with` statement."""
 
     streams: Mapping[str, Stream]
-    """What it wants to be read at every moment."""
+    """Streams that a row needs."""
 
     @property
     def episodes(self) -> int:
-        """How many were written so far."""
+        """Number of episodes written so far."""
         ...
 
     @property
     def rows(self) -> int:
-        """How many were written so far."""
+        """Number of rows written so far."""
         ...
 
     def __enter__(self) -> Self: ...
@@ -235,11 +243,11 @@ class Writer(Protocol):
     ) -> None: ...
 
     def episode(self, replay: WitnessReplay) -> bool:
-        """Add one scenario's episode, and say whether it reached the goal."""
+        """Add one scenario's episode, and return whether it reached the goal."""
         ...
 
     def finish(self, source: Mapping[str, Any]) -> None:
-        """Write what is known at the end. `source`: where the data came from."""
+        """Write the metadata. `source` describes the origin of the data."""
         ...
 
 
@@ -247,40 +255,40 @@ def _writer(
     settings: RecordSettings, robot: str, streams: Mapping[str, Stream], task: str, search: tuple[str, ...]
 ) -> Writer:
     if settings.format == LEROBOT:
-        return _LeRobot(settings, robot, streams)
+        return _LeRobotWriter(settings, robot, streams)
     from . import robomimic
 
     size = (settings.width, settings.height)
-    env, arguments = robomimic.environment(task, settings.folders, settings.eyes, size, search)
+    env, arguments = robomimic.environment(task, settings.folders, settings.camera_names, size, search)
     return robomimic.Demonstrations(settings.unfinished, robomimic.streams_of(streams, robot), env, arguments)
 
 
-class _LeRobot(DataSet):
-    """A LeRobot data set of replayed witnesses."""
+class _LeRobotWriter(DatasetWriter):
+    """Writer of a LeRobot data set of replayed witnesses."""
 
     def __init__(self, settings: RecordSettings, robot: str, streams: Mapping[str, Stream]):
         size = (settings.width, settings.height)
         features = _features(settings, robot, streams)
-        super().__init__(settings.unfinished, settings.rate, robot, features, settings.eyes, size)
+        super().__init__(settings.unfinished, settings.rate, robot, features, settings.camera_names, size)
         self.settings, self.streams = settings, streams
 
     def episode(self, replay: WitnessReplay) -> bool:
         row, success = replay.row, False
         size, views = (self.settings.width, self.settings.height), cameras_of(row.embodiment)
-        for name in self.settings.eyes:
+        for name in self.settings.camera_names:
             held = replay.scenario.orientation
             self.calibrate(name, calibration(replay.world, views[name], *size, held), str(row.name))
         for dataset_row in replay.rows():
             self.add(_values(dataset_row, proprioception(row.embodiment)), dataset_row.observed.pictures)
             success = dataset_row.success
         columns = row.plain()
-        about = {f"scengen/{name}": columns[name] for name in ABOUT}
-        self.end_episode(row.instruction, {**about, "scengen/success": success})
+        columns_of_pool = {f"scengen/{name}": columns[name] for name in EPISODE_COLUMNS}
+        self.end_episode(row.instruction, {**columns_of_pool, "scengen/success": success})
         return success
 
 
 def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
-    """The columns of a row: the paper's streams, the actions, and what LeRobot looks for.
+    """The columns of a row: the paper's streams, the actions, and the columns that LeRobot expects.
 
     Args:
         state: names of the streams that make up `observation.state`.
@@ -301,21 +309,23 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
 def _camera(
     stack: ExitStack, world: World, settings: RecordSettings, views: Mapping[str, str], held: Orientation
 ) -> Callable[[], dict[str, Picture]]:
-    """What takes the pictures of a moment, by the paper's names, as policies see them; without any, no OpenGL either.
+    """Function that takes the pictures of a moment, by the paper's names, in the orientation that policies see.
+
+    Without cameras it does not need OpenGL.
 
     Raises:
-        BadConfig: they are seen turned by a quarter and are not square.
+        BadConfig: pictures are turned by a quarter and are not square.
     """
-    if not settings.eyes:
+    if not settings.camera_names:
         return dict
     held.check_size(settings.width, settings.height)
     camera = Camera(world, settings.width, settings.height)
     stack.callback(camera.close)
-    return lambda: {name: held.apply(camera.take(views[name])) for name in settings.eyes}
+    return lambda: {name: held.apply(camera.take(views[name])) for name in settings.camera_names}
 
 
 def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:
-    """The columns of `_values`."""
+    """Types and names of the columns of `_values`."""
     own, numbers = named(streams, proprioception(robot)), action_names(robot)
     seen = {
         ENVIRONMENT if name == NAME else name: Feature("float32", stream.shape, stream.entries(name))
@@ -342,5 +352,5 @@ def _robot(pools: list[Pool]) -> str:
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
     if len(robots) > 1:
-        raise BadConfig(f"pools for {' and '.join(sorted(robots))}; a data set has one robot: record them apart")
+        raise BadConfig(f"pools for {' and '.join(sorted(robots))}; a data set has one robot: record them separately")
     return robots.pop()

@@ -1,14 +1,15 @@
 """Recordings in robomimic's format: one HDF5 file, as its loaders and its robosuite environments expect it.
 
-    data                    attributes: total (rows), env_args (which robosuite environment, and its arguments)
+    data                    attributes: total (rows), env_args (the robosuite environment and its arguments)
     data/demo_0             attributes: num_samples, model_file (MJCF), ep_meta (the scenario, its parameters, `lang`)
       actions  states  rewards  dones
       obs/<key>  next_obs/<key>
-    mask/<split>            the demonstrations of a split, by name; mask/success those that reach the goal
+    mask/<split>            names of the demonstrations of a split; mask/success: those that reach the goal
 
 Observations have robosuite's names: `object` is `object-state`, pictures are `<camera>_image`, first row on top. Each
-row is a control period of 10 ms with the action that the controller received, so that they can be played in robosuite.
-States are time, `qpos` and `qvel`; what events have moved or remember (a mark, a count of jumps) is not in them.
+row is a control period of 10 ms with the action that the controller received, so that robosuite can replay the actions.
+States are time, `qpos` and `qvel`. They do not contain bodies that events have moved, such as marks, nor the memory of
+events, such as a count of jumps.
 """
 
 import json
@@ -35,27 +36,27 @@ from .replay import Snapshot, WitnessReplay
 ROBOSUITE_TYPE = 1
 """robomimic's number for robosuite environments."""
 SUCCESS = "success"
-"""Name of the mask of demonstrations that reach the goal."""
+"""Name of the mask of the demonstrations that reach the goal."""
 OBJECT = "object"
 """robomimic's name of robosuite's `object-state`."""
 
 
 def streams_of(streams: Mapping[str, Stream], embodiment: str) -> dict[str, Stream]:
-    """Streams under robosuite's names: its `eef_quat` is that of the hand's body, ours its `eef_quat_site`."""
+    """Streams under robosuite's names. Its `eef_quat` is that of the hand's body; ours is its `eef_quat_site`."""
     found = {OBJECT if name == object_state.NAME else name: stream for name, stream in streams.items()}
     for number in range(len(hands(embodiment))):
         arm = Names(number).arm
         found[f"{arm}eef_quat_site"] = found[f"{arm}eef_quat"]
-        found[f"{arm}eef_quat"] = Stream(object_state.POSE["quat"], 1.0, _hand_of(arm))
+        found[f"{arm}eef_quat"] = Stream(object_state.POSE["quat"], 1.0, _hand_quat_reader(arm))
     return found
 
 
-def _hand_of(arm: str) -> Callable[[World], NDArray[np.float64]]:
+def _hand_quat_reader(arm: str) -> Callable[[World], NDArray[np.float64]]:
     return lambda world: world.data.xquat[world.body(f"{arm}right_hand")][[1, 2, 3, 0]]
 
 
 class Demonstrations:
-    """A file that is being written."""
+    """Writer of a robomimic file."""
 
     def __init__(
         self, path: Path, streams: Mapping[str, Stream], environment: RobosuiteEnv, arguments: Mapping[str, Any]
@@ -63,9 +64,9 @@ class Demonstrations:
         """Begin a file.
 
         Args:
-            streams: what is observed, by robosuite's names.
-            environment: composes the models of the scenarios; nothing is simulated in it.
-            arguments: with which to make it again, for robomimic to play in.
+            streams: streams to observe, by robosuite's names.
+            environment: environment that composes the models of the scenarios; it does not simulate.
+            arguments: robomimic's `env_args`, with which it makes this environment again.
 
         Raises:
             BadConfig: the file cannot be written.
@@ -82,7 +83,7 @@ class Demonstrations:
         self._masks: dict[str, list[str]] = defaultdict(list)
 
     def episode(self, replay: WitnessReplay) -> bool:
-        """Add one scenario's demonstration, and say whether it reached the goal."""
+        """Add one scenario's demonstration, and return whether it reached the goal."""
         row, name, success = replay.row, f"demo_{self.episodes}", False
         group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[Snapshot]()
         views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
@@ -115,7 +116,7 @@ class Demonstrations:
         return success
 
     def finish(self, source: Mapping[str, Any]) -> None:
-        """Write what is known at the end. `source`: where the data came from."""
+        """Write the metadata. `source` describes the origin of the data."""
         self._data.attrs["total"] = self.rows
         self._data.attrs["env_args"] = json.dumps(self._arguments, indent=4)
         self._data.attrs["scengen"] = json.dumps(source)
@@ -132,7 +133,7 @@ class Demonstrations:
 
     @staticmethod
     def _add(group: Any, what: str, seen: Snapshot, views: Mapping[str, str]) -> None:
-        """Append the pictures of a view: all of an episode would not fit into memory."""
+        """Append the pictures of a moment to the file: those of a whole episode would not fit into memory."""
         for camera, picture in seen.pictures.items():
             key, shape = f"{what}/{views[camera]}", picture.shape
             if key not in group:
@@ -145,11 +146,11 @@ class Demonstrations:
 def environment(
     task: str, pools: Sequence[str], cameras: Sequence[str], size: tuple[int, int], search: tuple[str, ...]
 ) -> tuple[RobosuiteEnv, dict[str, Any]]:
-    """The robosuite environment in which demonstrations can be played, and robomimic's `env_args` of it.
+    """The robosuite environment for replaying demonstrations, and robomimic's `env_args` of it.
 
     Args:
         pools: folders of the pools.
-        cameras: the paper's names of the cameras to be observed.
+        cameras: the paper's names of the observed cameras.
         size: width and height of the pictures [pixels].
         search: folders of other packages with tasks, see `task_files.search_path`.
     """

@@ -1,4 +1,4 @@
-"""Statistics of columns and of pictures, as LeRobot's data sets carry them for normalisation."""
+"""Statistics of columns and of pictures, which LeRobot's data sets contain for normalisation."""
 
 from typing import Any
 
@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from ..pictures.render import Picture
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-THINNING = 4
-"""Pictures are looked at in every fourth row and column; that is enough for their colours."""
+PIXEL_STRIDE = 4
+"""Distance between the rows and columns of pictures that are counted; every fourth is enough for colours."""
 
 Stats = dict[str, Any]
 """min, max, mean, std, count and quantiles as nested lists."""
 
 
 def describe(values: NDArray[Any]) -> Stats:
-    """Statistics over the first axis, element by element; numbers give lists of one, as LeRobot has it."""
+    """Statistics over the first axis, element by element. Numbers give lists of one entry, as in LeRobot."""
     rows = values.astype(np.float64)
     if rows.ndim == 1:
         rows = rows[:, None]
@@ -32,15 +32,15 @@ def describe(values: NDArray[Any]) -> Stats:
 
 
 class Shades:
-    """How often each channel of some pictures had each of its 256 values."""
+    """Histogram of the 256 values of each channel over some pictures."""
 
     def __init__(self) -> None:
         self.counts, self.frames = np.zeros((3, 256), np.int64), 0
 
-    def see(self, picture: Picture) -> None:
+    def add(self, picture: Picture) -> None:
         """Count one picture."""
-        thin = picture[::THINNING, ::THINNING]
-        self.counts += [np.bincount(thin[:, :, channel].ravel(), minlength=256) for channel in range(3)]
+        sample = picture[::PIXEL_STRIDE, ::PIXEL_STRIDE]
+        self.counts += [np.bincount(sample[:, :, channel].ravel(), minlength=256) for channel in range(3)]
         self.frames += 1
 
     def __iadd__(self, other: "Shades") -> "Shades":

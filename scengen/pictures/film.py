@@ -1,4 +1,4 @@
-"""Films: recorded actions played again in front of a camera, as a strip of pictures or as a video."""
+"""Films: recorded actions replayed in front of a camera, as a strip of pictures or as a video."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
@@ -19,16 +19,18 @@ from .render import Camera, Picture
 from .video import Movie
 
 WITNESS = "witness"
+"""Name of the actions of the witness, in place of a shortcut's."""
 COLUMNS = 4
-"""Pictures in a row of a strip."""
+"""Number of pictures in a row of a strip."""
 LOOKS = 8
-"""At how many moments of a video it is looked which view hides least."""
+"""Number of moments of a video over which the clearest view is chosen."""
 Progress = Callable[[int, int], None]
+"""Function that gets the number of finished pictures and the number of all."""
 
 
 @dataclass(frozen=True)
 class Take:
-    """What is filmed: recorded actions in their scene."""
+    """Recorded actions in their scene, to be filmed."""
 
     scenario: Scenario
     scene_xml: str
@@ -42,31 +44,31 @@ class Take:
 
     @property
     def seconds(self) -> float:
-        """How long it lasts [s]."""
+        """Duration [s]."""
         return round(len(self.actions) * Loop.PERIOD, 2)
 
     def world(self) -> World:
-        """Its world at the start, with everything that is only looked at."""
+        """Its world at the start, with the visual geoms."""
         return World.load(self.scene_xml, self.embodiment, visual=True)
 
     def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:
-        """Play the actions, stop after each of these numbers of control periods, and tell the time and the outcome."""
+        """Replay the actions, stop after each of these numbers of control periods, and yield time and outcome."""
         world.reset()
-        episode, done, outcome, told = Episode(self.scenario, world), 0, None, ""
+        episode, done, outcome, note = Episode(self.scenario, world), 0, None, ""
         for period in periods:
             for number, action in enumerate(self.actions[done:period], done + 1):
                 if (now := episode.step(action)) != outcome:
-                    outcome, told = now, f", {now} at {number * Loop.PERIOD:.2f} s"
+                    outcome, note = now, f", {now} at {number * Loop.PERIOD:.2f} s"
             done = period
-            yield f"{period * Loop.PERIOD:.2f} s{told}"
+            yield f"{period * Loop.PERIOD:.2f} s{note}"
 
     def even(self, count: int) -> list[int]:
-        """So many control periods at equal distances, from the start to the end."""
+        """`count` control periods at equal distances, from the start to the end."""
         return [int(period) for period in np.linspace(0, len(self.actions), count).round()]
 
 
 def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> tuple[Take, Rollout]:
-    """One of the tempting plans of a scenario, and what comes of it: what its certificate saw.
+    """The actions of a shortcut of a scenario, and its rollout, which is that of the certificate.
 
     Raises:
         UnknownName: the scenario has no shortcut of that name.
@@ -90,9 +92,9 @@ def strip(
     """Pictures at equal times from the start to the end, in rows of four, each with its time and the outcome so far.
 
     Args:
-        camera: one of the scene's or the robot's cameras; default the view fitted to the scene that hides least of it
-            in these pictures.
-        progress: told how many of how many pictures are taken.
+        camera: one of the scene's or the robot's cameras. Default: the fitted view that hides least of the scene in
+            these pictures.
+        progress: function that gets the number of pictures taken and the number of all.
 
     Raises:
         NoPictures: OpenGL is missing.
@@ -100,12 +102,12 @@ def strip(
     """
     pictures: list[Picture] = []
     with closing(Camera(take.world(), width, height)) as eye:
-        moments = [(eye.world.state(), told) for told in take.moments(eye.world, take.even(frames))]
+        moments = [(eye.world.state(), caption) for caption in take.moments(eye.world, take.even(frames))]
         if camera is None:
             eye.look([state for state, _ in moments])
-        for state, told in moments:
+        for state, caption in moments:
             eye.world.restore(state)
-            pictures.append(captioned(eye.take(camera), told))
+            pictures.append(captioned(eye.take(camera), caption))
             progress(len(pictures), frames)
     columns = min(COLUMNS, frames)
     blank = np.full_like(pictures[0], 255)
@@ -135,10 +137,10 @@ def movie(
     camera: str | None = None,
     progress: Progress = lambda done, total: None,
 ) -> int:
-    """Write an MP4 that runs as fast as the world did. Returns the number of its frames.
+    """Write an MP4 in real time. Returns the number of its frames.
 
     Args:
-        fps: frames in a second; a divisor of the control rate of 100 Hz.
+        fps: frames per second, a divisor of the control rate of 100 Hz.
         camera, progress: as for `strip`.
 
     Raises:
@@ -156,10 +158,10 @@ def movie(
 
 
 def periods_between(fps: int) -> int:
-    """Control periods between two frames; 100 Hz is a multiple of `fps`.
+    """Number of control periods between two frames.
 
     Raises:
-        UnknownName: it is not.
+        UnknownName: 100 Hz is not a multiple of `fps`.
     """
     rate = round(1 / Loop.PERIOD)
     if fps < 1 or rate % fps:

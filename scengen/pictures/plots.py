@@ -1,4 +1,4 @@
-"""Plots on pages."""
+"""Plots for HTML pages."""
 
 from io import BytesIO
 

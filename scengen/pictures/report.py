@@ -1,4 +1,4 @@
-"""What people see of a run and of a pool: the funnel, tables, and a contact sheet in one HTML file."""
+"""Tables of runs, pools, tasks and axes for the terminal, and the templates and thumbnails of HTML pages."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -21,14 +21,15 @@ from ..validate.playable import check_scene
 from . import render
 
 LINES = 1000
-"""Scenarios of a pool in a table; id= finds the others."""
+"""Largest number of scenarios in a table of a pool; id= finds the others."""
 LARGEST_PAGE = 19_000_000
-"""Letters of the scenarios on a page: with all else it stays below 20 MB, which browsers open at once."""
+"""Largest size of the scenarios on a page [characters]. The whole page is then below 20 MB, which browsers open at
+once."""
 
 
 def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table:
-    """How many draws got through each step, and what stopped the others."""
-    table = Table("step", "left", "lost", "share", title="funnel", title_justify="left")
+    """The rejection report: number of draws after each step, and the reasons of rejections."""
+    table = Table("step", "left", "lost", "share", title="rejection report", title_justify="left")
     before = None
     for stage in ("proposed", *STAGES):
         count = funnel[stage]
@@ -43,7 +44,7 @@ def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table
 
 
 def summary_lines(summary: Summary) -> list[str]:
-    """The end of a run in a few lines."""
+    """Summary of a run in a few lines."""
     n, indices = summary.certified, summary.indices
     pool = summary.pool
     lines = [
@@ -56,28 +57,28 @@ def summary_lines(summary: Summary) -> list[str]:
 
 
 def attack_table(report: AttackReport) -> Table:
-    """How often each tier of the adversary reached the goal."""
+    """Hit rate of each tier of the adversary."""
     table = Table("tier", "actions", title=f"attack on {report.task}", title_justify="left")
     for column in ("rollouts", "hits", "rate", "95 % bound", "refuting"):
         table.add_column(column, justify="right")
     for rate in report.rates:
-        table.add_row(*_cells(rate))
+        table.add_row(*_rate_cells(rate))
     return table
 
 
-def _cells(rate: TierRate) -> list[str]:
-    """One line of the table in words."""
+def _rate_cells(rate: TierRate) -> list[str]:
+    """Cells of one line of the table."""
     kind, counts = spelled(rate.raw), (str(rate.rollouts), str(rate.hits))
     return [rate.tier, kind, *counts, f"{rate.value:.1%}", f"< {rate.bound:.1%}", str(rate.refuting or "")]
 
 
 def pool_table(pool: Pool) -> Table:
-    """One line per scenario, of `LINES` at most, with the parameters that differ from one to another."""
+    """One line per scenario, at most `LINES`, with the parameters that differ between scenarios."""
     rows = list(islice(zip(pool.names(), pool.columns("shifted", "params"), strict=True), LINES))
     every = [params for _, (_, params) in rows]
     drawn = [name for name in (every[0] if every else ()) if any(params[name] != every[0][name] for params in every)]
     table = Table(title=f"{pool.folder}: {pool.split}", title_justify="left")
-    table.add_column("scenario", no_wrap=True)  # a name is there to be copied
+    table.add_column("scenario", no_wrap=True)  # users copy names
     table.add_column("parameters")
     for called, (shifted, params) in rows:
         shown = [name for name in params if name in drawn or name in shifted]
@@ -98,7 +99,7 @@ def pools_table(pools: Sequence[Pool]) -> Table:
 
 
 def scenario_tables(row: PoolRow) -> list[Table]:
-    """One scenario: what it is, its parameters, and its certificate."""
+    """Tables of one scenario: its identity, its parameters and its certificate."""
     about = Table(title=str(row.name), title_justify="left", show_header=False)
     for name in ("instruction", "split", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
         about.add_row(name, str(getattr(row, name)))
@@ -116,11 +117,11 @@ def scenario_tables(row: PoolRow) -> list[Table]:
 
 
 def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
-    """All tasks in a few words.
+    """One line for each task.
 
     Args:
-        tasks: those of a category one after the other.
-        certified: what certification came to, see `task_files.certified`.
+        tasks: tasks, grouped by category.
+        certified: results of certification, see `task_files.certified`.
     """
     table = Table(title=f"{len(tasks)} tasks", title_justify="left")
     for column in ("", "code", "task", "hands"):
@@ -138,14 +139,14 @@ def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Map
             task.category, task.code, *cells, end_section=after is not None and after.category != task.category
         )
     table.caption = (
-        "certified: of the draws tried (conf/certified.yaml); CPU s: for one certificate in training, level quick"
+        "certified: of the tried draws (conf/certified.yaml); CPU s: for one certificate in training, level quick"
     )
     table.caption_justify = "left"
     return table
 
 
 def task_tables(task: Task) -> list[Table]:
-    """One task: every parameter with unit, bounds and ID range, and every axis with its proof."""
+    """Tables of one task: parameters with unit, bounds and training range, and axes with their proofs."""
     params = Table("parameter", "unit", "bounds", "nominal", "training (id)", title=f"{task.code} {task.name}")
     for p in task.known.values():
         dist = task.training[p.name]
@@ -157,7 +158,7 @@ def task_tables(task: Task) -> list[Table]:
 
 
 def axes_table(axes: Sequence[tuple[Task, Axis]]) -> Table:
-    """Axes with their proofs; the task is named where there are several."""
+    """Axes with their proofs. If there are several tasks, the task of each axis is shown."""
     several = len({task.name for task, _ in axes}) > 1
     table = Table(*(["task"] if several else []), title="axes: each lies outside training", title_justify="left")
     for column in ("axis", "parameter", "training", "goes to", "gap", "proof", "why"):
@@ -169,13 +170,13 @@ def axes_table(axes: Sequence[tuple[Task, Axis]]) -> Table:
             gap = f"{proof.gap:.3g} {task.known[proof.parameter].unit}{relative}"
             spread = [spell(dist[proof.parameter]) for dist in (task.training, axis.replace)]
             table.add_row(*told[0], proof.parameter, *spread, gap, proof.kind, told[1])
-            told = [""] * len(told[0]), ""  # once for all parameters of an axis
+            told = [""] * len(told[0]), ""  # shown once for all parameters of an axis
         table.add_section()
     return table
 
 
 def template(name: str) -> jinja2.Template:
-    """One of the pages in scengen/pictures/templates; what is put into it is escaped."""
+    """A page of scengen/pictures/templates. Inserted texts are escaped."""
     loader = jinja2.PackageLoader("scengen", "pictures/templates")
     return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
 
@@ -183,10 +184,10 @@ def template(name: str) -> jinja2.Template:
 def thumbnail(
     scene_xml: str, embodiment: str, where: render.Where | None = None, width: int = 320, height: int = 240
 ) -> tuple[str, render.Where]:
-    """A picture of the start of a scenario, as a data address for HTML, and from where it was taken.
+    """A picture of the start of a scenario, as a data address for HTML, and the direction of its view.
 
     Args:
-        where: from where; default the view that hides least.
+        where: direction of the view. Default: that which hides least.
     """
     check_scene(scene_xml, embodiment)
     with render.camera(scene_xml, embodiment, width, height, where) as view:

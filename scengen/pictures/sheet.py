@@ -1,4 +1,4 @@
-"""The contact sheet: what the scenarios of pools look like, beside their training twins, in one HTML file."""
+"""The contact sheet: pictures of the scenarios of pools, beside their training twins, in one HTML file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,21 +20,22 @@ from . import film, render
 from .report import LARGEST_PAGE, template, thumbnail
 
 STRIP = (8, 240, 180)
-"""Pictures of a film strip, and width and height of each [pixels]."""
+"""Number of pictures of a film strip, and width and height of each [pixels]."""
 
 
 @dataclass
 class SheetEntry:
-    """One scenario on the sheet. Pictures are data addresses; empty where there is none."""
+    """One scenario on the sheet. Pictures are data addresses, or empty."""
 
     row: PoolRow
     moved: list[str]
-    """What its axes have moved, in words."""
+    """Descriptions of the parameters that its axes have moved."""
     picture: str = ""
+    """Picture of its start."""
     twin: str = ""
-    """Its training twin."""
+    """Picture of its training twin."""
     strip: str = ""
-    """A film strip of its witness."""
+    """Film strip of its witness."""
 
 
 def contact_sheet(
@@ -44,15 +45,16 @@ def contact_sheet(
     films: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> str:
-    """Write one HTML file that shows the scenes of some pools. Returns a remark, or nothing.
+    """Write one HTML file that shows the scenes of some pools. Returns a remark, or an empty text.
 
-    Without OpenGL the page has no pictures and says so. It says of every pool how many of its scenarios it shows.
+    Without OpenGL the page has no pictures and a remark about it. For every pool it gives the number of its scenarios
+    that are shown.
 
     Args:
-        pools: each with its task as it was when the pool was made.
-        images: how many scenarios of a pool are shown at most; fewer where the page would become too large.
-        films: how many of them with a film strip of the witness.
-        progress: told how many of how many scenarios are drawn.
+        pools: pools, each with its task as it was when the pool was made.
+        images: largest number of scenarios to show of each pool; fewer if the page would become too large.
+        films: number of these scenarios to show with a film strip of the witness.
+        progress: function that gets the number of drawn scenarios and the number of all.
 
     Raises:
         ScengenError: a scene or a witness cannot be played.
@@ -85,28 +87,28 @@ def contact_sheet(
 
 
 def _twin(pool: Pool, task: Task, row: PoolRow) -> str:
-    """The scene of a scenario's training twin, drawn again."""
+    """The scene of a scenario's training twin, made again from its seed and index."""
     trained = task.draw(ID, row.seed, row.index, task.design(pool.manifest.config.sampler)).scenario
     if trained.id != row.id_twin:
         raise ScengenError(
-            f"{row.id}: its training twin comes out as {trained.id}, but the pool names {row.id_twin}; the family has "
-            "changed since, see scengen verify"
+            f"{row.id}: its training twin is now {trained.id}, but the pool has {row.id_twin}; the family has changed "
+            "since then, see scengen verify"
         )
     return rebuild(trained)
 
 
 def _strip(task: Task, row: PoolRow) -> str:
-    """A film strip of a witness."""
+    """Film strip of the witness."""
     take = film.Take.witness(check_row(row), task.scenario(row.params))
     return render.address(render.encode(film.strip(take, *STRIP)), "webp")
 
 
 def _moved(task: Task, name: str, value: float) -> str:
-    """What an axis has done to a parameter: `tile height 0.055 m (training 0.07 to 0.09)`."""
+    """Description of a moved parameter: `tile height 0.055 m (training 0.07 to 0.09)`."""
     named = name.replace(".", " ").replace("_", " ")
     return f"{named} {value:.4g} {_unit(task, name)} (training {spell(task.training[name])})".replace("  ", " ")
 
 
 def _unit(task: Task, name: str) -> str:
-    """The unit of a parameter; nothing for a pure number."""
+    """Unit of a parameter; empty for a pure number."""
     return task.known[name].unit.removeprefix("1")

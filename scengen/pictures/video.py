@@ -1,4 +1,4 @@
-"""MP4 files. Needs PyAV (`pip install scengen[record]`), whose wheels carry FFmpeg."""
+"""MP4 files. Needs PyAV (`pip install scengen[record]`), whose wheels include FFmpeg."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -7,8 +7,10 @@ from types import TracebackType
 from ..errors import BadConfig, ScengenError
 from .render import Picture
 
-CODEC, PIXELS = "h264", "yuv420p"
-"""What every browser and every LeRobot version decodes."""
+CODEC = "h264"
+"""Codec that every browser and every version of LeRobot decodes."""
+PIXELS = "yuv420p"
+"""Pixel format that every browser and every version of LeRobot decodes."""
 
 
 class NoVideo(ScengenError):
@@ -20,19 +22,19 @@ def check_size(width: int, height: int) -> None:
     for name, value in (("width", width), ("height", height)):
         if value < 2 or value % 2:
             raise BadConfig(
-                f"{name} = {value}; the pictures of a video have an even number of pixels, at least 2; choose another"
+                f"{name} = {value}; the width and height of a video must be even numbers, at least 2; choose another"
             )
 
 
 class Movie:
-    """An MP4 file that is being written: frame k is shown from k / fps on, exactly."""
+    """An MP4 file that is being written. Frame k starts exactly at k / fps."""
 
     def __init__(self, path: Path, fps: int, width: int, height: int, key_every: int = 250):
         """Begin a file.
 
         Args:
-            key_every: every how many frames one is stored whole; few make single frames quick to reach. 250 is
-                x264's own.
+            key_every: number of frames per keyframe. With few frames per keyframe, single frames can be read quickly.
+                250 is x264's default.
 
         Raises:
             NoVideo: PyAV is missing.
@@ -42,7 +44,7 @@ class Movie:
         try:
             import av
         except ImportError:
-            raise NoVideo("no PyAV for MP4 files; say pip install 'scengen[record]'") from None
+            raise NoVideo("no PyAV for MP4 files; run pip install 'scengen[record]'") from None
         self.path, self.fps, self.frames = path, fps, 0
         self._encode = av.VideoFrame.from_ndarray
         try:
@@ -52,7 +54,7 @@ class Movie:
             raise BadConfig(f"{path} cannot be written: {error.strerror}") from None
         self._stream = self._file.add_stream("libx264", rate=fps, width=width, height=height, pix_fmt=PIXELS)
         self._stream.codec_context.gop_size = key_every
-        # no frame waits for a later one, so that times start at 0; crf 20 cannot be told from the original
+        # no frame depends on a later one, so that times start at 0; crf 20 looks like the original
         self._stream.options = {"crf": "20", "preset": "veryfast", "bf": "0"}
 
     def add(self, picture: Picture) -> None:
@@ -63,7 +65,7 @@ class Movie:
         self.frames += 1
 
     def close(self) -> None:
-        """Write what is still waiting, and the index."""
+        """Write the remaining frames and the index."""
         self._file.mux(self._stream.encode())
         self._file.close()
 

@@ -1,4 +1,4 @@
-"""MuJoCo's passive viewer on a scenario of a pool."""
+"""MuJoCo's passive viewer for a scenario of a pool."""
 
 import os
 import sys
@@ -19,22 +19,22 @@ from .render import fitted, hide_hulls
 
 
 class NoDisplay(ScengenError):
-    """There is no screen to open a window on."""
+    """There is no display for a window."""
 
 
 def check_display() -> None:
-    """Raise `NoDisplay` where no window can be opened: trying it would end the process."""
+    """Raise `NoDisplay` if no window can be opened: the attempt would end the process."""
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-        raise NoDisplay("no display to open a window on; scengen film draws the same into a file")
+        raise NoDisplay("no display to open a window on; use scengen film, which draws the same into a file")
 
 
 def view(row: PoolRow, scenario: Scenario, replay: bool) -> None:
-    """Show a scenario in real time until the window is closed. After its witness, or without, the robot is idle."""
+    """Show a scenario in real time until the window is closed. After the witness, or without it, the robot is idle."""
     world = Take.witness(row, scenario).world()
     hide_hulls(world.model)
     episode, actions = Episode(scenario, world), row.witness if replay else []
     with mujoco.viewer.launch_passive(world.model, world.data, show_left_ui=False, show_right_ui=False) as window:
-        _look(window, world)
+        _set_view(window, world)
         due = time.monotonic()
         for action in chain(actions, repeat(None)):
             if not window.is_running():
@@ -46,8 +46,8 @@ def view(row: PoolRow, scenario: Scenario, replay: bool) -> None:
             time.sleep(max(0.0, due - time.monotonic()))
 
 
-def _look(window: mujoco.viewer.Handle, world: World) -> None:
-    """Begin with the view of the pictures, without marks."""
+def _set_view(window: mujoco.viewer.Handle, world: World) -> None:
+    """Start with the view of the pictures, without sites."""
     eye = fitted(world, 4 / 3)
     with window.lock():
         window.cam.lookat[:] = eye.lookat

@@ -110,7 +110,7 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
     assert card(tmp_path / "false", to=tmp_path / "out") == 2
     err = capsys.readouterr().err.splitlines()[-1]
     assert "false is refuted at level replay: domino_single/wide_gaps@2@" in err
-    assert "a card is for pools that verify, see scengen verify pool=" in err and not (tmp_path / "out").exists()
+    assert "only pools that verify are published, see scengen verify pool=" in err and not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

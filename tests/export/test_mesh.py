@@ -37,7 +37,7 @@ def test_what_hangs_in_a_stand_touches_it_nowhere(name):
 def test_there_is_no_mesh_of_a_mark_on_the_table(name, tmp_path, capsys):
     assert cli.run(["asset", f"name={name}", f"to={tmp_path / 'mark.stl'}"]) == 2
     told = capsys.readouterr().err
-    assert "nothing of it is solid" in told and told.count("\n") == 1 and not any(tmp_path.iterdir())
+    assert "a visual mark without collision geometry" in told and told.count("\n") == 1 and not any(tmp_path.iterdir())
 
 
 def test_volumes_are_those_of_a_textbook():
@@ -73,7 +73,7 @@ def test_an_asset_is_written_by_name(capsys, tmp_path):
         (["name=cup", "to=x.txt"], "name a file that ends in .glb, .obj"),
         (["name=cup"], "asset needs to=FILE.stl"),
         (["mesh=cup.stl"], "asset needs to=FOLDER"),
-        (["to=x.stl"], "but of what? say name=ASSET or mesh=FILE"),
+        (["to=x.stl"], "without an asset; give name=ASSET or mesh=FILE"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(capsys, settings, says):

@@ -20,7 +20,7 @@ from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import streams_of
 from scengen.export import recording
 from scengen.export.cameras import calibration
-from scengen.export.lerobot import DataSet, Feature
+from scengen.export.lerobot import DatasetWriter, Feature
 from scengen.export.recording import RecordSettings, record
 from scengen.export.stats import QUANTILES, Shades
 from scengen.pool import Pool
@@ -253,7 +253,7 @@ def test_picture_statistics_are_those_of_the_pixels():
     pictures = rng.integers(0, 256, (3, 64, 64, 3)).astype(np.uint8)
     shades = Shades()
     for picture in pictures:
-        shades.see(picture)
+        shades.add(picture)
     pixels = (pictures[:, ::4, ::4] / 255).reshape(-1, 3)
     found = shades.describe()
     wanted = {
@@ -332,7 +332,7 @@ def test_a_killed_recording_leaves_nothing_that_looks_finished(tmp_path, capsys)
     assert process.wait() == -signal.SIGKILL and unfinished.exists()
     assert not target.exists() and not (unfinished / "meta" / "info.json").exists()
     assert cli.run(command[3:]) == 2
-    assert "killed.unfinished is left from a recording that was killed" in capsys.readouterr().err
+    assert "killed.unfinished exists: another recording is being written, or was interrupted" in capsys.readouterr().err
 
 
 def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):
@@ -355,9 +355,9 @@ def test_a_witness_that_fails_is_recorded_as_a_failure(tmp_path, capsys, witness
 
 
 def test_a_full_file_is_followed_by_another(tmp_path, monkeypatch):
-    monkeypatch.setattr("scengen.export.lerobot.DATA_SIZE", 0)
-    monkeypatch.setattr("scengen.export.lerobot.FILES", 2)
-    with DataSet(tmp_path, 25, "robot", {"x": Feature("float32")}, [], (0, 0)) as data:
+    monkeypatch.setattr("scengen.export.lerobot.DATA_FILE_SIZE", 0)
+    monkeypatch.setattr("scengen.export.lerobot.FILES_PER_CHUNK", 2)
+    with DatasetWriter(tmp_path, 25, "robot", {"x": Feature("float32")}, [], (0, 0)) as data:
         for episode in range(3):
             data.add({"x": float(episode)}, {})
             data.end_episode("do it", {})
@@ -382,7 +382,7 @@ def test_without_cameras_neither_opengl_nor_pyav_is_needed(tmp_path, monkeypatch
         (["fps=30"], "no fps that divides the control rate of 100 Hz named '30'"),
         (["cameras=rgb_griper_cam"], "no camera named 'rgb_griper_cam' (did you mean 'rgb_gripper_cam'?)"),
         (["cameras=rgb_ego_cam,rgb_griper_cam"], "no camera named 'rgb_griper_cam'"),
-        (["width=641"], "width = 641; the pictures of a video have an even number of pixels"),
+        (["width=641"], "width = 641; the width and height of a video must be even numbers"),
         (["n=0"], "n = 0; it must be at least 1"),
         ([f"to={REFERENCE}"], "exists already"),
         (["to=/dev/null/out"], "cannot be written"),

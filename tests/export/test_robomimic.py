@@ -111,7 +111,7 @@ def test_pictures_have_robosuites_names_and_follow_one_another(tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["fps=25"], "fps = 25; robosuite plays these actions, and certificates hold for 100 a second"),
+        (["fps=25"], "fps = 25; robomimic's data have 100 rows per second, for replay in robosuite"),
         (["to=out"], "to = out; robomimic's format is one file"),
         (["pool=nowhere"], "no pool at nowhere"),
     ],

@@ -252,7 +252,7 @@ class Window:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["to=film.gif"], "name a .png file for a film strip, an .mp4 file for a video"),
+        (["to=film.gif"], "give a .png file for a film strip or an .mp4 file for a video"),
         (["to=x.png", "of=push_the_slob"], "no shortcut named 'push_the_slob' (did you mean 'push_the_slab'?)"),
         (["to=x.png", "frames=0"], "frames = 0; it must be at least 1"),
         (["to=x.mp4", "fps=24"], "no fps that divides the control rate of 100 Hz named '24'"),
@@ -270,7 +270,7 @@ def test_bad_input_is_one_line(row, capsys, arguments, says):
     ("arguments", "says"),
     [
         (["to=x.png", "camera=rgb_griper"], "no camera named 'rgb_griper'"),
-        (["to=x.mp4", "width=63"], "width = 63; the pictures of a video have an even number of pixels"),
+        (["to=x.mp4", "width=63"], "width = 63; the width and height of a video must be even numbers"),
         (["to=/dev/null/x.mp4"], "/dev/null/x.mp4 cannot be written"),
     ],
 )

@@ -27,7 +27,7 @@ def test_pools_of_one_scenario_are_reported_too(tmp_path):
 
 @pytest.mark.parametrize(
     ("argv", "says"),
-    [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "name an .html file")],
+    [(("pool=nowhere",), "no pool at nowhere"), ((f"pool={REFERENCE}", "to=report.pdf"), "give an .html file")],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys):
     assert cli.run(("report", *argv)) == 2 and says in capsys.readouterr().err

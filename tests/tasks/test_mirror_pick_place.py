@@ -23,7 +23,7 @@ from scengen.envs.gym import PoolEnv
 from scengen.envs.robosuite import env_class
 from scengen.errors import BadConfig
 from scengen.export import recording
-from scengen.export.lerobot import DataSet
+from scengen.export.lerobot import DatasetWriter
 from scengen.export.recording import record
 from scengen.orientation import VIEW_CENTRE
 from scengen.pool import Pool
@@ -126,9 +126,9 @@ def test_robosuite_refuses_quarter_turns_of_pictures_that_are_not_square():
 @WITH_EYES
 def test_recordings_turn_every_picture_bit_by_bit_and_say_so_in_the_calibration(pools, tmp_path, monkeypatch):
     taken, told = [], []
-    monkeypatch.setattr(DataSet, "calibrate", lambda self, name, how, row: told.append(how))
-    add = DataSet.add
-    monkeypatch.setattr(DataSet, "add", lambda self, values, seen: (taken.append(seen), add(self, values, seen)))
+    monkeypatch.setattr(DatasetWriter, "calibrate", lambda self, name, how, row: told.append(how))
+    add = DatasetWriter.add
+    monkeypatch.setattr(DatasetWriter, "add", lambda self, values, seen: (taken.append(seen), add(self, values, seen)))
     how = {"cameras": CAMERAS[1], "width": 32, "height": 24, "fps": 2}
     for view in (PLAIN, HALF):
         record(recording.RecordSettings(str(pools[view]), str(tmp_path / str(view)), **how), lambda *_: None)
