@@ -123,8 +123,7 @@ class MassSort(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Lift and weigh each cube and put it back; then put the last one, which is still held, and the others into
-        zones."""
+        """Weigh each cube and put it back, except the last; put that one and then the others into their zones."""
         weights: list[float] = []
         *others, last = self.cubes
         for cube in others:
@@ -207,8 +206,7 @@ class MassSort(Scenario):
         yield within_reach("a zone", *(self.zone_at(rank) + above for rank in range(CUBE_COUNT)))
 
     def features(self) -> Mapping[str, float]:
-        """Least ratio of masses, largest mass [kg], number of pairs in wrong order, clearance in the jaw, side of
-        zones."""
+        """Least ratio of masses, largest mass [kg], number of pairs in wrong order, clearance in the jaw, side."""
         return {
             "least_ratio": min(heavier / lighter for lighter, heavier in pairwise(self.masses)),
             "heaviest": self.heavy,

@@ -120,9 +120,8 @@ class RecoverPegInsert(Scenario):
     def success(self, world: World) -> bool:
         foot, top = self.ends(world)
         within = np.abs(foot + top)[1:].max() < self.board.slot  # the middle's two distances, doubled
-        return bool(
-            world.memory["turned"] and within and MIN_INSERTED_SHARE <= self.inserted_share(world) <= MAX_INSERTED_SHARE
-        )
+        inserted = MIN_INSERTED_SHARE <= self.inserted_share(world) <= MAX_INSERTED_SHARE
+        return bool(world.memory["turned"] and within and inserted)
 
     def failure(self, world: World) -> str | None:
         return "the peg fell off the table" if fallen(world, "peg") else None

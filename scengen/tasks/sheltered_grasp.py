@@ -196,8 +196,7 @@ class ShelteredGrasp(Scenario):
         yield within_reach("the cube or the tray", *at, self.tray + RELEASE_HEIGHT * UP)
 
     def features(self) -> Mapping[str, float]:
-        """Azimuth of the entry [rad], depth in lengths of the fingers, clearance beside the palm [m], cube to rack
-        [rad]."""
+        """Azimuth of the entry [rad], depth over finger length, clearance beside the palm [m], cube to rack [rad]."""
         return {
             "azimuth": self._azimuth,
             "depth_over_palm": self.depth / PALM_ABOVE,

@@ -278,8 +278,8 @@ class StackCollapseRecovery(Scenario):
         yield from self.wait_for_collapse(world)
         for below, name in pairwise(NAMES):
             if not self.supports(world, below, name):
-                edge = self.cubes[below].edge / math.sqrt(2) + 0.004 if beyond_edge else 0.0
-                yield from self.stack(world, below, name, edge, by_mass)
+                over_edge = self.cubes[below].edge / math.sqrt(2) + 0.004  # the middle is 4 mm over the edge
+                yield from self.stack(world, below, name, over_edge if beyond_edge else 0.0, by_mass)
                 yield from self.settle(world)
 
     def _top_alone(self, world: World) -> Plan:
