@@ -176,7 +176,7 @@ def test_a_sample_is_verified_without_the_others(large, touched, capsys):
     assert touched.rows("witness") <= 3 * 40 and touched.rows("scene_xml") <= 3 * 40
     assert told.err.count("the scene") == 3 and "0 sound, 3 refuted" in told.out and "author's word" in told.out
     assert cli.run(["verify", f"pool={large}", "others=skip"]) == 2
-    assert "say sample=N too" in capsys.readouterr().err
+    assert "give sample=N, too" in capsys.readouterr().err
 
 
 # --- libraries -----------------------------------------------------------------------------------------------

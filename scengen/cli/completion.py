@@ -16,23 +16,23 @@ BASH = r"""
 _scengen() {
     local line=${COMP_LINE:0:COMP_POINT} IFS=$'\n'
     local word=${line##* }
-    local kept=${word%"${word##*[$COMP_WORDBREAKS]}"}  # bash replaces what comes after this alone
+    local kept=${word%"${word##*[$COMP_WORDBREAKS]}"}  # bash replaces only the text after this
     COMPREPLY=($(scengen --complete "$line" 2>/dev/null))
     COMPREPLY=("${COMPREPLY[@]#"$kept"}")
     [[ ${#COMPREPLY[@]} == 1 && ${COMPREPLY[0]} == *[=./@+] ]] && compopt -o nospace
 }
 complete -o default -F _scengen scengen
 """.lstrip()
-"""What bash evaluates. Where nothing is found it completes names of files."""
-OFFERED = 1000
-"""Scenarios of a pool that are offered: the first ones by their names, or those whose ids begin so."""
+"""Script for bash. Without completions of scengen it completes names of files."""
+MAX_SCENARIOS = 1000
+"""Largest number of scenarios of a pool to offer: the first ones by name, or those with a matching id."""
 
 
 def completions(line: str, verbs: Sequence[str]) -> list[str]:
-    """What the last word of a command line may become: commands, settings, tasks, splits, ids of a pool.
+    """Completions of the last word of a command line: commands, settings, tasks, splits, ids of a pool.
 
     Args:
-        line: from its beginning to the cursor.
+        line: command line up to the cursor.
         verbs: names of all commands.
     """
     *before, word = line.split(" ")
@@ -43,54 +43,57 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
     if verb not in verbs:
         return []
     key, equals, _ = word.partition("=")
-    with suppress(ScengenError):  # a line that is not right yet
+    with suppress(ScengenError):  # the line is not complete yet
         if equals and key == "split":
-            return _last(word, "+,", task_files.splits(_task(others), task_files.search_path(others)))
+            return _completed(word, "+,", task_files.splits(_task(others), task_files.search_path(others)))
         if equals and key == "axis":
-            return _last(word, "", task_files.splits(_task(others), task_files.search_path(others))[1:])
+            return _completed(word, "", task_files.splits(_task(others), task_files.search_path(others))[1:])
         if equals and key == "task":
-            return _last(word, ",", task_files.tasks(task_files.search_path(others))) if verb != "new" else []
+            return _completed(word, ",", task_files.tasks(task_files.search_path(others))) if verb != "new" else []
         if equals and key == "id":
             pools = [Pool.open(folder) for folder in _pools(others)]
-            names = [str(name) for pool in pools for name in islice(pool.names(), OFFERED)]
-            return _last(word, "", names) or _last(word, "", (id_ for pool in pools for id_ in _ids(pool, word)))
+            names = [str(name) for pool in pools for name in islice(pool.names(), MAX_SCENARIOS)]
+            return _completed(word, "", names) or _completed(
+                word, "", (id_ for pool in pools for id_ in _ids(pool, word))
+            )
         return _settings(verb, others, word)
     return []
 
 
 def _task(words: Sequence[str]) -> str:
-    """The task that has been chosen, for a command that wants one."""
+    """Name of the task on the command line; empty if there is none."""
     return next((word.removeprefix("task=") for word in words if word.startswith("task=")), "")
 
 
 def _pools(words: Sequence[str]) -> list[str]:
+    """Folders of the pools on the command line."""
     return [folder for word in words if word.startswith("pool=") for folder in word.removeprefix("pool=").split(",")]
 
 
 def _ids(pool: Pool, word: str) -> list[str]:
-    """Ids that begin as the word asks for."""
+    """Ids of a pool with the prefix that the word gives."""
     places = pool.directory.beginning(word.removeprefix("id="))
-    return [pool.directory.id(place) for place in places[:OFFERED]]
+    return [pool.directory.id(place) for place in places[:MAX_SCENARIOS]]
 
 
-def _last(word: str, separators: str, known: Iterable[str]) -> list[str]:
-    """Words that end in one of the known ones, after the last of the separators or the first `=`."""
+def _completed(word: str, separators: str, known: Iterable[str]) -> list[str]:
+    """Completions of a word by known names, after its last separator or its first `=`."""
     start = max(word.rfind(one) for one in "=" + separators) + 1
     return [word[:start] + one for one in known if one.startswith(word[start:])]
 
 
 def _settings(verb: str, words: Sequence[str], word: str) -> list[str]:
-    """Hydra's own: keys of the composed configuration, and files of groups."""
+    """Completions by Hydra: keys of the composed configuration, and files of groups."""
     groups = task_files.groups(verb)
     if "task" in groups and not _task(words):
-        words = [*words, f"task={task_files.tasks()[0]}"]  # its keys are those of all tasks, but for the parameters
+        words = [*words, f"task={task_files.tasks()[0]}"]  # all tasks have the same keys, except for parameters
     with initialize_config_dir(str(compose.config_dir(verb)), version_base="1.3", job_name="scengen"):
         plugin = DefaultCompletionPlugin(GlobalHydra.instance().config_loader())
         found = plugin._query(compose.config_name(verb), " ".join([*words, word]))
-    return [text for text in found if _offered(text, groups)]
+    return [text for text in found if _is_setting(text, groups)]
 
 
-def _offered(text: str, groups: Sequence[str]) -> bool:
-    """Whether a key is a setting of the command: Hydra also knows its own, and every folder of conf/."""
+def _is_setting(text: str, groups: Sequence[str]) -> bool:
+    """Whether a key is a setting of the command: Hydra also offers its own keys, and every folder of conf/."""
     first = text.lstrip("+~").split("=")[0].split(".")[0].split("/")[0]
     return first not in ("hydra", "command", "limits", "certify", "task") or first in groups

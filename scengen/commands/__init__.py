@@ -1,4 +1,4 @@
-"""One file per command: its docstring is the help line, `command(arguments)` runs it and returns the exit status."""
+"""One module per command: its docstring is the help line, `command(arguments)` runs it and returns the exit status."""
 
 import json
 import sys
@@ -17,7 +17,15 @@ from ..pool.names import Misnamed
 from ..work.printed import PlainConsole, printable
 from ..work.targets import write as write  # for the commands
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK = 0
+"""Exit status: success."""
+FAILED = 1
+"""Exit status: a check failed, or not all work succeeded."""
+BAD_INPUT = 2
+"""Exit status: bad input, a fault of the machine, or no verdict."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
+
 out = PlainConsole(width=None if sys.stdout.isatty() else 160)
 err = PlainConsole(stderr=True, soft_wrap=True)
 
@@ -25,17 +33,17 @@ Arguments = Sequence[str]
 
 
 def say(text: str) -> None:
-    """Print one line as it is: no markup, no colours, no control characters."""
+    """Print a line literally: no markup, colours or control characters."""
     out.print(printable(text))
 
 
 def warn(text: str, style: str = "red") -> None:
-    """Print a line on standard error as it is."""
+    """Print a line on standard error literally."""
     err.print(printable(text), style=style)
 
 
 def remark(text: str) -> None:
-    """Say on standard error what is missing though all went well."""
+    """Print a remark on standard error about a success with restrictions."""
     warn(f"scengen: {text}", "yellow")
 
 
@@ -48,37 +56,37 @@ def intake(module: str) -> ModuleType:
     try:
         return import_module(f"scengen.intake.{module}")
     except ImportError as error:
-        raise BadConfig(f"no {error.name} to take in meshes; say pip install 'scengen[mesh]'") from None
+        raise BadConfig(f"importing meshes needs {error.name}; pip install 'scengen[mesh]'") from None
 
 
 def one(pool: str | list[str] | None) -> str:
-    """The only pool named, for a command that takes one."""
+    """The folder of the pool, for a command that accepts one."""
     if pool is None:
-        raise BadConfig("no pool was named; say pool=FOLDER")
+        raise BadConfig("no pool was given; give pool=FOLDER")
     found = several(pool)
     if len(found) > 1:
-        raise BadConfig(f"pool = {cut(','.join(found), 400)}; this command takes one pool")
+        raise BadConfig(f"pool = {cut(','.join(found), 400)}; this command accepts one pool")
     return found[0]
 
 
 def several(pool: str | list[str]) -> list[str]:
-    """The pools named, one or more; those of a folder of pools, if that is named."""
+    """Folders of the pools, one or more. A folder of pools stands for its pools."""
     if not pool:
-        raise BadConfig("pool = ''; name the folder of a pool")
+        raise BadConfig("pool = ''; give the folder of a pool")
     return collection.folders(pool)
 
 
 def holder(pool: str | list[str] | None, name: str) -> Pool:
-    """The pool that holds the scenario that id= asks for, if several are named, or a folder of pools."""
+    """The pool with the scenario `name`: the only pool given, or the one of several that holds it."""
     found = [Pool.open(folder) for folder in several(pool or "")]
     if len(found) == 1:
         return found[0].check()
-    several_pools = Library(found)
-    return several_pools.pool(several_pools.find(name)).check()
+    library = Library(found)
+    return library.pool(library.find(name)).check()
 
 
 def chosen(pool: Pool, name: str) -> PoolRow:
-    """The scenario that id= asks for; of a name that is wrong about its id, a line says so."""
+    """The scenario `name` of a pool. A remark is printed if the name contradicts the id in it."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", Misnamed)
         row = pool.row(name)
@@ -88,5 +96,5 @@ def chosen(pool: Pool, name: str) -> PoolRow:
 
 
 def write_json(path: str, result: Any) -> None:
-    """Write what a command's json= asks for."""
+    """Write the result of a command to the file that json= names."""
     write(Path(path), json.dumps(result, indent=1) + "\n")

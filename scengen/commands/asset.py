@@ -38,19 +38,19 @@ class AssetSettings:
     def check(self) -> None:
         """Raise `BadConfig` for settings that do not go together."""
         if self.name is not None and self.mesh is not None:
-            raise BadConfig("name= writes an asset as a mesh, mesh= makes an asset of one; give one of them")
+            raise BadConfig("name= writes an asset as a mesh, mesh= imports a mesh as an asset; give one of them")
         if self.to is None and (self.name is not None or self.mesh is not None):
             where = "to=FILE.stl" if self.mesh is None else "to=FOLDER"
             raise BadConfig(f"asset needs {where}; see scengen asset --help")
         if self.to is not None and self.name is None and self.mesh is None:
-            raise BadConfig(f"to = {cut(self.to)}, but of what? say name=ASSET or mesh=FILE")
+            raise BadConfig(f"to = {cut(self.to)}, without an asset; give name=ASSET or mesh=FILE")
 
 
 def command(arguments: Arguments) -> int:
     settings = read("asset", arguments, AssetSettings)
     settings.check()
     if settings.mesh is not None:
-        return _take_in(settings, Path(str(settings.to)))
+        return _import_mesh(settings, Path(str(settings.to)))
     if settings.name is not None:
         return _write_mesh(settings.name, Path(str(settings.to)))
     out.print(_table())
@@ -75,23 +75,23 @@ def _write_mesh(name: str, target: Path) -> int:
     return OK
 
 
-def _take_in(settings: AssetSettings, folder: Path) -> int:
+def _import_mesh(settings: AssetSettings, folder: Path) -> int:
     asset = intake("asset")
     names = [field.name for field in fields(asset.IntakeRequest)]
     request = asset.IntakeRequest(**{name: getattr(settings, name) for name in names})
     request.check()
     try_folder(folder)
     if known := asset.kept(request, folder):
-        say(f"{folder} holds this mesh already, with these settings: nothing was computed")
-        return _tell(known)
+        say(f"{folder} already holds this mesh with these settings; nothing was computed")
+        return _report(known)
     taken = asset.take_in(request)
     figures = taken.figures()
     _write(taken, figures, folder)
-    return _tell(figures)
+    return _report(figures)
 
 
 def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
-    """The figures last: they vouch for the files beside them."""
+    """Write the files of an asset. The figures come last: they vouch for the others."""
     from ..intake.preview import preview
 
     write(folder / "asset.xml", taken.xml)
@@ -105,22 +105,26 @@ def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
     say(f"wrote {names} in {folder}")
 
 
-def _tell(figures: dict[str, Any]) -> int:
-    """What was found, and whether it is what was asked for."""
+def _report(figures: dict[str, Any]) -> int:
+    """Print the figures.
+
+    Returns:
+        Exit status: whether the asset is as accurate as asked for, and comes to rest.
+    """
     error, hull, rest = figures["error"], figures["error_of_one_hull"], figures["rest"]
     asked = figures["settings"]["error"]
-    near, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
+    is_accurate, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
     say(
         f"{count} convex piece{'s' * (count > 1)}: {1000 * error['outward']:.2f} mm too far out and "
         f"{1000 * error['inward']:.2f} mm too far in at most, {error['volume']:.3f} times the volume; "
         f"one convex hull: {1000 * hull['outward']:.2f} mm, {hull['volume']:.3f} times"
     )
     say(
-        f"{figures['mass']:.3g} kg; let go on the table it moves by {1000 * rest['creep']:.3f} mm in 2 s, "
+        f"{figures['mass']:.3g} kg; released on the table it moves by {1000 * rest['creep']:.3f} mm in 2 s, "
         f"at {1000 * rest['speed']:.2f} mm/s at most"
     )
-    if not near:
-        say(f"MISSED: the error of {1000 * asked:g} mm that was asked for; permit more pieces, or a larger error")
+    if not is_accurate:
+        say(f"MISSED: the error of {1000 * asked:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:
-        say("MISSED: it does not come to rest; give it a flat foot, or ask for a smaller error")
-    return OK if near and rest["rests"] else FAILED
+        say("MISSED: it does not come to rest; give it a flat foot, or set a smaller error")
+    return OK if is_accurate and rest["rests"] else FAILED

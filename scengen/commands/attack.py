@@ -26,7 +26,7 @@ def command(arguments: Arguments) -> int:
     settings.check()
     try_file(settings.json)
     try_folder(settings.to)
-    task, subjects = _chosen(arguments, settings)
+    task, subjects = _subjects(arguments, settings)
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
     with ProgressBar(err, f"attack {task.name}", len(subjects), settings.workers) as progress_bar:
@@ -36,11 +36,11 @@ def command(arguments: Arguments) -> int:
 
         report = attack(task, subjects, settings, folder, progress)
     out.print(attack_table(report))
-    called = {one.scenario.id: str(one.name) for one in subjects}
-    for line in _remarks(report, called):
+    names = {one.scenario.id: str(one.name) for one in subjects}
+    for line in _remarks(report, names):
         say(line)
     for hit in report.refuting:
-        warn(f"REFUTED {called[hit.scenario]} {hit}; {hit.name}.npz")
+        warn(f"REFUTED {names[hit.scenario]} {hit}; {hit.name}.npz")
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
@@ -48,11 +48,11 @@ def command(arguments: Arguments) -> int:
     return FAILED if report.refuting else BAD_INPUT if report.lost else OK
 
 
-def _chosen(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Sequence[Subject]]:
-    """The task that is attacked, and its scenarios.
+def _subjects(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Sequence[Subject]]:
+    """The task and its scenarios to attack.
 
     Raises:
-        ScengenError: neither a task nor a pool was given, or both, or nothing can be attacked.
+        ScengenError: neither a task nor a pool was given, or both, or there is no scenario to attack.
     """
     name, others = compose.chosen_task("attack", arguments), [a for a in arguments if a.startswith("task.")]
     if (name is None) == (settings.pool is None):
@@ -63,22 +63,21 @@ def _chosen(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Seque
     pool = Pool.open(str(settings.pool)).check()
     task = task_of(pool, search_path(arguments))
     if not (subjects := certified(task, islice(pool.rows(), settings.n))):
-        raise BadConfig(f"{pool.folder} holds no scenario; nothing can be attacked")
+        raise BadConfig(f"{pool.folder} holds no scenario to attack; choose another pool")
     return task, subjects
 
 
-def _remarks(report: AttackReport, called: Mapping[str, str]) -> list[str]:
+def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:
+    """Lines about fixed answers, shortcuts that were not tried, and attacks that did not finish."""
     counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
     untried = [
         f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()
     ]
-    lost = [
-        f"unknown: the attack on {called[id_]} {why}" for id_, _, why in (one.partition(" ") for one in report.lost)
-    ]
-    return [*map(_fixed, report.priors), *untried, *lost]
+    lost = [f"unknown: the attack on {names[id_]} {why}" for id_, _, why in (one.partition(" ") for one in report.lost)]
+    return [*map(_fixed_answers, report.priors), *untried, *lost]
 
 
-def _fixed(prior: Prior) -> str:
+def _fixed_answers(prior: Prior) -> str:
     values = ", ".join(f"{value:.3g}" for value in prior.values)
     told = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
     if prior.fresh is None or prior.bound is None:

@@ -35,8 +35,8 @@ def command(arguments: Arguments) -> int:
         say(f"a sample: {sampled_indices(pool)}")
     feasible = [p for p in drawn if p.feasible]
     stages = {
-        "feasible": ("feasible draws against all draws: what the family's constraints leave out", drawn),
-        "certified": ("certified against feasible draws: what the certifier leaves out", feasible),
+        "feasible": ("feasible draws against all draws: losses to the constraints of the family", drawn),
+        "certified": ("certified against feasible draws: losses to the certifier", feasible),
     }
     result = {}
     for name, (title, among) in stages.items():
@@ -55,13 +55,15 @@ def command(arguments: Arguments) -> int:
 
 
 def _table(among: Sequence[Redrawn]) -> dict[str, np.ndarray]:
+    """Parameters and features of draws, by name."""
     rows = [measured(p.scenario) for p in among]
     return {name: np.array([row[name] for row in rows], float) for name in rows[0]}
 
 
 def _verdict(stage: str, found: Bias) -> str:
+    """The result of a stage in words."""
     if found.accepted == found.proposed:
-        return f"{stage}: all of them, so that there is no selection bias"
+        return f"{stage}: all of them, so there is no selection bias"
     found_in = f"selection bias in {', '.join(found.flagged)}" if found.flagged else "no sign of selection bias"
     return (
         f"{stage}: {found_in}; along the worst marginal the {found.accepted} are worth {found.effective:.1f} "

@@ -40,22 +40,28 @@ def command(arguments: Arguments) -> int:
     search = search_path(arguments)
     task, names = task_of(pools[0], search), {task_of(pool, search).name for pool in pools}
     if len(names) > 1:
-        raise BadConfig(f"pool = {','.join(several(settings.pool))}; these are pools of {', '.join(sorted(names))}")
+        raise BadConfig(
+            f"pool = {','.join(several(settings.pool))}; pools of {', '.join(sorted(names))}; give pools of one task"
+        )
     first, *others = ((pool, batch_of(task, pool)) for pool in pools)
-    result = [_alone(task, *first, settings, search)]
+    result = [_own_figures(task, *first, settings, search)]
     for other in others:
-        result += [_alone(task, *other, settings, search), _pair(task, first, other, settings)]
+        result += [_own_figures(task, *other, settings, search), _contrast(task, first, other, settings)]
     if settings.json:
         write_json(settings.json, result)
     return FAILED if any(r["near_duplicates"] for r in result) else OK
 
 
-def _alone(task: Task, pool: Pool, batch: Batch, settings: CompareSettings, search: Sequence[str]) -> dict[str, Any]:
-    """How far one pool is from training, how even it is, and whether it repeats itself."""
-    away = per_parameter(task, batch)
-    far = "; ".join(f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in away.items())
+def _own_figures(
+    task: Task, pool: Pool, batch: Batch, settings: CompareSettings, search: Sequence[str]
+) -> dict[str, Any]:
+    """Print and return the distance of a pool from training, its evenness, and its near duplicates."""
+    distances = per_parameter(task, batch)
+    words = "; ".join(
+        f"{name} {mean:.2f} on average, {least:.2f} at least" for name, (least, mean) in distances.items()
+    )
     say(f"{pool.folder}: {len(batch)} scenarios")
-    say(f"  outside training by [training widths]: {far or 'nothing'}")
+    say(f"  outside training by [training widths]: {words or 'nothing'}")
     even = None
     if len(batch) and not pool.manifest.is_subset:
         certified = [list(p.quantiles.values()) for p in redrawn(pool, search=search) if p.certified]
@@ -68,7 +74,7 @@ def _alone(task: Task, pool: Pool, batch: Batch, settings: CompareSettings, sear
         out.print(pairs_table(pairs, "in the pool", "again", names([pool], _ids(pairs))))
     return {
         "pool": str(pool.folder),
-        "outside": {name: {"least": least, "mean": mean} for name, (least, mean) in away.items()},
+        "outside": {name: {"least": least, "mean": mean} for name, (least, mean) in distances.items()},
         "evenness": asdict(even) if even else None,
         "near_duplicates": [asdict(p) for p in pairs],
     }
@@ -77,8 +83,8 @@ def _alone(task: Task, pool: Pool, batch: Batch, settings: CompareSettings, sear
 Side = tuple[Pool, Batch]
 
 
-def _pair(task: Task, one: Side, other: Side, settings: CompareSettings) -> dict[str, Any]:
-    """How far a pool is from the first one, and what they share."""
+def _contrast(task: Task, one: Side, other: Side, settings: CompareSettings) -> dict[str, Any]:
+    """Print and return the energy distance between the first pool and another one, and their near duplicates."""
     (pool, here), (beside, there) = one, other
     ones, others = (first_scenarios(task, of, MAX_ENERGY_SCENARIOS) for of in (pool, beside))
     space = of_features(task, ones, others)
@@ -102,5 +108,5 @@ def _pair(task: Task, one: Side, other: Side, settings: CompareSettings) -> dict
 
 
 def _ids(pairs: Sequence[NearDuplicate]) -> list[str]:
-    """Ids of the scenarios that are told."""
+    """Ids of the scenarios in the printed pairs."""
     return [id_ for pair in pairs[:SHOWN_PAIRS] for id_ in (pair.one, pair.other)]

@@ -28,7 +28,7 @@ class CrosscheckSettings:
     limit_mb: int
 
     def check(self) -> None:
-        """Raise `BadConfig` for a value that means nothing."""
+        """Raise `BadConfig` for a value that is not valid."""
         if not 0.0 <= self.limit <= 1.0:
             raise BadConfig(f"limit = {self.limit:g}; it must lie in [0, 1]")
         at_least(self, first=1, workers=1, limit_seconds=1, limit_mb=200)
@@ -41,7 +41,7 @@ def command(arguments: Arguments) -> int:
     pools = [Pool.open(folder) for folder in several(settings.pool)]
     total = sum(min(len(pool), settings.first or len(pool)) for pool in pools)
     if not total:
-        raise BadConfig(f"pool = {', '.join(several(settings.pool))}; it holds no scenario, see scengen generate")
+        raise BadConfig(f"pool = {', '.join(several(settings.pool))}; it holds no scenario; see scengen generate")
 
     from ..envs.agreement import compare_all  # here, because importing robosuite takes seconds
 
@@ -52,9 +52,11 @@ def command(arguments: Arguments) -> int:
     for comparison in found:
         tasks[comparison.task].append(comparison)
         if not comparison.agrees:
-            told = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
-            warn(f"DIFFERS {called[comparison.id]}: {told}")
-    table = Table("task", "scenarios", "same verdict", "hands apart at most (mm)", "verdicts apart at most (s)")
+            difference = f"{comparison.ours} here, {comparison.theirs} in robosuite: {comparison.reason}"
+            warn(f"DIFFERS {called[comparison.id]}: {difference}")
+    table = Table(
+        "task", "scenarios", "same verdict", "largest distance of hands (mm)", "largest delay of verdicts (s)"
+    )
     for task, those in tasks.items():
         apart, later = max(c.apart for c in those), max(abs(c.later) for c in those)
         table.add_row(task, str(len(those)), str(sum(c.agrees for c in those)), f"{1000 * apart:.4f}", f"{later:.2f}")

@@ -30,7 +30,7 @@ def command(arguments: Arguments) -> int:
     out.print(_table(task.name, search))
     say("trials: " + ", ".join(f"{count} {what}" for what, count in search.spent.items()))
     write(folder / "axes.yaml", search.as_yaml(task))
-    say(f"wrote {folder / 'axes.yaml'}: copy what says something into the task file, and measure it with scengen probe")
+    say(f"wrote {folder / 'axes.yaml'}: copy useful axes into the task file, and evaluate them with scengen probe")
     return OK
 
 

@@ -16,7 +16,7 @@ from . import BAD_INPUT, FAILED, OK, Arguments, err, out, remark, say, several, 
 from .settings import read
 
 MODULE = "scengen.drift.judge"
-"""What runs in each environment."""
+"""Module that runs in each environment."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     versions = [settings.mujoco] if isinstance(settings.mujoco, str) else list(dict.fromkeys(settings.mujoco))
     if not versions:
-        raise BadConfig("mujoco = []; name the versions, as in mujoco=[3.4.0,3.5.0]")
+        raise BadConfig("mujoco = []; give versions, such as mujoco=[3.4.0,3.5.0]")
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-    places = [environment(version, say) for version in versions]
-    found = {place.mujoco: _judged(place, pools, settings, search_path(arguments)) for place in places}
+    environments = [environment(version, say) for version in versions]
+    found = {each.mujoco: _judged(each, pools, settings, search_path(arguments)) for each in environments}
     result = matrix(pools, found, settings.level, settings.n)
     if settings.json:
         write_json(settings.json, result)
@@ -61,25 +61,25 @@ def command(arguments: Arguments) -> int:
 
 
 def _judged(
-    place: Environment, pools: Sequence[Pool], settings: DriftSettings, search: Sequence[str]
+    where: Environment, pools: Sequence[Pool], settings: DriftSettings, search: Sequence[str]
 ) -> dict[str, Any]:
-    """What the checks of some pools say in an environment: its `fingerprint`, and by folder what was `judged`.
+    """Results of the checks of some pools in an environment: its `fingerprint`, and what was `judged`, by folder.
 
     Raises:
-        ScengenError: it does not run there, or not with the version that it should have.
+        ScengenError: the checks do not run there, or run with another version.
     """
     folders = [str(pool.folder) for pool in pools]
     asked = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
-    answers = place.lines(MODULE, {"pools": folders, "search": list(search), **asked})
+    answers = where.lines(MODULE, {"pools": folders, "search": list(search), **asked})
     about = next(answers)
-    if about["mujoco"] != place.mujoco:
+    if about["mujoco"] != where.mujoco:
         raise ScengenError(
-            f"the environment of mujoco {place.mujoco} imports {about['mujoco']}; remove {place.folder}, and look at "
+            f"the environment of mujoco {where.mujoco} imports {about['mujoco']}; remove {where.folder}, and check "
             "PYTHONPATH"
         )
     judged: dict[str, list[dict[str, Any]]] = {folder: [] for folder in folders}
     count = sum(len(pool) if settings.n is None else min(settings.n, len(pool)) for pool in pools)
-    with ProgressBar(err, f"mujoco {place.mujoco}", count) as progress_bar:
+    with ProgressBar(err, f"mujoco {where.mujoco}", count) as progress_bar:
         for done, answer in enumerate(answers, 1):
             judged[answer.pop("pool")].append(answer)
             progress_bar.show(done)

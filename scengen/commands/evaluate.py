@@ -24,9 +24,9 @@ def command(arguments: Arguments) -> int:
     write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
     called = names(map(Pool.open, settings.folders), found.lost)
     for scenario, why in found.lost.items():
-        warn(f"UNKNOWN {called[scenario]}: {why}; it was left out")
+        warn(f"UNKNOWN {called[scenario]}: {why}; its episodes are left out")
     if found.earlier:
-        what = "the pools, the settings and the policy are the same; fresh=true plays them anew"
+        what = "the pools, the settings and the policy are the same; fresh=true repeats them"
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl")
     return FAILED if found.lost else OK

@@ -19,8 +19,8 @@ from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, say, write
 from .settings import read
 
-STRIP = 100_000_000
-"""Largest size of a film strip [pixels]: it takes three bytes of memory for each, several times over."""
+MAX_STRIP_PIXELS = 100_000_000
+"""Largest size of a film strip [pixels]: each takes three bytes of memory, multiple times."""
 
 
 @dataclass(frozen=True)
@@ -41,26 +41,28 @@ class FilmSettings:
 
     @property
     def eye(self) -> str | None:
-        """The camera by its name in the model."""
+        """Name of the camera in the model."""
         return cameras_of(ALL).get(self.camera, self.camera) if self.camera else None
 
     def check(self) -> None:
-        """Raise `BadConfig` for settings that make no sense."""
+        """Raise `BadConfig` for settings that are not valid."""
         if (self.hit is None) == (self.id is None) or (self.hit is None and self.pool is None):
             raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
-            raise BadConfig(f"to = {self.to}; name a .png file for a film strip, an .mp4 file for a video")
+            raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
         at_least(self, frames=1, fps=1, width=1, height=1)
-        if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > STRIP:
+        if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > MAX_STRIP_PIXELS:
             size = f"{self.frames} frames of {self.width} x {self.height} pixels"
-            raise BadConfig(f"{size} are more than {STRIP / 1e6:g} million pixels; ask for fewer or smaller ones")
+            raise BadConfig(
+                f"{size} are more than {MAX_STRIP_PIXELS / 1e6:g} million pixels; ask for fewer or smaller ones"
+            )
 
 
 def command(arguments: Arguments) -> int:
     settings = read("film", arguments, FilmSettings)
     settings.check()
     try_file(settings.to)
-    take = _hit(settings, arguments) if settings.hit else _of_pool(settings, arguments)
+    take = _take_of_hit(settings, arguments) if settings.hit else _take_of_pool(settings, arguments)
     target, size = Path(settings.to), (settings.width, settings.height)
     with ProgressBar(err, "film", 1) as bar:
         if target.suffix == ".png":
@@ -71,21 +73,21 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _of_pool(settings: FilmSettings, arguments: Arguments) -> Take:
-    """The witness of a scenario in a pool, or one of its shortcuts."""
+def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:
+    """A take of the witness of a scenario in a pool, or of one of its shortcuts."""
     pool = holder(settings.pool, str(settings.id))
     row = check_row(chosen(pool, str(settings.id)))
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     if settings.of == WITNESS:
         return Take.witness(row, scenario)
     take, rollout = shortcut(row, scenario, settings.of, settings.raw)
-    told = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
-    say(f"{settings.of}: {told}")
+    outcome = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
+    say(f"{settings.of}: {outcome}")
     return take
 
 
-def _hit(settings: FilmSettings, arguments: Arguments) -> Take:
-    """What the adversary did."""
+def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> Take:
+    """A take of a hit of the adversary."""
     hit = Hit.load(Path(str(settings.hit)))
     search = search_path(arguments)
     task = (

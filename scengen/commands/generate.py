@@ -25,23 +25,23 @@ from .settings import read_task
 T = TypeVar("T")
 
 GENERATED = "generated"
-"""Folder of the pools of a sweep that names none."""
+"""Default folder of the pools of a sweep."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One pool that is to be made."""
+    """One pool to make."""
 
     task: Task
     certify_settings: CertifySettings
     settings: GenerateSettings
 
     def __call__(self) -> Summary:
-        """Make the pool, and tell what came of it."""
+        """Make the pool, and print its summary."""
         task, settings = self.task, self.settings
         if settings.sampler == "sobol" and settings.n < SOBOL:
-            what = f"of {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
-            warn(f"scengen: {what}, up to 0.95 at 32; say n={SOBOL} or more, or sampler=lhs:{settings.n}")
+            what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
+            warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
         with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
 
             def progress(certified: int, finished: int, verdicts: Mapping[str, int]) -> None:
@@ -67,8 +67,8 @@ def command(arguments: Arguments) -> int:
     if not asked[0].swept:
         (run,) = map(_run, asked)
         return OK if run().certified == run.settings.n else FAILED
-    asked, found = _sensible(asked)
-    runs = _apart(asked, found)
+    asked, found = _valid_runs(asked)
+    runs = _with_folders(asked, found)
     say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
     summaries = []
     for run in runs:
@@ -76,8 +76,8 @@ def command(arguments: Arguments) -> int:
         collection.write_index(summaries[-1].pool.folder.parent, [summaries[-1].pool])
     out.print(_table(asked, runs, summaries))
     folder = summaries[-1].pool.folder.parent
-    stands = f"pool={folder} stands for all pools that it names"
-    say(f"wrote {folder / collection.INDEX}: {stands}, in verify, show, report, evaluate")
+    use = f"pool={folder} stands for all pools in it"
+    say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
     short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
     return FAILED if short else OK
 
@@ -89,14 +89,14 @@ def _run(asked: Combination) -> Run:
     return Run(task, certify_settings, settings)
 
 
-def _sensible(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
-    """The runs of a sweep, found to make sense before the first begins.
+def _valid_runs(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
+    """The runs of a sweep, all checked before the first one starts.
 
-    Where several tasks are named, so may be axes of each: a combination of a task with an axis that another one has is
-    left out, and told.
+    A sweep over multiple tasks may name axes of each. A combination of a task with an axis of another task is left out
+    with a warning.
 
     Raises:
-        BadConfig: one makes no sense, and which it is.
+        BadConfig: a combination is not valid; the message names it.
     """
     runs = [_checked(one, _run) for one in asked]
     kept, lacking = [], []
@@ -108,7 +108,7 @@ def _sensible(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run
             _checked(one, lambda _, run=run: run.settings.check(run.task))
             kept.append((one, run))
     if lacking:
-        warn(f"scengen: left out, since the task has no such split: {', '.join(lacking)}", "yellow")
+        warn(f"scengen: left out, because the task has no such split: {', '.join(lacking)}", "yellow")
     return [one for one, _ in kept], [run for _, run in kept]
 
 
@@ -118,24 +118,26 @@ def _missing(run: Run) -> set[str]:
 
 
 def _checked(asked: Combination, look: Callable[[Combination], T]) -> T:
-    """What is found of a combination.
+    """Apply a function to a combination.
 
     Raises:
-        BadConfig: it makes no sense, and which it is.
+        BadConfig: the combination is not valid; the message names it.
     """
     try:
         return look(asked)
     except ScengenError as error:
-        raise BadConfig(f"{asked}: {error}; nothing was made, leave this combination out") from None
+        raise BadConfig(f"{asked}: {error}; no pool was made; leave this combination out") from None
 
 
-def _apart(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
-    """The runs with a folder each, `<task>-<split>` and what else is swept, below the one that pool= names.
+def _with_folders(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
+    """The runs with folders below that of pool=: `<task>-<split>` and the other swept settings.
 
     Raises:
-        BadConfig: two of them have the same.
+        BadConfig: two runs have the same folder.
     """
-    folders = [Path(run.settings.pool or GENERATED, _called(one, run)) for one, run in zip(asked, runs, strict=True)]
+    folders = [
+        Path(run.settings.pool or GENERATED, _folder_name(one, run)) for one, run in zip(asked, runs, strict=True)
+    ]
     folder, times = Counter(folders).most_common(1)[0]
     if times > 1:
         raise BadConfig(f"{times} of the combinations would be written to {folder}; give each value once")
@@ -145,14 +147,14 @@ def _apart(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
     ]
 
 
-def _called(asked: Combination, run: Run) -> str:
-    """What the folder of a combination is called."""
+def _folder_name(asked: Combination, run: Run) -> str:
+    """Name of the folder of a combination."""
     others = [f"{key}={value}" for key, value in asked.swept.items() if key not in ("task", "split")]
     return re.sub(r"[^\w.+@=,\[\]-]", "_", "-".join([run.task.name, run.settings.split, *others]))
 
 
 def _table(asked: Sequence[Combination], runs: Sequence[Run], summaries: Sequence[Summary]) -> Table:
-    """A line for every pool of a sweep."""
+    """A table with a line for each pool of a sweep."""
     names = list(asked[0].swept)
     table = Table(*names, title=f"{len(runs)} pools", title_justify="left")
     for column in ("certified", "indices", "CPU s each", "pool"):

@@ -31,8 +31,8 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _tell(memory: Baseline) -> str:
-    """What one kind of memory does, in words."""
+def _memory_result(memory: Baseline) -> str:
+    """Success of one kind of memory, in words."""
     if not (memory.training and memory.here and memory.excess):
         return memory.finding
     rates = f"{memory.training.value:.0%} of {memory.control}, {memory.here.value:.0%} of {memory.excess.twins} twins"
@@ -50,11 +50,11 @@ def _table(card: AxisCard) -> Table:
         how = f"{found.inside} of {found.draws} draws inside training"
         table.add_row("physics", f"{found.feature}: " + (f"leaves training ({found.kind})" if found.leaves else how))
     if card.indices:
-        told = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
-        table.add_row("solvable", told)
+        solvable = f"{card.funnel['certified']} of {card.indices} indices certified, {card.first_draws} as first drawn"
+        table.add_row("solvable", solvable)
     table.add_row("verdict", card.verdict)
     for baseline in card.baselines:
-        table.add_row(f"memory {baseline.name}", _tell(baseline))
+        table.add_row(f"memory {baseline.name}", _memory_result(baseline))
     if card.oracle:
         table.add_row("oracle", f"solves {card.oracle.value:.0%} of {card.oracle.scenarios} twins")
     for who, edge in card.boundaries.items():

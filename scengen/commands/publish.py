@@ -17,8 +17,8 @@ from . import OK, Arguments, err, say, several
 from .settings import read
 from .verify import EXPIRED, verified
 
-LONGEST = 300
-"""Letters of a fault that are told."""
+MAX_FAULT = 300
+"""Largest length of a fault in a message [characters]."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ def command(arguments: Arguments) -> int:
             report = verified(pool, options, search_path(arguments), progress_bar.show)
         if not report.holds:
             fault = report.failed[0]
-            why = f"{report.names.get(fault['id'], fault['id'])}: {cut(fault['reason'], LONGEST)}"
-            told = f"{pool.folder} is {report.verdict} at level {report.level}: {why}"
-            raise PoolError(f"{told}; a card is for pools that verify, see scengen verify pool={pool.folder}")
-        published.append(PublishedPool(pool, report.settings, _told(report)))
+            why = f"{report.names.get(fault['id'], fault['id'])}: {cut(fault['reason'], MAX_FAULT)}"
+            verdict = f"{pool.folder} is {report.verdict} at level {report.level}: {why}"
+            raise PoolError(f"{verdict}; only pools that verify are published, see scengen verify pool={pool.folder}")
+        published.append(PublishedPool(pool, report.settings, _verification(report)))
     tasks = dict.fromkeys(pool.task for pool in pools)
     title = settings.title or f"scengen: {', '.join(tasks)}"
     publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
@@ -65,7 +65,7 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _told(report: Report) -> str:
-    """What verification came to, in words."""
+def _verification(report: Report) -> str:
+    """The verification of a pool in words."""
     sample = f", {report.sample['size']} simulated" if report.sample else ""
     return f"level {report.level}{sample}{', certificates expired' if report.expired else ''}"

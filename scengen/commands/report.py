@@ -24,7 +24,7 @@ class ReportSettings:
 def command(arguments: Arguments) -> int:
     settings = read("report", arguments, ReportSettings)
     if Path(settings.to).suffix != ".html":
-        raise BadConfig(f"to = {settings.to}; name an .html file")
+        raise BadConfig(f"to = {settings.to}; give an .html file")
     try_file(settings.to)
     try_file(settings.json)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]

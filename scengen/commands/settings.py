@@ -16,10 +16,10 @@ T = TypeVar("T")
 
 
 def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
-    """The settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
+    """Read the settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
 
     Args:
-        kind: dataclass that says which settings there are, and their types.
+        kind: dataclass with the names and types of the settings.
 
     Raises:
         ScengenError: one line that says what is wrong.
@@ -28,21 +28,21 @@ def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
 
 
 def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task, CertifySettings]:
-    """The settings of a command that takes a task, the task, and the settings of its certificates.
+    """Read the settings of a command with a task, the task, and the settings of its certificates.
 
     Raises:
         ScengenError: one line that says what is wrong.
     """
     plain, choices = composed(verb, overrides)
     settings = typed("", kind, _settings(verb, plain))
-    found = load(choices["task"], plain["task"])
-    certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], found, choices["certify"]))
+    task = load(choices["task"], plain["task"])
+    certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"]))
     certify_settings.check()
-    return settings, found, certify_settings
+    return settings, task, certify_settings
 
 
 def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything but what is chosen from files, such as task and certify."""
+    """The settings without those that are chosen from files, such as task and certify."""
     settings = {key: value for key, value in plain.items() if key not in groups(verb)}
     for key, value in settings.items():
         if value == "???":
@@ -53,10 +53,10 @@ def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
-    """Who works: `workers=auto` stands for all cores, of this machine or of the cluster that executor=ray names.
+    """The workers of a command. `workers=auto` means all cores, of this machine or of the cluster of executor=ray.
 
     Raises:
-        ScengenError: it is no number, or there is no such cluster.
+        ScengenError: the count is not a number, or there is no such cluster.
     """
     if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
         raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")

@@ -15,8 +15,8 @@ from ..work.targets import try_file
 from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
 from .settings import read
 
-TOLD = 3
-"""Of more pools than these a line each is told, not every scenario."""
+MAX_DETAILED_POOLS = 3
+"""Largest number of pools whose scenarios are listed. More pools get one line each."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ def command(arguments: Arguments) -> int:
         at_least(settings, images=0, films=0)
         if target and target.suffix != ".html":
             raise BadConfig(
-                f"to = {target}; name an .html file for a contact sheet (a single scenario, id=, gives a .png)"
+                f"to = {target}; give an .html file for a contact sheet, or id= for a film strip of one scenario"
             )
         try_file(target)
         pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-        if len(pools) > TOLD:
+        if len(pools) > MAX_DETAILED_POOLS:
             out.print(report.pools_table(pools))
         else:
             for pool in pools:
@@ -55,7 +55,7 @@ def command(arguments: Arguments) -> int:
                     remark(f"{target} has no pictures: {missing}")
     else:
         if target and target.suffix != ".png":
-            raise BadConfig(f"to = {target}; name a .png file for the film strip of a scenario")
+            raise BadConfig(f"to = {target}; give a .png file for the film strip of a scenario")
         try_file(target)
         pool = holder(settings.pool, settings.id)
         row = chosen(pool, settings.id)

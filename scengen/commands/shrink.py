@@ -36,16 +36,21 @@ def command(arguments: Arguments) -> int:
     settings, task, certify_settings = read_task("shrink", arguments, ShrinkSettings)
     at_least(settings, seed=0, index=0)
     try_file(settings.json)
-    scenario = _proposed(task, settings)
+    scenario = _scenario(task, settings)
     failed = certify(scenario, task.horizon, certify_settings, task.embodiment, adversary=attacked).certificate.failed
     where = Name(task.name, settings.split, settings.index, scenario.id)
     if failed is None:
-        raise BadConfig(f"{where} passes every check of certify={certify_settings.name}; there is nothing to shrink")
+        raise BadConfig(
+            f"{where} passes every check of certify={certify_settings.name}; give a scenario that fails one"
+        )
     say(f"{where} fails {failed.name}: {failed.reason}")
     scales = {name: scale(task, name) for name in task.known}
     with ProgressBar(err, f"shrink {where}", None) as progress_bar:
         found = shrink(
-            values(scenario), centre(task.training), scales, _fails(task, certify_settings, failed, progress_bar.show)
+            values(scenario),
+            centre(task.training),
+            scales,
+            _same_failure(task, certify_settings, failed, progress_bar.show),
         )
     out.print(shrunk_table(found, {name: p.unit for name, p in task.known.items()}))
     nearest = with_values(scenario, found.values)
@@ -59,16 +64,16 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _proposed(task: Task, settings: ShrinkSettings) -> Scenario:
-    """The scenario of an index: the first feasible try, or the first one where none is feasible."""
+def _scenario(task: Task, settings: ShrinkSettings) -> Scenario:
+    """The scenario of an index: the first feasible try, or the first try if none is feasible."""
     tries = list(task.proposals(settings.split, settings.seed, settings.index, task.design(settings.sampler)))
     return (tries[0] if tries[-1].refutation else tries[-1]).scenario
 
 
-def _fails(
+def _same_failure(
     task: Task, certify_settings: CertifySettings, failed: Check, progress: Callable[[int, str], None]
 ) -> Callable[[Mapping[str, Value]], bool]:
-    """Whether a scenario fails the same check, and no cheaper one before it."""
+    """A function that says whether a scenario fails the same check, and no cheaper check before it."""
     start, judged = task.family(), 0
 
     def fails(candidate: Mapping[str, Value]) -> bool:

@@ -31,11 +31,13 @@ def command(arguments: Arguments) -> int:
     settings = read("subset", arguments, SubsetSettings)
     pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
     if not target.name:
-        raise BadConfig(f"to = {settings.to}; name a folder of its own for the new pool")
+        raise BadConfig(f"to = {settings.to}; give a folder for the new pool")
     if not 1 <= settings.n <= len(pool):
-        raise BadConfig(f"n = {settings.n}; it must lie in [1, {len(pool)}], the size of {pool.folder}")
+        raise BadConfig(
+            f"n = {settings.n}; it must lie in [1, {len(pool)}], because {pool.folder} has {len(pool)} scenarios"
+        )
     if (target / MANIFEST).exists():
-        raise PoolError(f"{target} holds a pool already; choose another to=")
+        raise PoolError(f"{target} already holds a pool; choose another to=")
     try_folder(target)
     locked = lock.read_lock(pool.folder)
     task = task_of(pool, search_path(arguments))

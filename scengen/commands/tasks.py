@@ -10,6 +10,7 @@ from . import OK, Arguments, out
 from .settings import read
 
 PAPER = "paper"
+"""Value of `axes` for the axes that the paper defines."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ def command(arguments: Arguments) -> int:
     if name is None and not settings.axes:
         out.print(tasks_table(listed, certified()))
         return OK
-    # Loading a task takes 0.1 s of processor time: here its numbers are told, and checked.
+    # Loading a task takes 0.1 s of processor time: only these branches print its numbers, which loading checks.
     others = [a for a in arguments if not a.startswith(("task=", "axes="))]
     tasks = [compose.load_task(each.name, others) for each in listed if name or each.paper_axes]
     if settings.axes:

@@ -29,14 +29,18 @@ from ..work.targets import try_file
 from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
 from .settings import read
 
-SHOWN = 20
-"""Differences and faults that are told; the files hold all."""
+MAX_PRINTED = 20
+"""Largest number of differences and faults to print; the files hold all."""
 EXPIRED = ("fail", "report")
+"""Values of `expired`."""
 SKIP = "skip"
+"""Value of `others` for a run that checks only its sample."""
 OTHERS = ("check", SKIP)
+"""Values of `others`."""
 STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
+"""Exit status by verdict."""
 WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound")}
-"""Exit statuses, the one that counts most among several pools first."""
+"""Exit status by verdict, in the order in which verdicts decide about multiple pools."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +68,12 @@ def command(arguments: Arguments) -> int:
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
     if settings.others == SKIP and settings.sample is None:
-        raise BadConfig(f"others = {SKIP}; it leaves out what is not in a sample: say sample=N too")
+        raise BadConfig(f"others = {SKIP}; it skips the scenarios outside a sample; give sample=N, too")
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
     try_file(settings.json)
     try_file(settings.junit)
     if settings.hits is not None:
-        return _hits(settings.hits, settings.pool, search_path(arguments))
+        return _replay_hits(settings.hits, settings.pool, search_path(arguments))
     if settings.pool is None:
         raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
     folders = several(settings.pool)
@@ -93,7 +97,7 @@ def command(arguments: Arguments) -> int:
         report = reports[folder] = _with_scans(report, pool, settings.ycb)
         about = {key: value for key, value in vars(report).items() if key != "names"}
         plain[folder] = {"pool_sha256": pool.sha256, **about}
-        _tell(pool, report)
+        _print_report(pool, report)
     if settings.json:
         write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
     if settings.junit:
@@ -105,11 +109,11 @@ def command(arguments: Arguments) -> int:
 
 
 def verified(pool: Pool, options: Options, search: Sequence[str], progress: Callable[[int], None]) -> Report:
-    """Check every claim of a pool, those about attacks on it included.
+    """Check every claim of a pool, including those about attacks on it.
 
     Args:
         search: overrides that add folders of other packages, see `task_files.search_path`.
-        progress: told how many scenarios have been checked.
+        progress: called with the number of checked scenarios.
     """
     task = compose.load_task(pool.task, search)
     return _with_hits(
@@ -118,7 +122,7 @@ def verified(pool: Pool, options: Options, search: Sequence[str], progress: Call
 
 
 def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report:
-    """The report on a pool that holds so far, with what is wrong about the attack that its manifest tells of."""
+    """The report on a pool. If the pool is sound so far, faults of the attack in its manifest are added."""
     if report.verdict != "sound" or pool.manifest.attack is None:
         return report
     verdict: Verdict = "refuted"
@@ -131,36 +135,40 @@ def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report
 
 
 def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
-    """The report on a pool that holds so far, with what can be said of the scans that its manifest holds.
+    """The report on a pool, with remarks and faults of the scans in its manifest.
 
     Raises:
-        BadConfig: a folder is given, and lacks one of them, or the pool holds none.
+        BadConfig: a folder is given but lacks one of the scans, or the pool holds none.
     """
     scans = pool.manifest.task_node.get("scans", {})
     if folder is not None and not scans:
         raise BadConfig(f"ycb = {cut(folder)}, but {pool.folder} holds no scans; leave it out")
     if report.verdict != "sound" or not scans:
         return report
-    told = f"{len(scans)} solids of scans ({', '.join(scans)})"
+    solids = f"{len(scans)} solids of scans ({', '.join(scans)})"
     if folder is None:
-        why = "whether they are made of the files that the manifest names is not checked; give ycb=FOLDER for that"
-        return replace(report, remarks=[*report.remarks, f"{told} stand in the pool: {why}"])
+        why = "it is not checked whether they are made of the files that the manifest names; give ycb=FOLDER for that"
+        return replace(report, remarks=[*report.remarks, f"the pool holds {solids}: {why}"])
     task = task_of(pool)
     if wrong := intake("ycb").other_files(task, folder):
         failed = [{"id": "manifest.json", "verdict": "refuted", "reason": why} for why in wrong]
         return replace(report, failed=[*report.failed, *failed], verdict="refuted")
-    return replace(report, remarks=[*report.remarks, f"{told} are those of the files in {folder}"])
+    return replace(report, remarks=[*report.remarks, f"{solids} are made of the files in {folder}"])
 
 
 def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
     return list(wrong_hits(*of))
 
 
-def _hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
-    """Replay hits of the adversary: files, or all of a folder."""
+def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
+    """Replay a hit of the adversary, or all hits in a folder.
+
+    Returns:
+        Exit status.
+    """
     paths = sorted(Path(hits).glob("*.npz")) if Path(hits).is_dir() else [Path(hits)]
     if not paths:
-        raise BadConfig(f"hits = {hits}; the folder holds no hits (*.npz) of scengen attack")
+        raise BadConfig(f"hits = {hits}; the folder holds no hits (*.npz); give one that scengen attack wrote")
     attacked_task = None if pool is None else task_of(Pool.open(str(pool)).check(), search)
     wrong = 0
     for path in paths:
@@ -172,19 +180,20 @@ def _hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int
     return FAILED if wrong else OK
 
 
-def _tell(pool: Pool, report: Report) -> None:
+def _print_report(pool: Pool, report: Report) -> None:
+    """Print differences, faults, remarks and counts of a report."""
     if report.differences:
         table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
-        for d in report.differences[:SHOWN]:
+        for d in report.differences[:MAX_PRINTED]:
             table.add_row(d["key"], d["pool"], d["installed"])
         out.print(table)
-        if (more := len(report.differences) - SHOWN) > 0:
-            say(f"and {more} more; json= writes them all")
-    for failure in report.failed[:SHOWN]:
-        called = report.names.get(failure["id"], failure["id"])
-        warn(f"{failure['verdict'].upper()} {called}: {failure['reason'][:2000]}")
-    if (more := len(report.failed) - SHOWN) > 0:
-        warn(f"and {more} more faults; json= writes them all")
+        if (more := len(report.differences) - MAX_PRINTED) > 0:
+            say(f"and {more} more; json=FILE writes all")
+    for failure in report.failed[:MAX_PRINTED]:
+        name = report.names.get(failure["id"], failure["id"])
+        warn(f"{failure['verdict'].upper()} {name}: {failure['reason'][:2000]}")
+    if (more := len(report.failed) - MAX_PRINTED) > 0:
+        warn(f"and {more} more faults; json=FILE writes all")
     for remark in report.remarks:
         say(remark)
     done = [
@@ -202,10 +211,10 @@ def _tell(pool: Pool, report: Report) -> None:
     ]
     say(f"settings: {report.settings or 'unknown'}")
     if pool.manifest.is_subset:
-        say("a subset: its scenarios were chosen from another pool, whose funnel it repeats")
+        say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")
     if report.sample:
         share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
-        told = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
-        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; without a fault, {told}")
+        bound = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
+        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; without a fault, {bound}")
     parts = ", ".join([f"{report.sound} sound, {report.refuted} refuted, {report.declined} declined", *done])
     say(f"{pool.folder}: {report.verdict} at level {report.level}: {parts}")

@@ -99,5 +99,5 @@ def test_a_sampler_that_does_not_exist_is_refused(capsys):
 def test_a_scenario_that_is_fine_is_refused(capsys):
     quickly = ("certify.robust.runs=1", "certify.robust.bound=0.04")
     assert cli.run(("shrink", "task=domino_single", *quickly)) == 2
-    assert "passes every check of certify=quick; there is nothing to shrink" in capsys.readouterr().err
+    assert "passes every check of certify=quick; give a scenario that fails one" in capsys.readouterr().err
     assert cli.run(("shrink", "task=domino_single", "index=-1")) == 2

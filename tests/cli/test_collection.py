@@ -55,7 +55,7 @@ def test_a_scenario_is_found_in_whichever_pool_it_is(folder, capsys):
     assert str(name) in out
     status, _, err = told(capsys, "audit", f"pool={folder}")
     assert status == 2
-    assert "this command takes one pool" in err
+    assert "this command accepts one pool" in err
 
 
 def test_a_pool_that_is_not_the_one_of_the_index_is_refused(folder, tmp_path, capsys):

@@ -60,13 +60,13 @@ def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(c
 
 def test_an_axis_of_another_task_of_a_sweep_is_left_out_and_told(capsys):
     asked = compose.combinations("generate", ["task=domino_single,packing", "split=id,tight"])
-    kept, runs = generate._sensible(asked)
+    kept, runs = generate._valid_runs(asked)
     assert [(run.task.name, run.settings.split) for run in runs] == [
         ("domino_single", "id"),
         ("packing", "id"),
         ("packing", "tight"),
     ]
-    assert len(kept) == 3 and "left out, since the task has no such split: task=domino_single split=tight" in (
+    assert len(kept) == 3 and "left out, because the task has no such split: task=domino_single split=tight" in (
         capsys.readouterr().err
     )
 

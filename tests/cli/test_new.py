@@ -60,15 +60,15 @@ def test_a_new_name_that_contains_an_old_one_is_not_replaced_twice():
     ("argv", "says"),
     [
         (("task=push_off",), "new needs package=..."),
-        (("task=x", "package=numpy"), "package = numpy; a package of that name is installed already"),
-        (("task=x", "package=json"), "package = json; a package of that name is installed already"),
-        (("task=x", "package=tests"), "package = tests; give a word of 60 letters at most, in snake_case"),
-        (("task=domino_single", "package=x"), "there is a task of that name already, see scengen tasks"),
-        (("task=Push-Off", "package=x"), "task = Push-Off; give a word of 60 letters at most, in snake_case"),
+        (("task=x", "package=numpy"), "package = numpy; a package of that name is installed"),
+        (("task=x", "package=json"), "package = json; a package of that name is installed"),
+        (("task=x", "package=tests"), "package = tests; give a word of at most 60 letters in snake_case"),
+        (("task=domino_single", "package=x"), "a task of that name exists; give another name, see scengen tasks"),
+        (("task=Push-Off", "package=x"), "task = Push-Off; give a word of at most 60 letters in snake_case"),
         (("task=../up", "package=x"), "task = ../up; give a word"),
         (("task=class", "package=x"), "task = class; give a word"),
         (("task=conf", "package=x"), "task = conf; give a word"),
-        (("task=" + "a" * 61, "package=x"), "give a word of 60 letters at most"),
+        (("task=" + "a" * 61, "package=x"), "give a word of at most 60 letters"),
         (("task=x", "pakage=x"), "no setting of new named 'pakage' (did you mean 'package'?)"),
         (("task=x", "package=x", f"to={__file__}"), "is a file; name a folder"),
     ],
@@ -83,5 +83,5 @@ def test_bad_input_is_one_line_and_writes_nothing(capsys, tmp_path, monkeypatch,
 def test_a_folder_that_is_not_empty_stays_as_it_is(capsys, tmp_path):
     (tmp_path / "README.md").write_text("mine")
     assert cli.run(("new", "task=slide_home", "package=lab_tasks", f"to={tmp_path}")) == 2
-    assert "is not empty; name a new folder with to=FOLDER" in capsys.readouterr().err
+    assert "is not empty; give a new folder as to=FOLDER" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["README.md"] and (tmp_path / "README.md").read_text() == "mine"

@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
 
 from fuzz.grammar import Grammar  # noqa: E402
 from scengen import cli  # noqa: E402
-from scengen.cli.program import LONGEST  # noqa: E402
+from scengen.cli.program import MAX_LINE  # noqa: E402
 
 REFERENCE = ROOT / "generated" / "reference"
 LIMIT = 60
@@ -29,7 +29,7 @@ LIMIT = 60
 REMEDY = re.compile(
     r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |"
     r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is not an option|install|"
-    r"takes one pool|correct |delete |wait for|needs \w+=|widen|wants a display"
+    r"accepts one pool|correct |delete |wait for|needs \w+=|widen|wants a display"
 )
 """Words with which an error says what would be right."""
 
@@ -59,7 +59,7 @@ def judge(line: list[str], place: Path) -> str:
         return f"unforeseen: {told[:500]}"
     if status == 2 and not REMEDY.search(told):
         return f"no remedy: {told[:300]}"
-    if any(len(x) > LONGEST + 100 for x in errors):
+    if any(len(x) > MAX_LINE + 100 for x in errors):
         return f"a line of {max(map(len, errors))} letters"
     if re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", told + out.getvalue()):
         return f"control characters: {told[:300]!r}"

@@ -109,7 +109,7 @@ def test_a_pool_with_scans_stands_alone(folder, tmp_path, capsys):
     capsys.readouterr()
     assert cli.run(["verify", f"pool={pool}"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "1 solids of scans (004_sugar_box/low) stand in the pool" in told and "give ycb=FOLDER" in told
+    assert "the pool holds 1 solids of scans (004_sugar_box/low)" in told and "give ycb=FOLDER" in told
     assert cli.run(["verify", f"pool={pool}", f"ycb={folder}", "level=replay"]) == 0
     place(tmp_path / "other", SUGAR, sugar_box((0.045, 0.092, 0.170)))
     assert cli.run(["verify", f"pool={pool}", f"ycb={tmp_path / 'other'}", "level=replay"]) == 1
@@ -120,7 +120,7 @@ def test_a_pool_with_scans_stands_alone(folder, tmp_path, capsys):
     ("arguments", "says"),
     [
         (["task=pick_place_ycb"], "no folder 005_tomato_soup_can"),
-        (["task=domino_single"], "task domino_single has no YCB object; name one that has, or leave ycb= out"),
+        (["task=domino_single"], "task domino_single has no YCB object; name a task that has one, or leave ycb= out"),
         (["task=pick_place_ycb", ONE, "ycb=nowhere"], "ycb = nowhere is not a folder"),
     ],
 )
