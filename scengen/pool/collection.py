@@ -1,7 +1,7 @@
 """Several pools as one: a folder with a pool for each task and split, and an index of their names and hashes.
 
-Every command that takes several pools also takes such a folder. Its index may come from anybody, like a pool: it can
-name folders beside it, and nothing else.
+Every command that takes several pools also takes such a folder. Its index may be of unknown origin, like a pool:
+it can name folders beside it, and nothing else.
 """
 
 import json

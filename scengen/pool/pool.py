@@ -1,7 +1,7 @@
 """A pool on disk: a folder with a manifest and Parquet shards.
 
-A pool is data only: nothing in it is executed, imported or opened by its name, whoever made it. Everything that is read
-has passed the rules of `scengen.pool.untrusted`.
+A pool is data only: nothing in it is executed, imported or opened by its name. Everything that is read has passed the
+rules of `scengen.pool.untrusted`.
 """
 
 from collections.abc import Iterable, Iterator

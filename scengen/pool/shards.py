@@ -1,4 +1,4 @@
-"""Reading the Parquet files of a pool, which may come from anybody."""
+"""Reading the Parquet files of a pool, which may be of unknown origin."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager

@@ -116,7 +116,7 @@ def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
         return
     for name, there in labels_of_draw(draw).items():
         here = getattr(row, name)
-        if name != "params" and _comparable(here) != _comparable(there):  # the id has told of these
+        if name != "params" and _comparable(here) != _comparable(there):  # the id covers params
             yield f"the {name} is {_short(_comparable(here))}; drawn again it is {_short(_comparable(there))}"
 
 
@@ -222,7 +222,7 @@ def _equal(one: Any, other: Any) -> bool:
     return type(one) is type(other) and one == other
 
 
-def _played(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: float) -> bool:
+def _witness_length_fits(numbers: Mapping[str, Any], seconds: float, row: PoolRow, settle: float) -> bool:
     """Whether the witness ends when the goal has lasted: actions after that would not be played."""
     periods = round((seconds + settle) / Loop.PERIOD)
     return numbers == {"periods": len(row.witness), "seconds": seconds} and abs(len(row.witness) - periods) <= 1
@@ -233,16 +233,16 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
     rules = {
         "feasible": lambda n: alike(scenario.features(), n),
         "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
-        "rest": lambda n: _rested(n, claims.settings),
+        "rest": lambda n: _rest_holds(n, claims.settings),
         "unsolved": lambda n: n == {},
-        "idle": lambda n: _unsolved(n, True),
-        "shortcuts": lambda n: _shortcuts(n, scenario),
-        "solved": lambda n: _solved(n, claims.task.horizon),
-        "robust": lambda n: _robust(n, claims.settings),
-        "numerics": _numerics,
-        "ablations": lambda n: set(n) == set(scenario.ablations()) and all(_unsolved(r, True) for r in n.values()),
-        "witness": lambda n: _played(n, checks["solved"].numbers["seconds"], row, claims.settings.settle),
-        "attack": lambda n: _attacked(n, claims.settings),
+        "idle": lambda n: _goal_missed(n, True),
+        "shortcuts": lambda n: _shortcuts_failed(n, scenario),
+        "solved": lambda n: _solved_in_time(n, claims.task.horizon),
+        "robust": lambda n: _robust_holds(n, claims.settings),
+        "numerics": _numerics_hold,
+        "ablations": lambda n: set(n) == set(scenario.ablations()) and all(_goal_missed(r, True) for r in n.values()),
+        "witness": lambda n: _witness_length_fits(n, checks["solved"].numbers["seconds"], row, claims.settings.settle),
+        "attack": lambda n: _attack_failed(n, claims.settings),
     }
     for name, holds in rules.items():
         try:
@@ -254,47 +254,47 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
                 f"check {name} cannot have passed with its numbers, or they are not those of this family; "
                 "if the family has changed since, certify the pool again"
             )
-    if not _filtered(row.witness):
+    if not _passed_filter(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
 
 
-def _rested(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+def _rest_holds(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
     limits = settings.rest
     within = 0 <= numbers["drift"] <= limits.drift and 0 <= numbers["turn"] <= limits.turn
     return set(numbers) == {"drift", "turn"} and within
 
 
-def _unsolved(numbers: Mapping[str, Any], unstable: bool) -> bool:
+def _goal_missed(numbers: Mapping[str, Any], unstable: bool) -> bool:
     """Whether these are the numbers of a complete episode that has not reached the goal."""
     known = ("failure", "timeout", "unstable") if unstable else ("failure", "timeout")
     return set(numbers) == {"outcome", "reason", "seconds"} and numbers["outcome"] in known and numbers["seconds"] >= 0
 
 
-def _shortcuts(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
+def _shortcuts_failed(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
     known = scenario.shortcuts()
     tries = [(known[name], n) for name, told in numbers.items() for n in told.values() if set(told) == set(ACTIONS)]
-    seen = all(_failed(n) and (not shortcut.to_rest or n["reason"] == AT_REST) for shortcut, n in tries)
+    seen = all(_shortcut_failed(n) and (not shortcut.to_rest or n["reason"] == AT_REST) for shortcut, n in tries)
     return set(numbers) == set(known) and len(tries) == len(ACTIONS) * len(known) and seen
 
 
-def _failed(numbers: Mapping[str, Any]) -> bool:
+def _shortcut_failed(numbers: Mapping[str, Any]) -> bool:
     """Whether these are the numbers of a shortcut that has not reached the goal, or of one that was not tried."""
-    return _unsolved({**numbers, "outcome": "timeout"} if numbers["outcome"] == NOT_TRIED else numbers, False)
+    return _goal_missed({**numbers, "outcome": "timeout"} if numbers["outcome"] == NOT_TRIED else numbers, False)
 
 
-def _attacked(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+def _attack_failed(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
     rollouts = [told["rollouts"] for told in numbers.values()]
     whole = all(type(n) is int and n > 0 for n in rollouts) and sum(rollouts) <= settings.attack
     counted = all(set(n) == {"rollouts", "hits"} and 0 <= n["hits"] <= n["rollouts"] for n in numbers.values())
     return whole and counted and bool(numbers) == bool(settings.attack)
 
 
-def _solved(numbers: Mapping[str, Any], horizon: float) -> bool:
+def _solved_in_time(numbers: Mapping[str, Any], horizon: float) -> bool:
     told = set(numbers) == {"outcome", "reason", "seconds"} and numbers["reason"] == ""
     return told and numbers["outcome"] == "success" and 0 <= numbers["seconds"] <= horizon + 0.011
 
 
-def _robust(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
+def _robust_holds(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
     limits, solved, failures = settings.robust, numbers["solved"], numbers["failures"]
     whole = type(solved) is int and 0 <= solved <= limits.runs and numbers["runs"] == limits.runs
     counted = whole and isinstance(failures, list) and len(failures) == limits.runs - solved
@@ -302,7 +302,7 @@ def _robust(numbers: Mapping[str, Any], settings: CertifySettings) -> bool:
     return bool(bound) and numbers["bound"] >= limits.bound and len(numbers) == 4
 
 
-def _numerics(numbers: Mapping[str, Any]) -> bool:
+def _numerics_hold(numbers: Mapping[str, Any]) -> bool:
     held = (
         n == {"witness": "success"} or (n["witness"] != "success" and n["oracle"] == "success")
         for n in numbers.values()
@@ -310,7 +310,7 @@ def _numerics(numbers: Mapping[str, Any]) -> bool:
     return set(numbers) == set(NUMERICS) and all(held)
 
 
-def _filtered(witness: np.ndarray) -> bool:
+def _passed_filter(witness: np.ndarray) -> bool:
     """Whether the teleoperation filter can give these actions, starting from rest."""
     if np.abs(witness).max(initial=0.0) > 1.0:
         return False

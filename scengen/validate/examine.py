@@ -7,10 +7,18 @@ from ..errors import ScengenError
 from ..fingerprint import fingerprint
 from ..pool import PoolRow
 from ..pool.manifest import MANIFEST
-from . import claims as claim
 from . import survey
 from .certify import Adversary
-from .claims import Claims
+from .claims import (
+    Claims,
+    compiles,
+    scene_or_nothing,
+    wrong_certificate,
+    wrong_labels,
+    wrong_names,
+    wrong_rejection,
+    wrongly_drawn,
+)
 from .rebuilt import difference, rebuild
 from .recheck import fails_again, simulate, why_not_certified
 
@@ -77,17 +85,17 @@ class Examiner:
             why = " ".join(str(error).split())[:300] or type(error).__name__
             if isinstance(job, tuple):
                 return Examination(job[0].id, "refuted", (why,), expired=self.expired)
-            return Examination(MANIFEST, "refuted", (f"{_spelled(job)} cannot be made again: {why}",))
+            return Examination(MANIFEST, "refuted", (f"{_described(job)} cannot be made again: {why}",))
 
     def _examined(self, row: PoolRow, simulated: bool, certified: bool) -> Examination:
         claims = self.claims
-        reasons = list(claim.wrong_labels(row, claims))
+        reasons = list(wrong_labels(row, claims))
         if row.task != claims.task.name:
             return Examination(row.id, "refuted", tuple(reasons), expired=self.expired)
         scenario = claims.task.scenario(row.params)
-        reasons += [*claim.wrong_names(row, scenario), *claim.wrongly_drawn(row, claims)]
-        reasons += (claim.wrong_certificate if certified else claim.wrong_rejection)(row, scenario, claims)
-        text = rebuild(scenario) if claim.compiles(row) else claim.scene_or_nothing(scenario)
+        reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]
+        reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
+        text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)
         reasons += filter(None, [difference(row.scene_xml, text, row.certificate.fingerprint == fingerprint())])
         if reasons or not simulated:
             verdict: Verdict = "refuted" if reasons else "sound"
@@ -105,8 +113,8 @@ def lost_examination(job: Job, reason: str) -> Examination:
     """The examination of a job that has crashed its process, or has reached a limit."""
     if isinstance(job, tuple):
         return Examination(job[0].id, "declined", (f"verification {reason}",))
-    return Examination(MANIFEST, "declined", (f"making {_spelled(job)} again {reason}",))
+    return Examination(MANIFEST, "declined", (f"making {_described(job)} again {reason}",))
 
 
-def _spelled(job: range | LeftOut) -> str:
+def _described(job: range | LeftOut) -> str:
     return f"index {job.index}" if isinstance(job, LeftOut) else f"indices {job.start} to {job.stop - 1}"

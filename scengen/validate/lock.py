@@ -1,7 +1,7 @@
 """scengen.lock beside a pool: versions of the packages that its verdicts were made with, in the format of pip.
 
 It repeats what the manifest says, which counts, and adds the packages that the manifest does not name. Like a pool it
-may come from anybody: only its lines about packages that the code of a verdict imports are ever used.
+may be of unknown origin: only its lines about packages that the code of a verdict imports are ever used.
 """
 
 import platform

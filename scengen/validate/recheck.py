@@ -52,7 +52,7 @@ def simulate(
         level: one of `LEVELS`.
         adversary: see `certify`.
     """
-    here = row.certificate.fingerprint == fingerprint()
+    same_rounding = row.certificate.fingerprint == fingerprint()
     trial = Trial(scenario, row.horizon, settings, row.embodiment)
     trial.text = text
     stored = {check.name: check for check in row.certificate.checks}
@@ -61,11 +61,11 @@ def simulate(
         return Simulated(tuple(reasons), False)
     rollout = replay(scenario, trial.world, row.witness, row.horizon, settings.settle)
     drifted = rollout.digest != row.certificate.final_state
-    reasons = list(_replayed(row, rollout, here))
+    reasons = list(_replay_faults(row, rollout, same_rounding))
     if not reasons and level == "recheck":
-        reasons = list(_repeated(trial, rollout, stored, here))
+        reasons = list(_repetition_faults(trial, rollout, stored, same_rounding))
     if not reasons and level == "full":
-        reasons = list(_certified_again(row, scenario, settings, stored, here, adversary))
+        reasons = list(_certification_faults(row, scenario, settings, stored, same_rounding, adversary))
     return Simulated(tuple(reasons), drifted and not reasons)
 
 
@@ -107,19 +107,19 @@ def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -
     return without_numbers(again.certificate.reason)
 
 
-def _replayed(row: PoolRow, rollout: Rollout, here: bool) -> Iterator[str]:
+def _replay_faults(row: PoolRow, rollout: Rollout, same_rounding: bool) -> Iterator[str]:
     if not rollout.solved:
         yield f"the witness fails: {rollout.reason}"
         return
-    if here and rollout.digest != row.certificate.final_state:
+    if same_rounding and rollout.digest != row.certificate.final_state:
         yield "the witness ends in another state, although this machine rounds like the certificate's"
-    if here and not np.array_equal(rollout.actions, row.witness):
+    if same_rounding and not np.array_equal(rollout.actions, row.witness):
         yield f"the witness has {len(row.witness)} actions, but {len(rollout.actions)} are played"
-    if here and rollout.seconds != _check(row, "witness").numbers["seconds"]:
+    if same_rounding and rollout.seconds != _stored_check(row, "witness").numbers["seconds"]:
         yield f"the witness reaches the goal after {rollout.seconds:g} s, not when its certificate says"
 
 
-def _repeated(trial: Trial, rollout: Rollout, stored: dict[str, Check], here: bool) -> Iterator[str]:
+def _repetition_faults(trial: Trial, rollout: Rollout, stored: dict[str, Check], same_rounding: bool) -> Iterator[str]:
     for name in (*BEFORE_WITNESS, *WITH_WITNESS):
         if name in WITH_WITNESS:
             trial.solution = rollout
@@ -127,17 +127,17 @@ def _repeated(trial: Trial, rollout: Rollout, stored: dict[str, Check], here: bo
             found = trial.check(name)
         except NoOracle:
             found = Check(name, False, "the witness fails, and this machine has no oracle", {}, {})
-        yield from _differences(found, stored[name], here)
+        yield from _differences(found, stored[name], same_rounding)
         if not found.passed and not found.waived:
             return
 
 
-def _certified_again(
+def _certification_faults(
     row: PoolRow,
     scenario: Scenario,
     settings: CertifySettings,
     stored: dict[str, Check],
-    here: bool,
+    same_rounding: bool,
     adversary: Adversary | None,
 ) -> Iterator[str]:
     again = certify(scenario, row.horizon, settings, row.embodiment, adversary=adversary)
@@ -147,7 +147,7 @@ def _certified_again(
     same_oracle = np.array_equal(again.witness, row.witness)
     for check in again.certificate.checks:
         depends = check.name in ("solved", "robust", "numerics", "ablations", "witness", "attack")
-        yield from _differences(check, stored[check.name], here and (same_oracle or not depends))
+        yield from _differences(check, stored[check.name], same_rounding and (same_oracle or not depends))
 
 
 def _differences(found: Check, stored: Check, exact: bool) -> Iterator[str]:
@@ -158,5 +158,5 @@ def _differences(found: Check, stored: Check, exact: bool) -> Iterator[str]:
         yield f"check {found.name} has other numbers when it is made again: {as_json(found.numbers)[:160]}"
 
 
-def _check(row: PoolRow, name: str) -> Check:
+def _stored_check(row: PoolRow, name: str) -> Check:
     return next(check for check in row.certificate.checks if check.name == name)
