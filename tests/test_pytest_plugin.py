@@ -43,7 +43,7 @@ def test_the_checks_of_a_task_run_without_a_file(checked):
 def test_a_broken_rule_is_told_in_one_line(checked, monkeypatch):
     monkeypatch.setattr(PushBlock, "shortcuts", lambda self: {})
     status, told = checked("--scengen-task=push_block", "-k", "id and controls")
-    assert status == 1 and "push_block/id/0 has 0 shortcuts: 2 at least must show" in told
+    assert status == 1 and "push_block/id/0 has 0 shortcuts; at least 2 must show" in told
     assert "Traceback" not in told and "def _scenes" not in told
 
 
@@ -90,9 +90,9 @@ def test_an_axis_that_breaks_a_memory_and_is_solvable_passes():
         (
             rules._breaks,
             card("solved by memory", findings=("holds",)),
-            "say in its why what it asks of the eye",
+            "say in its why what it demands of vision",
         ),
-        (rules._breaks, card("inconclusive", findings=("holds",), leaves=True), "more twins may tell"),
+        (rules._breaks, card("inconclusive", findings=("holds",), leaves=True), "try more twins"),
         (rules._breaks, card("inconclusive", findings=("too weak",)), "baseline_0 too weak"),
     ],
 )

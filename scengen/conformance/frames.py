@@ -1,9 +1,9 @@
-"""Frames: a scene that is moved or turned as a whole must be judged as it was before.
+"""Frames: the verdict of a scene must not change if the scene is moved or turned as a whole.
 
-Which parameters do that is found by building, not declared: those by which everything that lies on the table moves as
-one rigid body, over the table or about a vertical line. Then every moment of a solution can be carried over, robot
-included, and what the family says of it there must be what it said before. A goal that counts in the table's axes,
-where it means the scene's, is caught by that without a simulation of its own.
+The parameters that move a scene are not declared, but found by building scenes: with them all things on the table move
+as one rigid body, along the table or about a vertical line. Then every moment of a solution can be moved, robot
+included, and the family's verdict on it must stay the same. So a goal that uses the axes of the table instead of those
+of the scene is found without another simulation.
 """
 
 from collections.abc import Iterator
@@ -21,57 +21,60 @@ from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.rebuilt import world_of
 
-EXACT = 1e-9
-"""How far a geom may be from where a rigid motion takes it [m, and entries of matrices]: rounding."""
-TRIES = 50
-"""Draws within the bounds of a parameter until one gives a feasible scene."""
-EVERY = 10
-"""Control periods between two moments that are judged; the last one always is."""
-FIXED = ("floor", "table_top")
-"""Geoms that stay where they are."""
+TOLERANCE = 1e-9
+"""Largest deviation of a geom from a rigid motion [m, and entries of matrices], due to rounding."""
+MAX_TRIES = 50
+"""Largest number of draws within the bounds of a parameter to find a feasible scene."""
+MOMENT_INTERVAL = 10
+"""Number of control periods between two judged moments; the last moment is always judged."""
+FIXED_GEOMS = ("floor", "table_top")
+"""Geoms that do not move with a scene."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A turn about the vertical, then a shift."""
+    """A rotation about the vertical, then a shift."""
 
     rot: Mat3
     shift: Vec3
-    """[m]"""
+    """Shift [m]."""
 
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where it takes points, shape (..., 3) [m]."""
+        """Moved points, shape (..., 3) [m]."""
         return points @ self.rot.T + self.shift
 
 
-STILL = Motion(np.eye(3), np.zeros(3))
+IDENTITY = Motion(np.eye(3), np.zeros(3))
+"""The motion that changes nothing."""
 
 
 @dataclass(frozen=True)
 class MovedScene:
-    """A scenario that is another one moved as a whole."""
+    """A scenario that equals another one, moved as a whole."""
 
     parameter: str
+    """Name of the parameter that moves it."""
     scenario: Scenario
     motion: Motion
+    """Motion from the other scenario to this one."""
 
 
 def moved(scenario: Scenario, key: str) -> Iterator[MovedScene]:
-    """The scenario moved by each parameter that moves it as a whole, to a feasible place that `key` decides."""
+    """The scenario, moved by each parameter that moves it as a whole to a feasible place, which depends on `key`."""
     for parameter in parameters(scenario):
-        there = next(_elsewhere(scenario, parameter, key), None)
-        if there is not None and (motion := _motion(scenario, there)):
+        there = next(_feasible_variants(scenario, parameter, key), None)
+        if there is not None and (motion := _rigid_motion(scenario, there)):
             yield MovedScene(parameter.name, there, motion)
 
 
-def differing(scenario: Scenario, other: MovedScene, actions: Actions, embodiment: str) -> str:
-    """Play actions in a scenario, and judge every moment of it in the other place too.
+def difference(scenario: Scenario, other: MovedScene, actions: Actions, embodiment: str) -> str:
+    """Replay actions in a scenario, and judge its moments also in the moved scene.
 
     Args:
-        actions: which have passed the filter, shape (periods, 7 * arms), such as a witness.
+        actions: filtered actions, shape (periods, 7 * arms), such as a witness.
 
     Returns:
-        The first verdict that is another there, in words; empty if there is none.
+        Description of the first verdict that differs there; empty if there is none.
     """
     played, here, there = (world_of(s, embodiment) for s in (scenario, scenario, other.scenario))
     _move_robot(there, other.motion)
@@ -79,25 +82,26 @@ def differing(scenario: Scenario, other: MovedScene, actions: Actions, embodimen
     for period, action in enumerate(actions):
         if episode.step(action) == "unstable":
             break
-        if period % EVERY and period + 1 < len(actions):
+        if period % MOMENT_INTERVAL and period + 1 < len(actions):
             continue
-        _carry(played, here, STILL)  # both the same way: what MuJoCo derives of a state is a step old after a step
-        _carry(played, there, other.motion)
-        before, after = _said(scenario, here), _said(other.scenario, there)
-        for what in before:
-            if after[what] != before[what]:
-                return f"at {played.time:.2f} s {what} is {before[what]}, and {after[what]} where the scene is moved"
+        # Both in the same way: after a step, the quantities that MuJoCo derives from a state are one step old.
+        _copy_moved(played, here, IDENTITY)
+        _copy_moved(played, there, other.motion)
+        before, after = _verdicts(scenario, here), _verdicts(other.scenario, there)
+        for name in before:
+            if after[name] != before[name]:
+                return f"at {played.time:.2f} s {name} is {before[name]}, but {after[name]} in the moved scene"
     return ""
 
 
-def _said(scenario: Scenario, world: World) -> dict[str, bool]:
-    """What a family says of a moment."""
+def _verdicts(scenario: Scenario, world: World) -> dict[str, bool]:
+    """Verdicts of a family on a moment."""
     return {"success": scenario.success(world), "failure": scenario.failure(world) is not None}
 
 
-def _elsewhere(scenario: Scenario, parameter: Parameter, key: str) -> Iterator[Scenario]:
-    """The scenario with other values of one parameter that are feasible, from anywhere within its bounds."""
-    for k in range(0 if parameter.integer else TRIES):
+def _feasible_variants(scenario: Scenario, parameter: Parameter, key: str) -> Iterator[Scenario]:
+    """Feasible scenarios with another value of one parameter, from its whole range."""
+    for k in range(0 if parameter.integer else MAX_TRIES):
         share = unit(key, parameter.name, k)
         there = with_values(scenario, {parameter.name: parameter.low + share * (parameter.high - parameter.low)})
         if there.infeasible() is None:
@@ -105,7 +109,7 @@ def _elsewhere(scenario: Scenario, parameter: Parameter, key: str) -> Iterator[S
 
 
 def _start(scenario: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The scene without robot, at its start."""
+    """Model and data of the scene without robot, at its start."""
     model = scenario.build().compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -122,30 +126,30 @@ PHYSICS = (
     "jnt_range",
     "dof_damping",
 )
-"""What a rigid motion leaves as it is."""
+"""Fields of a model that a rigid motion does not change."""
 
 
-def _motion(before: Scenario, after: Scenario) -> Motion | None:
-    """The rigid motion that takes all that lies on the table from one scene to the other; None if there is none."""
+def _rigid_motion(before: Scenario, after: Scenario) -> Motion | None:
+    """The rigid motion of all things on the table from one scene to the other; None if there is none."""
     (model, data), (other, there) = _start(before), _start(after)
     if not all(_alike(getattr(model, name), getattr(other, name)) for name in PHYSICS):
         return None
-    movable = [g for g in range(model.ngeom) if model.geom(g).name not in FIXED]
+    movable = [g for g in range(model.ngeom) if model.geom(g).name not in FIXED_GEOMS]
     spots, turns = data.geom_xpos[movable], data.geom_xmat[movable].reshape(-1, 3, 3)
     new_spots, new_turns = there.geom_xpos[movable], there.geom_xmat[movable].reshape(-1, 3, 3)
     rot = about_z(yaw_of(new_turns[0] @ turns[0].T))
     motion = Motion(rot, new_spots[0] - rot @ spots[0])
-    rigid = _alike(motion(spots), new_spots) and _alike(rot @ turns, new_turns) and abs(motion.shift[2]) < EXACT
+    rigid = _alike(motion(spots), new_spots) and _alike(rot @ turns, new_turns) and abs(motion.shift[2]) < TOLERANCE
     still = _alike(spots, new_spots) and _alike(turns, new_turns)
     return motion if rigid and not still else None
 
 
 def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    return one.shape == other.shape and np.allclose(one, other, rtol=0.0, atol=EXACT)
+    return one.shape == other.shape and np.allclose(one, other, rtol=0.0, atol=TOLERANCE)
 
 
 def _move_robot(world: World, motion: Motion) -> None:
-    """Move the robot with the scene: what it touches and holds stays where it is in the hand."""
+    """Move the robot with the scene, so that its contacts with things do not change."""
     model = world.model
     for body in world.own:
         if model.body_parentid[body] == 0:
@@ -153,15 +157,15 @@ def _move_robot(world: World, motion: Motion) -> None:
             model.body_quat[body] = _turned(model.body_quat[body], motion)
 
 
-def _carry(here: World, there: World, motion: Motion) -> None:
-    """Put the moment of one world into the other one, moved: contacts and memory of the episode are as they were."""
+def _copy_moved(here: World, there: World, motion: Motion) -> None:
+    """Copy the moment of one world to another one and move it. Contacts and the episode's memory do not change."""
     there.restore(here.state())
     model, data = there.model, there.data
     for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
         at, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         data.qpos[at : at + 3] = motion(data.qpos[at : at + 3])
         data.qpos[at + 3 : at + 7] = _turned(data.qpos[at + 3 : at + 7], motion)
-        data.qvel[dof : dof + 3] = motion.rot @ data.qvel[dof : dof + 3]  # the spin counts in the body's own axes
+        data.qvel[dof : dof + 3] = motion.rot @ data.qvel[dof : dof + 3]  # the angular velocity is in the body's axes
     for mark in range(model.nmocap):
         data.mocap_pos[mark] = motion(data.mocap_pos[mark])
         data.mocap_quat[mark] = _turned(data.mocap_quat[mark], motion)

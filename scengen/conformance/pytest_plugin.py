@@ -1,6 +1,6 @@
-"""pytest plugin: `pytest --scengen-task=push_off --scengen-axis=far` checks a task as scengen checks its own.
+"""pytest plugin: `pytest --scengen-task=push_off --scengen-axis=far` runs scengen's checks of tasks on a task.
 
-Without paths on the command line nothing else is collected. `-k certified`, `-x`, `-n 2`, `--junitxml` and all other
+Without paths on the command line pytest collects nothing else. `-k certified`, `-x`, `-n 2`, `--junitxml` and all other
 options of pytest work on these checks as on any test.
 """
 
@@ -15,20 +15,22 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What a command line may say."""
+    """Add the options to pytest's command line."""
     group = parser.getgroup("scengen", "scengen: checks of a task")
     group.addoption("--scengen-task", metavar="TASK", help="check this task: draws, names, frames, certificates")
     group.addoption(
-        "--scengen-axis", metavar="AXIS", help="check what this axis of it does to memory, and write its card"
+        "--scengen-axis", metavar="AXIS", help="check that this axis breaks memories of training, and write its card"
     )
-    group.addoption("--scengen-conf", metavar="FOLDER", help="holds task/TASK.yaml, of a package that is not installed")
-    group.addoption("--scengen-n", metavar="N", type=int, default=30, help="twins of the axis (default: 30)")
+    group.addoption(
+        "--scengen-conf", metavar="FOLDER", help="folder with task/TASK.yaml, for a package that is not installed"
+    )
+    group.addoption("--scengen-n", metavar="N", type=int, default=30, help="number of twins of the axis (default: 30)")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Where no paths are given, collect the checks alone: not the tests of the folder that pytest was called in."""
+    """If no paths are given, collect only the checks, not the tests of the current folder."""
     if config.option.scengen_axis and not config.option.scengen_task:
-        raise pytest.UsageError("--scengen-axis needs --scengen-task, the task that it belongs to")
+        raise pytest.UsageError("--scengen-axis needs --scengen-task; give the task of the axis")
     if config.option.scengen_task and config.args_source is not config.ArgsSource.ARGS:
         config.args = []
 
@@ -42,8 +44,8 @@ def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.It
 
 
 def _rules(config: pytest.Config) -> list["Rule"]:
-    """All checks of a task, and of one of its axes if that is asked for."""
-    from .. import conformance  # here: whoever does not ask for checks pays nothing
+    """All checks of a task, and of one of its axes if one is given."""
+    from .. import conformance  # imported only if checks are requested
 
     option = config.option
     task, axis, conf = option.scengen_task, option.scengen_axis, option.scengen_conf
@@ -55,14 +57,14 @@ def _rules(config: pytest.Config) -> list["Rule"]:
 
 
 class RuleCollector(pytest.Collector):
-    """What the checks of a task belong to."""
+    """Collector of the checks of a task."""
 
     def collect(self) -> list[pytest.Item]:
         return []
 
 
 class RuleItem(pytest.Item):
-    """One check."""
+    """One check as a test of pytest."""
 
     def __init__(self, *, rule: "Rule", **others: Any):
         super().__init__(**others)
@@ -72,7 +74,7 @@ class RuleItem(pytest.Item):
         self.rule()
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """What scengen says in its own words, without the way there."""
+        """The message of an error of scengen, without a traceback."""
         return str(excinfo.value) if isinstance(excinfo.value, ScengenError) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Any, int | None, str]:

@@ -1,13 +1,13 @@
-"""What every task must keep to, as checks that a package runs on its own tasks.
+"""Rules that every task must satisfy, as checks that a package runs on its own tasks.
 
-In the tests of a package whose task files lie in `conf/task`, three lines do:
+If the task files of a package are in `conf/task`, three lines in its tests are enough:
 
     @pytest.mark.parametrize("check", conformance.checks("push_block", conf="path/to/conf"), ids=str)
     def test_push_block_keeps_to_the_rules(check):
         check()
 
-`frame_checks` and `axis_checks` are more of the same kind. `pytest --scengen-task=push_block --scengen-axis=far` runs
-all of them without a file (`pytest_plugin`).
+`frame_checks` and `axis_checks` return further checks. `pytest --scengen-task=push_block --scengen-axis=far` runs all
+of them without a test file (`pytest_plugin`).
 """
 
 import json
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
-from .. import config
+from .. import compose
 from ..errors import ScengenError
-from ..ood import axis_card, behaviour, features
+from ..ood import axis_card, axis_evidence, behaviour, features
 from ..params import canonical, values, with_values
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -31,25 +31,25 @@ from ..validate.rollout import run
 from ..validate.settings import QUICK
 from . import frames
 
-TRIED = 2
-"""How many shortcuts of every scenario must be carried out to their end: one that gives up shows nothing."""
-
-
-SURE = 0.95
-"""Share of fresh draws of every split that an oracle has to solve without jitter."""
+MIN_SHORTCUTS = 2
+"""Smallest number of shortcuts per scenario that are carried out to their end: one that gives up shows nothing."""
+MIN_ORACLE_SUCCESS = 0.95
+"""Smallest share of the fresh draws of a split that the oracle solves without jitter."""
+DRAWS = 10
+"""Number of draws of each split that are compared in two orders."""
+TWINS = 12
+"""Number of twins of each axis in which the moved parameters are looked for."""
+SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+"""Names of shortcuts, ablations and features, which users write on command lines and in lists with commas."""
 
 
 class Nonconformity(ScengenError):
     """A task breaks a rule."""
 
 
-SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
-"""What names of shortcuts, ablations and features look like: they stand on command lines and in comma lists."""
-
-
 @dataclass(frozen=True)
 class Rule:
-    """One rule for one split. Calling it raises `Nonconformity` where the rule is broken."""
+    """One rule for one split. Calling it raises `Nonconformity` if the task breaks the rule."""
 
     name: str
     run: Callable[[], None]
@@ -72,38 +72,46 @@ def checks(
 
     Args:
         task: name of the task's file.
-        conf: folder of the package that holds `task/<task>.yaml`; None for scengen's own.
-        scenarios: how many of each split are looked at closely and certified, at some 3 CPU seconds each.
-        seed: of the draws.
-        certified: splits whose scenarios are certified; None for all.
+        conf: folder of the package that holds `task/<task>.yaml`. Default: scengen's own.
+        scenarios: number of scenarios of each split that are built and certified, which takes about 3 CPU seconds each.
+        seed: seed of the draws.
+        certified: splits whose scenarios are certified. Default: all splits.
 
     Raises:
         ScengenError: the file cannot be loaded: names, types, bounds, or an axis that does not leave training.
     """
-    found = config.task(task, search(conf))
+    found = compose.load_task(task, search(conf))
     splits = (ID, *found.axes)
+    in_every_split = (_draws_are_keyed, _twins_differ_in_the_axis_alone)
     wanted = [
-        *((split, rule) for split in splits for rule in (_draws_are_keyed, _twins_differ_in_the_axis_alone)),
+        *((split, check) for split in splits for check in in_every_split),
         *((split, _scenes_have_controls) for split in splits),
         *((split, _scenarios_are_certified) for split in splits if certified is None or split in certified),
     ]
-    told = [Rule("the file tells what policies may know", partial(_told_well, found))]
-    return told + [
-        Rule(f"{split}: {rule.__name__.strip('_').replace('_', ' ')}", partial(rule, found, split, scenarios, seed))
-        for split, rule in wanted
+    of_splits = [
+        Rule(f"{split}: {_readable_name(check)}", partial(check, found, split, scenarios, seed))
+        for split, check in wanted
     ]
+    return [Rule("the file tells what policies may know", partial(_describes_axes, found)), *of_splits]
+
+
+def _readable_name(check: Callable[..., None]) -> str:
+    """Name of a check: that of its function in words."""
+    return check.__name__.strip("_").replace("_", " ")
 
 
 def frame_checks(task: str, conf: str | Path | None = None, seed: int = 0) -> list[Rule]:
-    """Checks that the first training scenario is judged alike wherever it stands, see `frames`: some CPU seconds.
+    """Checks that the verdict of the first training scenario does not depend on its place, see `frames`.
+
+    They take a few CPU seconds.
 
     Returns:
-        One check for each parameter that moves or turns the whole scene; none where a family has no such parameter.
+        One check for each parameter that moves or turns the whole scene; none if the family has no such parameter.
 
     Raises:
         ScengenError: the file cannot be loaded.
     """
-    found = config.task(task, search(conf))
+    found = compose.load_task(task, search(conf))
     scenario = found.draw(ID, seed, 0).scenario
     return [
         Rule(f"judged alike wherever {other.parameter} puts the scene", partial(_judged_alike, found, scenario, other))
@@ -120,24 +128,24 @@ def axis_checks(
     to: str | Path | None = None,
     workers: int = 1,
 ) -> list[Rule]:
-    """Checks of what an axis does to memories of training, from its card, at some 5 CPU seconds a twin.
+    """Checks from the card of an axis that it breaks memories of training; about 5 CPU seconds for each twin.
 
     Args:
-        axis: its name in the task's file.
-        n: twins; a fifth of them are tried with any of 16 memories.
-        to: folder of the card, which a second call continues; generated/axes/<task>-<axis> by default.
+        axis: name of the axis in the task's file.
+        n: number of twins. A fifth of them are tried with each of 16 memories.
+        to: folder of the card, which a second call continues. Default: generated/axes/<task>-<axis>.
 
     Raises:
         ScengenError: the file cannot be loaded, it has no such axis, or n is less than 2.
     """
-    found = config.task(task, search(conf))
+    found = compose.load_task(task, search(conf))
     settings = axis_card.AxisSettings(axis, n, any_n=n // 5, certify_n=0, seed=seed, rounds=0, workers=workers)
     settings.check(found)
     folder = Path(to or f"generated/axes/{task}-{axis}")
 
     @cache
     def made() -> axis_card.AxisCard:
-        return axis_card.make_axis_card(found, QUICK, settings, folder, lambda *_: None)[0]
+        return axis_evidence.make_axis_card(found, QUICK, settings, folder, lambda *_: None)[0]
 
     return [
         Rule(f"{axis}: the oracle solves it", lambda: _solvable(made())),
@@ -146,57 +154,64 @@ def axis_checks(
 
 
 def search(conf: str | Path | None) -> tuple[str, ...]:
-    """The override that makes Hydra look into another package's folder too."""
+    """The override that adds the folder of another package to Hydra's search path."""
     return () if conf is None else (f"hydra.searchpath=[file://{Path(conf).resolve()}]",)
 
 
-def _told_well(task: Task) -> None:
-    """The instruction names no axis, and every axis says why."""
+def _describes_axes(task: Task) -> None:
+    """The instruction names no axis, and every axis has a `why`."""
     for name, axis in task.axes.items():
-        _ask(name not in task.instruction, f"the instruction of {task.name} names the axis {name}")
-        _ask(bool(axis.why), f"axis {name} of {task.name} does not say why a habit from training fails there")
+        _require(name not in task.instruction, f"the instruction of {task.name} names the axis {name}; leave it out")
+        _require(bool(axis.why), f"axis {name} of {task.name} has no why; say why a habit from training fails there")
 
 
 def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:
-    """A scenario depends on its index alone, and its parameters survive being written down."""
-    forward = [task.draw(split, seed, i).scenario for i in range(10)]
-    backward = [task.draw(split, seed, i).scenario for i in reversed(range(10))]
+    """A scenario depends on seed and index only, and its parameters can be written and read."""
+    forward = [task.draw(split, seed, i).scenario for i in range(DRAWS)]
+    backward = [task.draw(split, seed, i).scenario for i in reversed(range(DRAWS))]
     for i, (one, other) in enumerate(zip(forward, reversed(backward), strict=True)):
-        _ask(one.id == other.id, f"{task.name}/{split}/{i} is another scenario when drawn in another order")
+        where = f"{task.name}/{split}/{i}"
+        _require(one.id == other.id, f"{where} depends on the order of draws; it must depend on seed and index only")
         again = with_values(task.family(), json.loads(canonical(one)))
-        _ask(again == one, f"{task.name}/{split}/{i} does not come back from its parameters; every field must be one")
-    _ask(len({s.id for s in forward}) > 1, f"{task.name}/{split}: ten draws gave one scenario; nothing varies")
+        _require(again == one, f"{where} differs when it is made of its parameters; make every field a parameter")
+    varied = len({scenario.id for scenario in forward}) > 1
+    _require(varied, f"{task.name}/{split}: {DRAWS} draws gave the same scenario; vary a parameter")
 
 
 def _twins_differ_in_the_axis_alone(task: Task, split: str, scenarios: int, seed: int) -> None:
-    """Scenario i of an axis is scenario i of training but for what the axis names, all of it."""
+    """Scenario i of an axis differs from scenario i of training in exactly the parameters that the axis names."""
     if split == ID:
         return
-    seen, where = features.sampled(task, split, 12, seed), f"{task.name}/{split}"
-    _ask(not seen.strays, f"{where}: {', '.join(seen.strays)} differ between twins, though the axis does not name them")
-    _ask(not seen.stuck, f"{where}: the axis names {', '.join(seen.stuck)}, and twins are equal there")
+    seen, where = features.sampled(task, split, TWINS, seed), f"{task.name}/{split}"
+    strays, stuck = ", ".join(seen.strays), ", ".join(seen.stuck)
+    _require(not strays, f"{where}: {strays} differ between twins, though the axis does not name them")
+    _require(not stuck, f"{where}: the axis names {stuck}, but twins do not differ in them")
 
 
 def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> None:
-    """Shortcuts show that the bottleneck is real, ablations that the means are needed; all have names in snake_case.
+    """Shortcuts show that the bottleneck is real, ablations that the means are needed; all names are in snake_case.
 
-    A family without ablations says why in `NO_ABLATIONS`."""
+    A family without ablations gives the reason in `NO_ABLATIONS`.
+    """
     for i in range(scenarios):
         scenario, where = task.draw(split, seed, i).scenario, f"{task.name}/{split}/{i}"
         shortcuts, ablations = scenario.shortcuts(), scenario.ablations()
-        few = f"{where} has {len(shortcuts)} shortcuts: {TRIED} at least must show that its bottleneck is real"
-        _ask(len(shortcuts) >= TRIED, few)
-        why = f"{where} has no ablations: nothing shows that the intended means are needed; say why in NO_ABLATIONS"
-        _ask(bool(ablations or scenario.NO_ABLATIONS), why)
+        few = f"{where} has {len(shortcuts)} shortcuts; at least {MIN_SHORTCUTS} must show that its bottleneck is real"
+        _require(len(shortcuts) >= MIN_SHORTCUTS, few)
+        missing = f"{where} has no ablations, which show that the intended means are needed; add one, or say why not"
+        _require(bool(ablations or scenario.NO_ABLATIONS), f"{missing} in NO_ABLATIONS")
         for kind, names in (("shortcut", shortcuts), ("ablation", ablations), ("feature", scenario.features())):
             for name in names:
-                good = SNAKE_CASE.fullmatch(name) is not None
-                _ask(good, f"{where}: the {kind} {name!r} has no name in snake_case, such as push_the_slab")
-        both = sorted(scenario.features().keys() & values(scenario).keys())
-        _ask(not both, f"{where}: {', '.join(both)} name both parameters and features; a table of both needs two names")
+                valid = SNAKE_CASE.fullmatch(name) is not None
+                _require(valid, f"{where}: the {kind} {name!r} must have a name in snake_case, such as push_the_slab")
+        both = ", ".join(sorted(scenario.features().keys() & values(scenario).keys()))
+        _require(not both, f"{where}: {both} name both parameters and features; rename the features")
         whole = rebuild(scenario)
         for name, scene in ablations.items():
-            _ask(scene_text.emit(scene)[0] != whole, f"{where}: the ablation {name!r} takes nothing away")
+            changed = scene_text.emit(scene)[0] != whole
+            _require(
+                changed, f"{where}: the ablation {name!r} does not change the scene; remove what it is named after"
+            )
 
 
 def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) -> None:
@@ -205,37 +220,42 @@ def _scenarios_are_certified(task: Task, split: str, scenarios: int, seed: int) 
         scenario = task.draw(split, seed, i).scenario
         certificate = certify(scenario, task.horizon, QUICK, task.embodiment).certificate
         where = f"{task.name}/{split}/{i} (seed {seed}, {canonical(scenario)})"
-        _ask(certificate.verdict == "certified", f"{where} is {certificate.verdict}: {certificate.reason}")
+        _require(certificate.verdict == "certified", f"{where} is {certificate.verdict}: {certificate.reason}")
         ends = certificate["shortcuts"].numbers
-        tried = [name for name, told in ends.items() if any(end["outcome"] != NOT_TRIED for end in told.values())]
-        gave_up = "; ".join(f"{name}: {told['filtered']['reason']}" for name, told in ends.items() if name not in tried)
-        _ask(len(tried) >= TRIED, f"{where}: of its shortcuts only {len(tried)} could be carried out; {gave_up}")
+        tried = [name for name, of_plan in ends.items() if any(e["outcome"] != NOT_TRIED for e in of_plan.values())]
+        gave_up = [f"{name}: {of_plan['filtered']['reason']}" for name, of_plan in ends.items() if name not in tried]
+        few = f"{where}: only {len(tried)} of its shortcuts were carried out to their end; {'; '.join(gave_up)}"
+        _require(len(tried) >= MIN_SHORTCUTS, few)
 
 
 def _judged_alike(task: Task, scenario: Scenario, other: frames.MovedScene) -> None:
-    """What a family says of every moment of a solution does not depend on where the scene stands."""
+    """The verdict of a family on every moment of a solution does not depend on the place of the scene."""
     world = world_of(scenario, task.embodiment)
     solution = run(scenario, world, scenario.oracle, task.horizon)
-    _ask(solution.solved, f"{task.name}/id/0: the oracle fails: {solution.reason}")
-    differs = frames.differing(scenario, other, solution.actions, task.embodiment)
-    _ask(not differs, f"{task.name}/id/0 moved by {other.parameter}: {differs}")
+    _require(solution.solved, f"{task.name}/id/0: the oracle fails: {solution.reason}")
+    difference = frames.difference(scenario, other, solution.actions, task.embodiment)
+    _require(not difference, f"{task.name}/id/0 moved by {other.parameter}: {difference}")
 
 
-def _solvable(made: axis_card.AxisCard) -> None:
+def _solvable(card: axis_card.AxisCard) -> None:
     """The oracle solves nearly all twins."""
-    solved = made.oracle.value if made.oracle else 0.0
-    _ask(solved >= SURE, f"{made.task}/{made.axis}: the oracle solves {solved:.0%} of the twins, less than {SURE:.0%}")
+    solved, least = card.oracle.value if card.oracle else 0.0, MIN_ORACLE_SUCCESS
+    _require(
+        solved >= least, f"{card.task}/{card.axis}: the oracle solves {solved:.0%} of the twins, less than {least:.0%}"
+    )
 
 
-def _breaks(made: axis_card.AxisCard) -> None:
-    """A memory that works in training fails; where none works there, a feature of the physics leaves training."""
-    weak = all(baseline.finding in ("too weak", "not tried") for baseline in made.baselines)
-    leaves = weak and any(departure.leaves for departure in made.features)
-    told = ", ".join(f"{baseline.name} {baseline.finding}" for baseline in made.baselines)
-    helps = "more twins may tell" if made.verdict == behaviour.INCONCLUSIVE else "say in its why what it asks of the eye"
-    _ask(made.verdict.startswith("breaks") or leaves, f"{made.task}/{made.axis}: {made.verdict} ({told}); {helps}")
+def _breaks(card: axis_card.AxisCard) -> None:
+    """A memory that works in training fails; if none works there, a feature of the physics leaves training."""
+    weak = all(baseline.finding in ("too weak", "not tried") for baseline in card.baselines)
+    leaves = weak and any(departure.leaves for departure in card.features)
+    findings = ", ".join(f"{baseline.name} {baseline.finding}" for baseline in card.baselines)
+    inconclusive = card.verdict == behaviour.INCONCLUSIVE
+    remedy = "try more twins" if inconclusive else "say in its why what it demands of vision"
+    broken = card.verdict.startswith("breaks") or leaves
+    _require(broken, f"{card.task}/{card.axis}: {card.verdict} ({findings}); {remedy}")
 
 
-def _ask(holds: bool, otherwise: str) -> None:
-    if not holds:
-        raise Nonconformity(otherwise)
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise Nonconformity(message)

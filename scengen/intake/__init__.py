@@ -1,1 +1,1 @@
-"""A user's mesh becomes an asset: read and checked, cut into convex pieces, measured, dropped, written."""
+"""Conversion of a user's mesh to an asset: it is checked, cut into convex pieces, measured, dropped and written."""

@@ -1,4 +1,4 @@
-"""Convex pieces as an asset: MJCF that stands alone, the figures behind it, and whether it comes to rest."""
+"""Convex pieces as an asset: MJCF without references to files, its figures, and a test whether it comes to rest."""
 
 import hashlib
 import importlib.metadata
@@ -21,37 +21,45 @@ from .feet import feet
 from .pieces import Pieces, Surface, cut_up, one_hull
 from .solid import UNITS, MeshSolid, as_mesh, content, read
 
-WATER = 1000.0
-"""Density where neither mass nor density is given [kg/m^3]."""
-FACES = 2000
-"""Most triangles of the mesh that is only looked at."""
-DROP, FALL, WATCH = 0.005, 3.0, 2.0
-"""The asset is let go at this height above the table [m], left alone for some time, and then watched [s]."""
-CREEP = 0.001
-"""How far it may move while it is watched [m]: what a certificate allows in the same time."""
-SPEED = 0.001
-"""How fast [m/s]: what rocks on one contact is faster."""
+DEFAULT_DENSITY = 1000.0
+"""Density if neither mass nor density is given [kg/m^3]: that of water."""
+MAX_VISUAL_FACES = 2000
+"""Largest number of triangles of the visual mesh."""
+DROP_HEIGHT = 0.005
+"""Height above the table from which the asset is dropped [m]."""
+SETTLING_TIME = 3.0
+"""Time from the drop to the start of the test [s]."""
+TEST_TIME = 2.0
+"""Duration of the test [s]."""
+MAX_CREEP = 0.001
+"""Largest motion during the test [m], which is what a certificate allows in the same time."""
+MAX_SPEED = 0.001
+"""Largest speed during the test [m/s]; a thing that rocks on one contact is faster."""
 
 
 @dataclass(frozen=True)
 class IntakeRequest:
-    """What a mesh is taken in with; the settings of `scengen asset` of these names."""
+    """A mesh file and the settings of its conversion, which are the settings of `scengen asset` of these names."""
 
     mesh: str
+    """Path of the mesh file."""
     units: str | None = None
+    """Unit of the numbers in the file, one of `UNITS`. Default: metres."""
     mass: float | None = None
-    """[kg]."""
+    """Mass [kg]."""
     density: float | None = None
-    """[kg/m^3]; 1000 where no mass is given either."""
+    """Density [kg/m^3]. Default: 1000, unless a mass is given."""
     friction: float = 0.6
+    """Sliding friction."""
     error: float = 0.003
-    """How far the pieces may be from the mesh [m]."""
+    """Largest distance of the pieces from the mesh [m]."""
     pieces: int = 64
-    """How many there may be."""
+    """Largest number of pieces."""
     seed: int = 0
+    """Seed of sampled points and of the decomposition."""
 
     def check(self) -> None:
-        """Raise `BadConfig` or `UnknownName` for a value that means nothing."""
+        """Raise `BadConfig` or `UnknownName` for an invalid value."""
         if self.units is not None and self.units not in UNITS:
             raise UnknownName("unit", self.units, UNITS)
         if self.mass is not None and self.density is not None:
@@ -72,30 +80,32 @@ class IntakeRequest:
 
 @dataclass(frozen=True)
 class DropResult:
-    """How an asset behaves that was let go just above the table."""
+    """Motion of an asset after it was dropped from just above the table."""
 
     creep: float
-    """Distance that its centre of mass goes while it is watched [m]."""
+    """Distance that its centre of mass moved during the test [m]."""
     speed: float
-    """Largest speed of its origin meanwhile [m/s]."""
+    """Largest speed of its origin during the test [m/s]."""
     turn: float
-    """Angle by which it is turned from how it was let go [rad]."""
+    """Angle between its orientations at the drop and at the end [rad]."""
     contacts: int
+    """Number of contacts at the end."""
 
     @property
     def rests(self) -> bool:
-        return self.creep <= CREEP and self.speed <= SPEED
+        """Whether it has come to rest."""
+        return self.creep <= MAX_CREEP and self.speed <= MAX_SPEED
 
 
 def dropped(prop: Prop) -> DropResult:
-    """Let a prop go above the middle of the table, upright, and watch it once it has had time to come to rest."""
+    """Drop a prop upright above the middle of the table, and test whether it comes to rest."""
     scene = table()
-    place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP + DROP])
+    place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP + DROP_HEIGHT])
     model = scene.compile()
     data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, round(FALL / model.opt.timestep))
+    mujoco.mj_step(model, data, round(SETTLING_TIME / model.opt.timestep))
     before, speed = data.body("asset").xipos.copy(), 0.0
-    for _ in range(round(WATCH / model.opt.timestep)):
+    for _ in range(round(TEST_TIME / model.opt.timestep)):
         mujoco.mj_step(model, data)
         speed = max(speed, float(np.linalg.norm(data.qvel[:3])))
     mujoco.mj_forward(model, data)
@@ -106,30 +116,34 @@ def dropped(prop: Prop) -> DropResult:
 
 @dataclass(frozen=True)
 class MeshAsset:
-    """A mesh that was taken in."""
+    """An asset made of a mesh."""
 
     request: IntakeRequest
     solid: MeshSolid
+    """Solid that the mesh encloses."""
     pieces: Pieces
+    """Convex pieces that replace the solid."""
     hull: Pieces
-    """The convex hull alone, for comparison."""
+    """Convex hull of the solid, for comparison."""
     prop: MeshProp
+    """Asset in the orientation of the file."""
 
     def turned(self, rot: Mat3) -> MeshProp:
-        """The asset turned from how its file shows it, to stand on what is then below."""
+        """The asset rotated by `rot` from the orientation of its file, with feet below."""
         return _prop(self.request, self.solid, self.pieces, rot)
 
     @cached_property
     def rest(self) -> DropResult:
+        """Result of dropping the asset on the table."""
         return dropped(self.prop)
 
     @cached_property
     def xml(self) -> str:
-        """A model with one body, "body", that refers to no files."""
+        """MJCF of a model with one body, "body", without references to files."""
         return emit(self.prop.spec())[0]
 
     def figures(self) -> dict[str, Any]:
-        """What is known about the asset, as plain data."""
+        """Figures of the asset, as plain data."""
         extents = self.solid.mesh.extents
         return {
             "key": key(self.request, self.solid.sha256),
@@ -157,10 +171,10 @@ class MeshAsset:
 
 
 def take_in(request: IntakeRequest) -> MeshAsset:
-    """Read a mesh, cut it into convex pieces unless its hull is near enough, and weigh it.
+    """Read a mesh and make an asset of it: one convex hull if that is near enough, else convex pieces.
 
     Raises:
-        BadConfig, UnknownName: one line that says what is wrong with the settings or the file.
+        BadConfig, UnknownName: the settings or the file are invalid.
     """
     request.check()
     found = read(request.mesh, request.units, request.seed)
@@ -173,22 +187,22 @@ def take_in(request: IntakeRequest) -> MeshAsset:
 
 def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | None = None) -> MeshProp:
     mesh = found.mesh
-    mesh.density = request.mass / mesh.volume if request.mass else (request.density or WATER)
+    mesh.density = request.mass / mesh.volume if request.mass else (request.density or DEFAULT_DENSITY)
     turn = np.eye(3) if rot is None else rot
     parts = [points if rot is None else points @ rot.T for points in pieces.corners]
     com, corners = turn @ np.asarray(mesh.center_mass), np.vstack(parts)
     stands = feet(corners, com)
     lowest = np.concatenate([corners[:, 2], stands[:, 2] - FOOT_RADIUS]).min()
     origin = np.array([com[0], com[1], lowest])
-    tolerance, look = 1e-4, found.manifold
-    while look.num_tri() > FACES:
-        look, tolerance = found.manifold.simplify(tolerance), 1.5 * tolerance
-    seen = as_mesh(look)
+    tolerance, simplified = 1e-4, found.manifold
+    while simplified.num_tri() > MAX_VISUAL_FACES:
+        simplified, tolerance = found.manifold.simplify(tolerance), 1.5 * tolerance
+    visual = as_mesh(simplified)
     return MeshProp(
         corners=tuple(points - origin for points in parts),
         feet=stands - origin,
-        vertices=np.asarray(seen.vertices) @ turn.T - origin,
-        faces=np.asarray(seen.faces),
+        vertices=np.asarray(visual.vertices) @ turn.T - origin,
+        faces=np.asarray(visual.faces),
         mass=float(mesh.mass),
         com=com - origin,
         inertia=turn @ np.asarray(mesh.moment_inertia) @ turn.T,
@@ -197,7 +211,7 @@ def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | 
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the pieces and figures depend on."""
+    """Versions of the packages on which pieces and figures depend."""
     return {name: importlib.metadata.version(name) for name in ("scengen", "coacd", "manifold3d", "mujoco", "trimesh")}
 
 
@@ -206,13 +220,13 @@ def _settings(request: IntakeRequest) -> dict[str, Any]:
 
 
 def key(request: IntakeRequest, sha256: str) -> str:
-    """What an asset is known by: the content of the file, the settings and the versions, not where the file is."""
-    told = json.dumps([sha256, _settings(request), versions()], sort_keys=True)
-    return hashlib.sha256(told.encode()).hexdigest()
+    """Key of an asset: a hash of the content of the file, the settings and the versions, but not the file's path."""
+    identity = json.dumps([sha256, _settings(request), versions()], sort_keys=True)
+    return hashlib.sha256(identity.encode()).hexdigest()
 
 
 def kept(request: IntakeRequest, folder: Path) -> dict[str, Any] | None:
-    """The figures of an asset in a folder, if it was made of this very file with these settings and versions.
+    """The figures of an asset in a folder, if it was made of the same file content, settings and versions; else None.
 
     Raises:
         BadConfig: the mesh file cannot be read.
@@ -222,6 +236,6 @@ def kept(request: IntakeRequest, folder: Path) -> dict[str, Any] | None:
         figures = json.loads((folder / "asset.json").read_text())
         sha256 = hashlib.sha256((folder / "asset.xml").read_bytes()).hexdigest()
         same = figures["key"] == wanted and figures["sha256"]["asset.xml"] == sha256
-    except (OSError, ValueError, KeyError, TypeError):  # there is none, or what is there is none of ours
+    except (OSError, ValueError, KeyError, TypeError):  # there is no asset, or the files are not ours
         return None
     return figures if same else None

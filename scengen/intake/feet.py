@@ -1,4 +1,4 @@
-"""Feet for a body of convex pieces: a mesh rests on a table on one or two points of contact, and rocks."""
+"""Feet for a body of convex pieces: without them a mesh has one or two points of contact with a table, and rocks."""
 
 import math
 
@@ -9,27 +9,27 @@ from ..assets.mesh_prop import Points
 from ..assets.turned import FOOT_COUNT, FOOT_PROTRUSION, FOOT_RADIUS
 from ..geometry import Vec3
 
-LEVEL = 0.0003
-"""How far above the plane that it stands on a corner may be to have a foot [m]."""
-LEAN = math.radians(15.0)
-"""How far a body may lean from how its file shows it, to stand [rad]."""
+CORNER_HEIGHT = 0.0003
+"""Largest height of a corner above the plane on which the body stands for the corner to get a foot [m]."""
+MAX_LEAN = math.radians(15.0)
+"""Largest angle between the orientation of the file and the one in which the body stands [rad]."""
 
 
 def feet(corners: Points, com: Vec3) -> Points:
-    """Centres of the spheres of radius `FOOT_RADIUS` that a body stands on, shape (n, 3); none if it would not stand as it is.
+    """Centres of the feet of a body, spheres of radius `FOOT_RADIUS`, shape (n, 3) [m]; none if it cannot stand.
 
-    It stands on that side of its convex hull in which the foot of the perpendicular from the centre of mass lies; of
-    several the most level one. Feet are where its corners reach farthest in `FOOT_COUNT` directions.
+    The body stands on the face of its convex hull that contains the foot of the perpendicular from the centre of mass;
+    of several faces on the most horizontal one. Feet are at the corners that are farthest in `FOOT_COUNT` directions.
 
     Args:
-        corners: of all its pieces [m].
+        corners: corners of all its pieces [m].
         com: centre of mass [m].
     """
     side = side_below(corners, com)
     if side is None:
         return np.zeros((0, 3))
     up, height = side
-    low = corners[corners @ up - height < LEVEL]
+    low = corners[corners @ up - height < CORNER_HEIGHT]
     x = np.cross(up, [0.0, 1.0, 0.0])
     x /= np.linalg.norm(x)
     flat = np.stack([x, np.cross(up, x)])
@@ -45,7 +45,7 @@ def feet(corners: Points, com: Vec3) -> Points:
 
 
 def side_below(corners: Points, com: Vec3) -> tuple[Vec3, float] | None:
-    """The unit vector from the side that a body stands on to the body, and that side's distance from the origin [m]."""
+    """Inward unit normal of the face on which a body stands, and the face's distance from the origin [m], or None."""
     hull = Manifold.hull_points(np.ascontiguousarray(corners)).to_mesh64()
     triangles = np.asarray(hull.vert_properties)[:, :3][np.asarray(hull.tri_verts, np.int64)]
     best = None
@@ -54,6 +54,6 @@ def side_below(corners: Points, com: Vec3) -> tuple[Vec3, float] | None:
         inward /= max(float(np.linalg.norm(inward)), 1e-18)
         below = com - ((com - a) @ inward) * inward
         inside = all(np.cross(q - p, below - p) @ inward <= 0.0 for p, q in ((a, b), (b, c), (c, a)))
-        if inside and inward[2] > (best[0][2] if best else math.cos(LEAN)):
+        if inside and inward[2] > (best[0][2] if best else math.cos(MAX_LEAN)):
             best = inward, float(a @ inward)
     return best

@@ -1,4 +1,4 @@
-"""A solid as convex pieces, and how far the pieces are from it."""
+"""Decomposition of a solid into convex pieces, and the error of the pieces."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -13,27 +13,33 @@ from scipy.spatial import KDTree
 from ..assets.mesh_prop import Points
 from .solid import MeshSolid, as_mesh, sampled
 
-DETAIL = 0.1
-"""Share of the permitted error by which a surface is simplified before it is cut up. A scan of a bottle with 16 000
-triangles then takes 9 s and 15 pieces at 3 mm; with a tenth of that share 24 s, and 26 pieces around its roughness."""
-POINTS = 60_000
-"""At which distances are measured."""
+SIMPLIFICATION = 0.1
+"""Share of the permitted error by which a surface is simplified before the decomposition. A scan of a bottle with
+16 000 triangles then takes 9 s and 15 pieces at 3 mm. With a tenth of that share it takes 24 s, and 26 pieces because
+of its roughness."""
+SAMPLE_POINTS = 60_000
+"""Number of points at which distances are measured."""
 NEIGHBOURS = 8
-"""Triangles among which the nearest one is looked for: those of the nearest points."""
+"""Number of nearest points whose triangles are candidates for the nearest triangle."""
 BATCH = 4096
-"""Points that are compared with all planes at once; all of them would take a gigabyte."""
-ITERATIONS, NODES, RESOLUTION = 60, 15, 1000
-"""CoACD's search for cuts. With its own 150, 20 and 2000 the same bottle takes 14 s and 13 pieces."""
+"""Number of points that are compared with all planes at once; all points would need a gigabyte."""
+ITERATIONS = 60
+"""Iterations of CoACD's search for cuts. With its defaults of 150 iterations, 20 nodes and a resolution of 2000 the
+same bottle takes 14 s and 13 pieces."""
+NODES = 15
+"""Nodes of CoACD's search."""
+RESOLUTION = 1000
+"""Sampling resolution of CoACD's search."""
 
 
 @dataclass(frozen=True)
 class PieceError:
-    """How far convex pieces are from a solid [m]."""
+    """Error of convex pieces that replace a solid."""
 
     outward: float
-    """Farthest point of the pieces outside the solid, from the solid."""
+    """Largest distance of a point of the pieces outside the solid from the solid [m]."""
     inward: float
-    """Farthest point of the solid outside the pieces, from the planes of that piece to which it is least outside."""
+    """Largest distance of a point of the solid outside the pieces from the planes of its nearest piece [m]."""
     volume: float
     """Volume of the pieces' union over that of the solid."""
 
@@ -43,21 +49,21 @@ class PieceError:
 
 
 class Surface:
-    """The surface of a solid, asked how far away points are.
+    """The surface of a solid, to measure distances from it.
 
     Args:
-        seed: of the points that stand for it.
+        seed: seed of the points that represent the surface.
     """
 
     def __init__(self, manifold: Manifold, seed: int):
         self.manifold, self.mesh = manifold, as_mesh(manifold)
-        points, faces = sampled(self.mesh, POINTS, np.random.default_rng(seed))
+        points, faces = sampled(self.mesh, SAMPLE_POINTS, np.random.default_rng(seed))
         self.points = np.vstack([points, self.mesh.triangles_center])
         self._faces = np.concatenate([faces, np.arange(len(self.mesh.faces))])
         self._tree = KDTree(self.points)
 
     def distance(self, points: Points) -> NDArray[np.float64]:
-        """From the surface [m], shape (n,): or slightly more where the nearest triangle is not among those asked."""
+        """Distances from the surface, shape (n,) [m]; slightly too large if the nearest triangle is no candidate."""
         _, near = self._tree.query(points, NEIGHBOURS)
         triangles = self.mesh.triangles[self._faces[near].ravel()]
         again = np.repeat(points, NEIGHBOURS, axis=0)
@@ -67,22 +73,22 @@ class Surface:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Convex pieces in place of a solid."""
+    """Convex pieces that replace a solid."""
 
     hulls: tuple[Manifold, ...]
     error: PieceError
 
     @classmethod
     def of(cls, hulls: list[Manifold], surface: Surface, seed: int) -> Self:
-        """Measure pieces against the solid that they stand for: what of one is not in the other, by exact booleans."""
+        """Measure pieces against the solid that they replace, with exact boolean operations."""
         union = Manifold.batch_boolean(hulls, OpType.Add)
         outward = 0.0
         if (beyond := as_mesh(union - surface.manifold)).area > 0.0:
-            points, _ = sampled(beyond, POINTS, np.random.default_rng(seed))
+            points, _ = sampled(beyond, SAMPLE_POINTS, np.random.default_rng(seed))
             outward = float(surface.distance(np.vstack([points, beyond.vertices])).max())
         lowest = np.full(len(surface.points), np.inf)
         for hull in hulls:
-            lowest = np.minimum(lowest, _highest(surface.points, as_mesh(hull)))
+            lowest = np.minimum(lowest, _heights_above(surface.points, as_mesh(hull)))
         inward = max(0.0, round(float(lowest.max()), 9))
         return cls(tuple(hulls), PieceError(outward, inward, union.volume() / surface.manifold.volume()))
 
@@ -93,24 +99,25 @@ class Pieces:
 
 
 def one_hull(solid: MeshSolid, surface: Surface, seed: int) -> Pieces:
-    """The convex hull: what MuJoCo makes of a mesh by itself."""
+    """The convex hull, with which MuJoCo by default replaces a mesh."""
     return Pieces.of([solid.manifold.hull()], surface, seed)
 
 
 def cut_up(solid: MeshSolid, surface: Surface, error: float, most: int, seed: int) -> Pieces:
-    """Convex pieces by CoACD, of which no more than `most` are made, whatever the error is then.
+    """Convex pieces by CoACD.
 
     Args:
-        error: largest concavity of a piece [m], the distance of its hull from the solid.
-        seed: of CoACD's search.
+        error: largest concavity of a piece, the distance of its hull from the solid [m].
+        most: largest number of pieces, also if the error is then larger.
+        seed: seed of CoACD's search.
     """
-    mesh = as_mesh(solid.manifold.simplify(DETAIL * error))
+    mesh = as_mesh(solid.manifold.simplify(SIMPLIFICATION * error))
     coacd.set_log_level("error")
     found = coacd.run_coacd(
         coacd.Mesh(mesh.vertices, mesh.faces),
-        threshold=(1 - DETAIL) * error,
+        threshold=(1 - SIMPLIFICATION) * error,
         max_convex_hull=most,
-        preprocess_mode="off",  # it makes a closed surface of an open one; this one is closed
+        preprocess_mode="off",  # it closes open surfaces; this one is closed
         real_metric=True,
         mcts_iterations=ITERATIONS,
         mcts_nodes=NODES,
@@ -121,8 +128,8 @@ def cut_up(solid: MeshSolid, surface: Surface, error: float, most: int, seed: in
     return Pieces.of([hull for hull in hulls if not hull.is_empty()], surface, seed)
 
 
-def _highest(points: Points, convex: trimesh.Trimesh) -> NDArray[np.float64]:
-    """How far each point is above that plane of a convex body that it is farthest above [m]; negative: inside."""
+def _heights_above(points: Points, convex: trimesh.Trimesh) -> NDArray[np.float64]:
+    """Largest height of each point above the planes of a convex body [m]; negative for points inside."""
     offsets = np.einsum("ij,ij->i", convex.face_normals, convex.triangles[:, 0])
     highest = np.empty(len(points))
     for start in range(0, len(points), BATCH):

@@ -1,4 +1,4 @@
-"""A picture of an asset on the table: as it is looked at, and beside it the pieces that things collide with."""
+"""A picture of an asset on the table: its visual mesh, and beside it its collision geometry."""
 
 import math
 from dataclasses import replace
@@ -14,9 +14,9 @@ from ..sim.scene_text import emit
 from ..sim.world import JAW
 
 SIZE = 480
-"""Edge of each half [pixels]."""
-AWAY = 2.6
-"""Distance of the camera, as a multiple of the asset's largest distance from the middle of its bounding box."""
+"""Edge of each half of the picture [pixels]."""
+CAMERA_DISTANCE = 2.6
+"""Distance of the camera, as a multiple of half the diagonal of the asset's bounding box."""
 
 
 def preview(prop: MeshProp) -> Picture:
@@ -38,7 +38,7 @@ def _picture(prop: MeshProp) -> Picture:
     right = np.cross(ahead, UP) / math.cos(dip)
     axes, turn = np.column_stack([right, np.cross(right, ahead), -ahead]), np.empty(4)
     mujoco.mju_mat2Quat(turn, axes.ravel())
-    eye = TABLE_TOP * UP + (low + high) / 2 - AWAY * float(np.linalg.norm(high - low)) / 2 * ahead
+    eye = TABLE_TOP * UP + (low + high) / 2 - CAMERA_DISTANCE * float(np.linalg.norm(high - low)) / 2 * ahead
     scene.worldbody.add_camera(name="close", pos=eye.tolist(), quat=turn.tolist())
     with camera(emit(scene)[0], JAW, SIZE, SIZE) as view:
         return view.take("close")

@@ -1,4 +1,4 @@
-"""A mesh file read as a solid: repaired where that changes nothing, refused in one line where it is none."""
+"""Reads a mesh file as a solid: repairs it if that does not change the shape, and refuses it if it is not a solid."""
 
 import hashlib
 import logging
@@ -15,17 +15,21 @@ from ..errors import BadConfig, UnknownName, cut, nearest
 from ..work.targets import remedy
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-"""Metres in a unit."""
+"""Length of each unit [m]."""
 FORMATS = ("glb", "obj", "off", "ply", "stl")
-SMALLEST, LARGEST = 0.005, 1.0
-"""Largest extent of a thing that a Panda, whose reach is 0.855 m, can have to do with [m]."""
-THIN = 0.0015
-"""Walls that are thinner let small balls through at moderate speed [m]."""
-THIN_SHARE = 0.1
-"""Share of the surface that may be thinner: scans have fringes."""
-MOST_BYTES = 200_000_000
+"""Endings of the names of mesh files."""
+MIN_EXTENT = 0.005
+"""Smallest accepted extent of a thing for a Panda [m]; the extent is the longest edge of the bounding box."""
+MAX_EXTENT = 1.0
+"""Largest accepted extent of a thing for a Panda, whose reach is 0.855 m [m]."""
+MIN_WALL = 0.0015
+"""Smallest thickness of walls [m]: thinner walls let small balls through at moderate speed."""
+MAX_THIN_SHARE = 0.1
+"""Largest share of the surface that may be thinner, as scans have fringes."""
+MAX_BYTES = 200_000_000
+"""Largest size of a mesh file [bytes]."""
 RAYS = 2000
-"""Places at which thickness is measured."""
+"""Number of points at which the thickness is measured."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +37,20 @@ class MeshSolid:
     """A closed body in one part, in metres."""
 
     file: str
+    """Name of the mesh file."""
     sha256: str
+    """Hash of the content of the file."""
     manifold: Manifold
     merged: int
-    """Vertices that stood in the same place as another one."""
+    """Number of vertices that were merged with another one at the same position."""
     dropped: int
-    """Triangles without area that have gone with them."""
+    """Number of triangles without area that were removed by the merging."""
     thin: float
-    """Share of the surface under which the solid is thinner than `THIN`."""
+    """Share of the surface under which the solid is thinner than `MIN_WALL`."""
 
     @property
     def mesh(self) -> trimesh.Trimesh:
+        """Its surface as triangles."""
         return as_mesh(self.manifold)
 
 
@@ -55,7 +62,7 @@ def as_mesh(manifold: Manifold) -> trimesh.Trimesh:
 
 
 def sampled(mesh: trimesh.Trimesh, count: int, rng: np.random.Generator) -> tuple[Points, NDArray[np.int64]]:
-    """Points spread evenly over a surface, and the triangle that each lies in."""
+    """Points with uniform distribution over a surface, and the index of the triangle of each."""
     areas = mesh.area_faces
     faces = rng.choice(len(areas), count, p=areas / areas.sum())
     root, share = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
@@ -67,11 +74,11 @@ def read(path: str, units: str | None = None, seed: int = 0) -> MeshSolid:
     """Read a mesh file.
 
     Args:
-        units: of the numbers in the file, one of `UNITS`; None: metres.
-        seed: of the places at which thickness is measured.
+        units: unit of the numbers in the file, one of `UNITS`. Default: metres.
+        seed: seed of the points at which the thickness is measured.
 
     Raises:
-        BadConfig: there is no such file, it cannot be read, or what it holds is no solid that a scene can use.
+        BadConfig: there is no such file, it cannot be read, or it does not hold a solid that a scene can use.
         UnknownName: there is no such unit.
     """
     if units is not None and units not in UNITS:
@@ -85,10 +92,11 @@ def read(path: str, units: str | None = None, seed: int = 0) -> MeshSolid:
     manifold = _manifold(path, whole, kept)
     _check_size(path, whole, units)
     thin, median = _thinness(manifold, seed)
-    if thin > THIN_SHARE:
+    if thin > MAX_THIN_SHARE:
         raise BadConfig(
-            f"{cut(path)} is thinner than {1000 * THIN:g} mm under {thin:.0%} of its surface (half of it is thinner "
-            f"than {1000 * median:.1f} mm), and thin walls let things through; give it walls of {1000 * THIN:g} mm"
+            f"{cut(path)} is thinner than {1000 * MIN_WALL:g} mm under {thin:.0%} of its surface (half of it is "
+            f"thinner than {1000 * median:.1f} mm), and thin walls let things through; "
+            f"give it walls of {1000 * MIN_WALL:g} mm"
         )
     sha256 = hashlib.sha256(data).hexdigest()
     return MeshSolid(Path(path).name, sha256, manifold, len(points) - len(whole), len(faces) - len(kept), thin)
@@ -98,7 +106,7 @@ def content(path: str) -> bytes:
     """The bytes of a mesh file.
 
     Raises:
-        BadConfig: there is no such file, or it cannot be a mesh.
+        BadConfig: there is no such file, or it is not a mesh file.
     """
     file = Path(path)
     ending = file.suffix[1:].lower()
@@ -111,32 +119,32 @@ def content(path: str) -> bytes:
         if ending not in FORMATS:
             known = ", ".join(f".{form}" for form in FORMATS)
             raise BadConfig(f"{cut(path)}: no mesh format named {cut(repr(file.suffix))}; known: {known}")
-        if file.stat().st_size > MOST_BYTES:
-            raise BadConfig(f"{cut(path)} has more than {MOST_BYTES // 10**6} MB; give a mesh with fewer triangles")
+        if file.stat().st_size > MAX_BYTES:
+            raise BadConfig(f"{cut(path)} has more than {MAX_BYTES // 10**6} MB; give a mesh with fewer triangles")
         return file.read_bytes()
     except OSError as error:
         raise BadConfig(f"{cut(path)} cannot be read: {remedy(error) or 'choose another file'}") from None
 
 
 def _triangles(path: str, data: bytes) -> tuple[Points, NDArray[np.int64]]:
-    """Vertices and triangles of a file, whatever scene they are arranged in."""
+    """Vertices and triangles of a file, with the parts of a scene merged."""
     ending = Path(path).suffix[1:].lower()
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # it writes what it stumbles over to standard error
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # it logs problems to standard error
     try:
         found = trimesh.load(
             trimesh.util.wrap_as_stream(data), file_type=ending, force="mesh", process=False, skip_materials=True
         )
         points = np.asarray(getattr(found, "vertices", np.zeros((0, 3))), np.float64)
         faces = np.asarray(getattr(found, "faces", np.zeros((0, 3))), np.int64)
-    except Exception as error:  # what a reader raises on a damaged file differs by format
+    except Exception as error:  # the type of the error for a damaged file depends on the format
         what = cut(" ".join(str(error).split()), 80) or type(error).__name__
         raise BadConfig(
-            f"{cut(path)} is no .{ending} file that can be read ({what}); see the program that made it"
+            f"{cut(path)} cannot be read as a .{ending} file ({what}); see the program that made it"
         ) from None
     if not len(faces):
         raise BadConfig(f"{cut(path)} holds no triangles; expected a mesh, not points or lines")
     if not np.isfinite(points).all() or faces.min() < 0 or faces.max() >= len(points):
-        raise BadConfig(f"{cut(path)} has vertices that are no numbers or do not exist; expected a sound mesh")
+        raise BadConfig(f"{cut(path)} has vertices that are not numbers or do not exist; expected a valid mesh")
     return points, faces
 
 
@@ -157,7 +165,7 @@ def _manifold(path: str, points: Points, faces: NDArray[np.int64]) -> Manifold:
     parts = manifold.decompose()
     volumes = sorted((part.volume() for part in parts), reverse=True)
     if not volumes or manifold.volume() == 0.0:
-        raise BadConfig(f"{cut(path)} is flat: it encloses no volume; give it walls of {1000 * THIN:g} mm")
+        raise BadConfig(f"{cut(path)} is flat: it encloses no volume; give it walls of {1000 * MIN_WALL:g} mm")
     if volumes[0] <= 0.0:
         raise BadConfig(f"{cut(path)} is inside out: its triangles face inwards; make all of them face outwards")
     if len(parts) > 1:
@@ -168,22 +176,23 @@ def _manifold(path: str, points: Points, faces: NDArray[np.int64]) -> Manifold:
 
 def _check_size(path: str, points: Points, units: str | None) -> None:
     extent = float(np.ptp(points, axis=0).max())
-    if SMALLEST <= extent <= LARGEST:
+    if MIN_EXTENT <= extent <= MAX_EXTENT:
         return
     given = extent / UNITS[units or "m"]
-    fitting = [unit for unit, metres in UNITS.items() if SMALLEST <= given * metres <= LARGEST]
-    likely = "mm" if "mm" in fitting and extent > LARGEST else next(iter(fitting), "")
-    told = f"; say units={likely} if they are" if likely else "; give it its true size"
+    fitting = [unit for unit, metres in UNITS.items() if MIN_EXTENT <= given * metres <= MAX_EXTENT]
+    likely = "mm" if "mm" in fitting and extent > MAX_EXTENT else next(iter(fitting), "")
+    hint = f"; give units={likely} if they are" if likely else "; give it its true size"
     raise BadConfig(
         f"{cut(path)} is {extent:.3g} m long if its numbers are in {units or 'm'}; "
-        f"it must be {SMALLEST:g} to {LARGEST:g} m long{told}"
+        f"it must be {MIN_EXTENT:g} to {MAX_EXTENT:g} m long{hint}"
     )
 
 
 def _thinness(manifold: Manifold, seed: int) -> tuple[float, float]:
-    """Share of the surface under which the solid is thinner than `THIN`, and median thickness, at most the solid's own.
+    """Share of the surface under which the solid is thinner than `MIN_WALL`, and median thickness [m].
 
-    Thickness is the length of the ray from a place on the surface straight inwards to where it leaves the solid [m].
+    The thickness is the length of the ray from a point of the surface straight inwards to the point where it leaves
+    the solid, at most the size of the solid.
     """
     mesh = as_mesh(manifold)
     points, faces = sampled(mesh, RAYS, np.random.default_rng(seed))
@@ -193,4 +202,4 @@ def _thinness(manifold: Manifold, seed: int) -> tuple[float, float]:
     for i, (start, end) in enumerate(zip(points - skin * normals, points - longest * normals, strict=True)):
         if hits := manifold.ray_cast(start.tolist(), end.tolist()):
             thickness[i] = skin + hits[0].distance * (longest - skin)
-    return float((thickness < THIN).mean()), float(np.median(thickness))
+    return float((thickness < MIN_WALL).mean()), float(np.median(thickness))

@@ -1,4 +1,4 @@
-"""Scans of YCB objects in the place of their proxies: a folder of the set becomes a part of a task."""
+"""Scans of YCB objects, from a folder of the set, as part of a task in place of their proxies."""
 
 import hashlib
 import json
@@ -23,17 +23,17 @@ from .feet import side_below
 from .solid import content
 
 LIES: Mat3 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turns a carton that stands, as in its scan, to its narrow side: what was up then lies along y."""
+"""Rotation of a carton from standing, as in its scan, to its narrow side: its upward axis is then along y."""
 
 
 def with_scans(task: Task, split: str, folder: str) -> Task:
-    """The task with scans in the place of the proxies, of all objects that a split or training may draw.
+    """The task with scans in place of the proxies of all objects that a split or training may draw.
 
     Args:
-        folder: that holds the set, or a part of it, see `assets.ycb.mesh_of`.
+        folder: folder of the set, or of a part of it, see `assets.ycb.mesh_of`.
 
     Raises:
-        BadConfig: the task has no YCB object, a scan is not there, or a mesh is no solid.
+        BadConfig: the task has no YCB object, a scan is missing, or a mesh is not a solid.
     """
     found = {}
     for thing in _drawn(task, split):
@@ -42,10 +42,10 @@ def with_scans(task: Task, split: str, folder: str) -> Task:
 
 
 def other_files(task: Task, folder: str) -> list[str]:
-    """What is wrong with the scans that a task holds, made again from a folder; empty if nothing is.
+    """Differences between the scans that a task holds and those made again from a folder.
 
     Raises:
-        BadConfig: a scan is not there, or a mesh is no solid.
+        BadConfig: a scan is missing, or a mesh is not a solid.
     """
     wrong = []
     for called, told in task.node["scans"].items():
@@ -53,12 +53,12 @@ def other_files(task: Task, folder: str) -> list[str]:
         if told["sha256"] != made["sha256"]:
             wrong.append(f"the scan of {called} was made of another file, {told['file']}")
         elif told["settings"] == made["settings"] and told["solid"] != made["solid"]:
-            wrong.append(f"the solid of {called} is not what is made of its file")
+            wrong.append(f"the solid of {called} differs from the one that is made of its file")
     return wrong
 
 
 def _drawn(task: Task, split: str) -> list[Ycb]:
-    """Every YCB object that may be drawn, in training or in the split."""
+    """Every YCB object that training or the split may draw."""
     found = {}
     for name in things(task.family):
         shifts = task.shifts(Split.parse(split))
@@ -69,12 +69,12 @@ def _drawn(task: Task, split: str) -> list[Ycb]:
             every = (Ycb(item=item, low=low) for item in items for low in lows)
             found |= {thing.called: thing for thing in every}
     if not found:
-        raise BadConfig(f"task {task.name} has no YCB object; name one that has, or leave ycb= out")
+        raise BadConfig(f"task {task.name} has no YCB object; name a task that has one, or leave ycb= out")
     return [found[called] for called in sorted(found)]
 
 
 def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
-    """What a task holds of an object: kept in the folder of cached files under what it is made of."""
+    """The data of an object's scan that a task holds, cached by the content and settings of the scan."""
     path = mesh_of(folder, thing.row)
     request = IntakeRequest(str(path), mass=thing.mass, friction=_friction(thing.row.prop))
     made_of = key(request, hashlib.sha256(content(request.mesh)).hexdigest())
@@ -95,40 +95,40 @@ def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
 
 
 def _friction(proxy: Prop) -> float:
-    """Of an object's proxy: that of its first geom."""
+    """Friction of an object's proxy: that of its first geom."""
     return float(proxy.spec().compile().geom_friction[0, 0])
 
 
 def _upright(thing: Ycb, taken: MeshAsset) -> Mat3:
-    """The turn from a scan's axes to those of the proxy: scans of the set stand or lie as their proxies do, but askew.
+    """The rotation from a scan's axes to those of the proxy. Scans stand or lie as their proxies do, but askew.
 
-    About the vertical, until the narrow side lies as the proxy's; to its side, if it is a carton that lies; and by
-    what the side that it then stands on is off the level: else it would turn as it comes to rest.
+    It turns the scan about the vertical, to align its narrow side with the proxy's; to its side, if it is a carton that
+    lies; and by the tilt of the face on which it then stands, as otherwise it would turn while it comes to rest.
     """
     corners, com = np.vstack(taken.pieces.corners), np.asarray(taken.solid.mesh.center_mass)
-    turn = about_z(_askew(corners, _broad(thing.row.prop)))
+    turn = about_z(_alignment(corners, _long_direction(thing.row.prop)))
     turn = LIES @ turn if thing.lies else turn
     side = side_below(corners @ turn.T, turn @ com)
     if side is None:
-        raise BadConfig(f"the scan of {thing.called} does not stand as its file shows it; turn it upright there")
+        raise BadConfig(f"the scan of {thing.called} does not stand upright in its file; turn it upright there")
     return shortest(side[0], UP) @ turn
 
 
-def _askew(corners: Points, broad: float) -> float:
-    """By how much a body must be turned about the vertical for the narrowest strip that holds it to lie along `broad`.
+def _alignment(corners: Points, direction: float) -> float:
+    """Rotation about the vertical that aligns the narrowest strip that contains a body with a direction [rad].
 
-    Of the two ways, which differ by pi, it is the shorter one [rad].
+    Of the two solutions, which differ by pi, it is the smaller one.
     """
     flat = corners[:, :2]
     outline = flat[ConvexHull(flat).vertices]
     edges = np.roll(outline, -1, axis=0) - outline
     angles = np.arctan2(edges[:, 1], edges[:, 0])
     widths = [float(np.ptp(outline @ np.array([-math.sin(a), math.cos(a)]))) for a in angles]
-    return math.remainder(broad - float(angles[int(np.argmin(widths))]), math.pi)
+    return math.remainder(direction - float(angles[int(np.argmin(widths))]), math.pi)
 
 
-def _broad(proxy: Prop) -> float:
-    """The level direction in which a proxy is longer: 0 along x, pi / 2 along y [rad]."""
+def _long_direction(proxy: Prop) -> float:
+    """Horizontal direction in which a proxy is longer: 0 for x, pi / 2 for y [rad]."""
     model = proxy.spec().compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -11,7 +11,7 @@ from helpers import pictures_are_possible
 from manifold3d import Manifold
 
 from scengen import cli
-from scengen.assets.turned import FOOT_RADIUS, FOOT_PROTRUSION
+from scengen.assets.turned import FOOT_PROTRUSION, FOOT_RADIUS
 from scengen.errors import BadConfig
 from scengen.intake.asset import IntakeRequest, dropped, take_in
 from scengen.intake.pieces import Pieces, Surface
@@ -44,7 +44,7 @@ WRONG = {
     "both_ways": (changed(turned=3), "has triangles that face both ways"),
     "millimetres": (
         changed(scale=1000.0),
-        "is 70 m long if its numbers are in m; it must be 0.005 to 1 m long; say units=mm",
+        "is 70 m long if its numbers are in m; it must be 0.005 to 1 m long; give units=mm",
     ),
     "tiny": (changed(scale=0.01), "is 0.0007 m long if its numbers are in m"),
     "two": (
@@ -76,10 +76,10 @@ def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, capsys, case, e
         ("noise.stl", b"noise", "holds no triangles"),
         ("empty.obj", b"", "holds no triangles"),
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "holds no triangles"),
-        ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertices that are no numbers"),
-        ("far.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", "is no .obj file that can be read"),
-        ("noise.glb", b"glTFglTFglTF", "is no .glb file that can be read"),
-        ("noise.ply", b"ply", "that can be read"),
+        ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertices that are not numbers"),
+        ("far.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", "cannot be read as a .obj file"),
+        ("noise.glb", b"glTFglTFglTF", "cannot be read as a .glb file"),
+        ("noise.ply", b"ply", "cannot be read as a .ply file"),
     ],
 )
 def test_what_is_no_mesh_is_said_in_one_line(tmp_path, capsys, name, content, says):

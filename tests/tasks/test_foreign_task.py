@@ -45,7 +45,7 @@ def test_what_does_not_vary_is_caught():
     still = replace(
         task, training={name: Fixed(0.12 if name == "distance" else p.nominal) for name, p in task.known.items()}
     )
-    assert "nothing varies" in broken(rules._draws_are_keyed, still)
+    assert "gave the same scenario" in broken(rules._draws_are_keyed, still)
 
 
 def test_an_axis_whose_value_twins_share_is_caught():
@@ -53,7 +53,7 @@ def test_an_axis_whose_value_twins_share_is_caught():
     same = replace(task.axes["far"], replace={"distance": Fixed(0.12)})
     here = replace(task, training={**task.training, "distance": Fixed(0.12)}, axes={"far": same})
     told = broken(rules._twins_differ_in_the_axis_alone, here, "far")
-    assert "the axis names distance, and twins are equal there" in told
+    assert "the axis names distance, but twins do not differ in them" in told
 
 
 def test_a_task_whose_shortcut_works_is_caught(monkeypatch):
@@ -71,7 +71,7 @@ def test_a_feature_with_the_name_of_a_parameter_is_caught(monkeypatch):
 def test_an_instruction_that_names_its_axis_is_caught():
     task = replace(load_task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
-        rules._told_well(task)
+        rules._describes_axes(task)
 
 
 @pytest.fixture

@@ -36,7 +36,7 @@ def solution(scenario):
 def told(scenario):
     (other,) = frames.moved(scenario, "test")
     assert other.parameter == "y"
-    return frames.differing(scenario, other, solution(scenario), DOMINO.embodiment)
+    return frames.difference(scenario, other, solution(scenario), DOMINO.embodiment)
 
 
 def test_a_goal_in_the_axes_of_the_scene_is_judged_alike_everywhere():
@@ -45,7 +45,7 @@ def test_a_goal_in_the_axes_of_the_scene_is_judged_alike_everywhere():
 
 @pytest.mark.parametrize(("family", "what"), [(OnTheTable, "success"), (NearTheMiddle, "failure")])
 def test_a_verdict_in_the_axes_of_the_table_is_caught(family, what):
-    assert f"{what} is " in told(family()) and "where the scene is moved" in told(family())
+    assert f"{what} is " in told(family()) and "in the moved scene" in told(family())
 
 
 @pytest.mark.parametrize(

@@ -64,12 +64,12 @@ class SpelledAblation(DominoSingle):
 @pytest.mark.parametrize(
     ("family", "says"),
     [
-        (NoShortcuts, "domino_single/id/0 has 0 shortcuts: 2 at least"),
+        (NoShortcuts, "domino_single/id/0 has 0 shortcuts; at least 2"),
         (NoAblations, "domino_single/id/0 has no ablations"),
-        (EmptyAblation, "the ablation 'no_chain' takes nothing away"),
-        (SpelledShortcut, "the shortcut 'push the slab' has no name in snake_case"),
-        (SpelledFeature, "the feature 'gap over height, least' has no name in snake_case"),
-        (SpelledAblation, "the ablation 'no_chain-Gone' has no name in snake_case"),
+        (EmptyAblation, "the ablation 'no_chain' does not change the scene"),
+        (SpelledShortcut, "the shortcut 'push the slab' must have a name in snake_case"),
+        (SpelledFeature, "the feature 'gap over height, least' must have a name in snake_case"),
+        (SpelledAblation, "the ablation 'no_chain-Gone' must have a name in snake_case"),
     ],
 )
 def test_what_shows_nothing_or_is_spelled_badly_is_caught(family, says):
