@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -122,6 +123,10 @@ class Loop:
         self._no_record = np.zeros((0, model.nu))
         self._fingers = [panda.fingers(model, name) for name in names]
         self.reset()
+
+    def __reduce__(self) -> NoReturn:
+        remedy = "copy the World, or make Loop(model, data) and restore(loop.state())"
+        raise TypeError(f"a Loop holds addresses of its model and data and cannot be copied or pickled; {remedy}")
 
     def reset(self) -> None:
         """Return to the start: `home`, jaw half open or suction off, no contacts.

@@ -148,6 +148,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
                 turned by a quarter are not square.
         """
+        self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         _check_render_mode(render_mode)
         check_filter(action_filter)
         _check_action_repeat(action_repeat)
@@ -172,6 +173,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world: World | None = None
         self._renderer: Camera | None = None
         self._row: PoolRow = self._rows[0]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles open the pools again and continue from the same state with a simulation of their own."""
+        return _revived, (type(self), self._arguments, self._progress())
 
     @property
     def streams(self) -> Mapping[str, Stream]:
@@ -276,6 +281,23 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._renderer.close()
             self._renderer = None
 
+    def _progress(self) -> dict[str, Any]:
+        """Everything that a copy needs to continue, beside the arguments of `__init__`."""
+        made = {"next": self._next, "random": self._np_random, "random_seed": self._np_random_seed}
+        if self._world is None:
+            return made
+        episode = (self._episode.outcome, self._episode.reason, self._episode.held)
+        return {**made, "scenario": self._row.id, "world": self._world.state(), "episode": episode}
+
+    def _continue(self, progress: Mapping[str, Any]) -> None:
+        """Return to a `_progress()` of an environment with the same arguments."""
+        if "scenario" in progress:
+            self._load(self._rows[self._rows.find(progress["scenario"])])
+            self.world.restore(progress["world"])
+            self._episode.outcome, self._episode.reason, self._episode.held = progress["episode"]
+        self._next = progress["next"]
+        self._np_random, self._np_random_seed = progress["random"], progress["random_seed"]
+
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
@@ -312,6 +334,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         row = self._row
         about = {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
         return {**about, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
+
+
+def _revived(kind: type[PoolEnv], arguments: Mapping[str, Any], progress: Mapping[str, Any]) -> PoolEnv:
+    """An environment that continues from the progress of another one."""
+    env = kind(**arguments)
+    env._continue(progress)
+    return env
 
 
 def _check_render_mode(render_mode: str | None) -> None:

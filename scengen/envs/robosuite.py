@@ -10,7 +10,7 @@ the scene, the suction cup, the events of the scene, and the verdict, which is t
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 import mujoco
 import numpy as np
@@ -167,6 +167,9 @@ class RobosuiteEnv(ManipulationEnv):
     def _controlled_arms(self) -> int:
         """Number of robots that actions control."""
         return len(hands(self.task.embodiment))
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("robosuite's simulation cannot be copied or pickled; make another environment")
 
     def _certified_grippers(self, gripper_types: str | Sequence[str]) -> list[str]:
         """robosuite's names of the task's hands, one for each arm.

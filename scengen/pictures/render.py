@@ -9,6 +9,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -40,6 +41,9 @@ class NoPictures(ScengenError):
 
 class Camera:
     """A renderer for one world."""
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make Camera(world) anew")
 
     def __init__(self, world: World, width: int = 320, height: int = 240, where: Where | None = None):
         """Start with the fitted view of the scene, from `where` or from the direction that hides least of it.

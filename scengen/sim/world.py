@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Self
+from typing import Any, NoReturn, Self
 
 import mujoco
 import numpy as np
@@ -106,6 +106,9 @@ class Arm:
         self._fingers = panda.fingers(model, names)
         self._site = model.site(names.grip_site).id
         self._wrist = model.site(names.wrist_site).id
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("an Arm belongs to its World and cannot be copied or pickled alone; copy the World")
 
     @property
     def label(self) -> str:
@@ -238,6 +241,13 @@ class Arm:
         return self.world.model.actuator(Names(self.number).cup).id
 
 
+def _revived(kind: "type[World]", model: mujoco.MjModel, scripted: int, state: NDArray[np.float64]) -> "World":
+    """A world of a compiled scene in a state."""
+    world = kind.of(model, scripted)
+    world.restore(state)
+    return world
+
+
 @dataclass
 class World:
     """Simulation that maps names to numbers. It holds no task logic. `World.load` makes it, `step` drives it."""
@@ -294,6 +304,10 @@ class World:
         world = cls(model, data, Loop(model, data), scripted)
         world.reset()
         return world
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles get a simulation of their own in the same state: addresses are found anew."""
+        return _revived, (type(self), self.model, self.scripted, self.state())
 
     def reset(self) -> None:
         """Return to the start. A used world then behaves bit by bit like a fresh one."""

@@ -1,0 +1,69 @@
+"""Copies and pickles of worlds and environments are independent of the original, or are refused in one line."""
+
+import copy
+import gc
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from helpers import REFERENCE
+
+import scengen.envs.gym  # noqa: F401  (registers the tasks)
+from scengen.pool import Pool
+from scengen.sim.world import World
+
+PUSH = np.full(7, 0.3, np.float32)
+
+
+@pytest.fixture
+def env():
+    made = gymnasium.make("scengen/domino_single-v0", pool=str(REFERENCE), action_filter="teleop")
+    made.reset(seed=1)
+    for _ in range(20):
+        made.step(np.full(7, 0.2))
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+def test_an_environment_and_its_copy_go_their_own_ways_with_the_same_bits(env, copied):
+    twin = copied(env)
+    assert twin.unwrapped.world.digest == env.unwrapped.world.digest and twin.unwrapped.row.id == env.unwrapped.row.id
+    for _ in range(10):
+        seen, *_ = twin.step(PUSH)
+    assert env.unwrapped.world.time == pytest.approx(0.2) and twin.unwrapped.world.time == pytest.approx(0.3)
+    for _ in range(10):
+        own, *_ = env.step(PUSH)
+    assert env.unwrapped.world.digest == twin.unwrapped.world.digest
+    assert all(np.array_equal(own[name], seen[name]) for name in own)
+
+
+def test_a_copy_outlives_its_original(env):
+    twin = copy.deepcopy(env)
+    env.unwrapped._world = None
+    gc.collect()
+    junk = [np.random.default_rng(0).random(200_000) for _ in range(20)]
+    for _ in range(50):
+        twin.step(PUSH)
+    assert len(junk) == 20 and twin.unwrapped.world.time == pytest.approx(0.7)
+
+
+def test_an_environment_that_was_never_reset_is_copied_too():
+    made = copy.deepcopy(gymnasium.make("scengen/domino_single-v0", pool=str(REFERENCE)))
+    assert made.reset(seed=2)[1]["scenario"] == Pool.open(REFERENCE).at(2).id
+
+
+def test_shallow_copies_of_a_world_have_their_own_simulation():
+    world = World.load(Pool.open(REFERENCE).at(0).scene_xml)
+    other = copy.copy(world)
+    other.step(PUSH)
+    assert world.time == 0.0 and other.time == pytest.approx(0.01)
+
+
+def test_what_holds_addresses_alone_refuses_in_one_line():
+    world = World.load(Pool.open(REFERENCE).at(0).scene_xml)
+    for held in (world.loop, world.arm):
+        for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match="copy the World"):
+                copied(held)
