@@ -6,12 +6,13 @@ certificate. Reset samples nothing: the seed selects one of the stored scenarios
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import ArrayLike, NDArray
 
 from .. import compose, task_files
@@ -44,6 +45,8 @@ Observation = dict[str, Reading]
 
 RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
+RESET_OPTIONS = ("scenario", "labels")
+"""Names of the options of `reset`."""
 MAX_ACTION_REPEAT = 100
 """Largest `action_repeat` [control periods]: one second. With longer repeats the arm is hardly controlled."""
 
@@ -101,16 +104,18 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `scenario`, `scene_sha256`, `split`, `axes`, `success`, `is_success`, and at the end `reason`.
+    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that tells scenarios apart. After
+    `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
     """
 
+    _spec: EnvSpec | None = None
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": round(1 / Loop.PERIOD)}  # noqa: RUF012
 
     def __init__(
         self,
         task: str,
         pool: Folders | None = None,
-        observations: Sequence[str] | None = None,
+        observations: str | Sequence[str] | None = None,
         render_mode: str | None = None,
         width: int = 256,
         height: int = 256,
@@ -127,7 +132,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Args:
             task: name of the task. Pools of other tasks are refused.
             pool: folder of a pool, or several folders.
-            observations: names of streams and cameras; only these are computed. Default: proprioception.
+            observations: names of streams and cameras, or one name; only these are computed. Default: proprioception.
                 Privileged streams are `object-state`, all poses and velocities in one vector
                 (`scengen.envs.object_state`), each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m]
                 if the family turns pictures.
@@ -157,7 +162,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._rows = chosen(rows, scenario, split)
-        names = proprioception(self.task.embodiment) if observations is None else observations
+        names = [observations] if isinstance(observations, str) else observations
+        names = proprioception(self.task.embodiment) if names is None else names
         streams, cameras = _requested(names, self.task, rows, lambda: self.scenario.orientation)
         self.observed = ObservationSettings(streams, cameras, width, height)
         if self._needs_pictures:
@@ -232,23 +238,25 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start a scenario: `options={"scenario": name}`, else number `seed` of the pool, else the next one.
 
-        The name is a scenario's id, a unique prefix of its id, or its `PoolRow.name`.
+        The name is a scenario's id, a unique prefix of its id, or its `PoolRow.name`. With `options={"labels": True}`
+        the returned `info` says which scenario is running.
 
         Raises:
             UnknownName: there is no such scenario or option.
             BadConfig: several ids have this prefix.
         """
         super().reset(seed=seed)
-        unknown = set(options or {}) - {"scenario"}
+        unknown = set(options or {}) - set(RESET_OPTIONS)
         if unknown:
-            raise UnknownName("reset option", unknown.pop(), ["scenario"])
+            raise UnknownName("reset option", unknown.pop(), RESET_OPTIONS)
         if seed is not None:
             self._next = seed % len(self._rows)
         named = (options or {}).get("scenario")
         number = self._next if named is None else self._rows.find(str(named))
         self._next = (number + 1) % len(self._rows)
         self._load(self._rows[number])
-        return self._observe(), self._info("", False)
+        info = self._info("", False)
+        return self._observe(), {**info, **self._labels()} if (options or {}).get("labels") else info
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance one control period (10 ms), or `action_repeat` of them.
@@ -259,6 +267,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         given, size = np.asarray(action, np.float32), action_size(self.task.embodiment)
         if given.shape != (size,) or not np.isfinite(given).all():
             raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
+        if self._world is None:
+            raise BadConfig("no scenario is running; call reset first")
         outcome = None
         for _ in range(self.action_repeat):
             outcome = outcome or self._advance(given)
@@ -280,6 +290,20 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+    @property
+    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+        """Gymnasium's specification, with folders as text so that `to_json` can write it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and "pool" in spec.kwargs:
+            pool = spec.kwargs["pool"]
+            many = isinstance(pool, Sequence) and not isinstance(pool, str)
+            told = [str(folder) for folder in pool] if many else str(pool)
+            spec = replace(spec, kwargs={**spec.kwargs, "pool": told})
+        self._spec = spec
 
     def _progress(self) -> dict[str, Any]:
         """Everything that a copy needs to continue, beside the arguments of `__init__`."""
@@ -331,9 +355,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._scenario.orientation.apply(self._renderer.take(camera)).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
+        return {"success": success, "is_success": success, "reason": reason, "time": self.world.time}
+
+    def _labels(self) -> dict[str, Any]:
+        """Labels of the running scenario. A policy that sees them can memorise scenarios."""
         row = self._row
-        about = {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
-        return {**about, "success": success, "is_success": success, "reason": reason, "time": self.world.time}
+        return {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
 
 
 def _revived(kind: type[PoolEnv], arguments: Mapping[str, Any], progress: Mapping[str, Any]) -> PoolEnv:

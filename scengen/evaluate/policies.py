@@ -112,7 +112,7 @@ class NearestReplay:
         """Find the nearest witness."""
         here = coordinates(self.env.task, self.env.values)
         far = np.linalg.norm(self.points - here, axis=1)
-        far[self.memory.directory.ids == info["scenario"].encode()] = np.inf
+        far[self.memory.directory.ids == self.env.row.id.encode()] = np.inf
         self.actions: Actions = self.memory.witness(int(far.argmin()))
         self.next = 0
 

@@ -104,7 +104,7 @@ def test_policies_play_foreign_tasks(tmp_path):
     quickly = ("certify.robust.runs=1", "certify.robust.bound=0.04")
     assert cli.run(("generate", "task=push_block", "n=1", f"pool={pool}", *SEARCH, *quickly)) == 0
     env = PoolEnv("push_block", pool, search=SEARCH)
-    _, info = env.reset(seed=0)
+    _, info = env.reset(seed=0, options={"labels": True})
     assert info["split"] == "id"
     with pytest.raises(UnknownName, match="no task named 'push_block'"):
         PoolEnv("push_block", pool)
