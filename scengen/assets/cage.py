@@ -39,8 +39,14 @@ MIN_SIZE = 1e-6
 TRAP_COLOUR: Rgba = (0.30, 0.12, 0.45, 0.45)
 """Colour of the trap: violet, which no other thing has."""
 
-BOTTOM, END, SIDE, TOP = range(4)
-"""Values of `face`. For the other end or side, turn the cage round."""
+BOTTOM = 0
+"""Value of `face` for a hole in the bottom."""
+END = 1
+"""Value of `face` for a hole in the end at +x. For the other end, turn the cage round."""
+SIDE = 2
+"""Value of `face` for a hole in the side at +y. For the other side, turn the cage round."""
+TOP = 3
+"""Value of `face` for a hole in the top."""
 FACES = {BOTTOM: (2, -1, 0), END: (0, 1, 1), SIDE: (1, 1, 0), TOP: (2, 1, 0)}
 """Axis and sign of the outward normal of each face, and the axis of `offset`."""
 

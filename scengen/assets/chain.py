@@ -15,9 +15,14 @@ from ..geometry import Vec3
 from ..params import check_bounds, param
 from .box import Domino
 
-GAP, DRIFT, DECOY, MISSING = range(4)
-"""Kinds of defect: a tile beside the chain, spaces that grow, a slab that does not count, a missing tile. The first
-three are the paper's (App. B, T18)."""
+GAP = 0
+"""Kind of defect: a tile beside the chain (paper, App. B, T18)."""
+DRIFT = 1
+"""Kind of defect: spaces that grow along the chain (paper, App. B, T18)."""
+DECOY = 2
+"""Kind of defect: a slab that does not count (paper, App. B, T18)."""
+MISSING = 3
+"""Kind of defect: a missing tile, which is not in the paper."""
 
 
 @dataclass(frozen=True, kw_only=True)

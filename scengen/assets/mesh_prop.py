@@ -113,9 +113,9 @@ class MeshProp(Prop):
         return cls(corners=corners, faces=faces, mass=mass, friction=friction, **arrays)
 
 
-def _numbers(name: str, told: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _numbers(name: str, data: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Finite numbers as an array of a shape, in which -1 stands for any length."""
-    found = np.asarray(told, np.float64)
+    found = np.asarray(data, np.float64)
     if not len(shape) and found.ndim == 0 and np.isfinite(found):
         return found
     fits = found.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, found.shape, strict=True))

@@ -25,8 +25,16 @@ from .turned import FOOT_PROTRUSION, FOOT_RADIUS
 
 KINDS = ("cube", "cylinder", "hexagonal prism", "triangular prism", "cone frustum")
 """Names of the kinds of shapes."""
-CUBE, CYLINDER, HEXAGON, TRIANGLE, FRUSTUM = range(len(KINDS))
-"""Values of `kind`."""
+CUBE = 0
+"""Value of `kind` for a cube."""
+CYLINDER = 1
+"""Value of `kind` for a cylinder."""
+HEXAGON = 2
+"""Value of `kind` for a hexagonal prism."""
+TRIANGLE = 3
+"""Value of `kind` for a triangular prism."""
+FRUSTUM = 4
+"""Value of `kind` for a cone frustum."""
 SIDES = (4, 24, 6, 3, 24)
 """Number of sides of each kind's outline. A round one is 0.9 % wider over its corners."""
 CONE_SLOPE = math.radians(50.0)

@@ -311,6 +311,7 @@ ITEMS = (
     ),
     Item(61, "foam brick", _carton(50.0, 75.0, 50.0, 0.028, 0.70, RED), 0.05, False),
 )
+"""The sixteen objects, by their numbers in the set."""
 
 
 @dataclass(frozen=True)

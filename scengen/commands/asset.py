@@ -81,10 +81,10 @@ def _import_mesh(settings: AssetSettings, folder: Path) -> int:
     request = asset.IntakeRequest(**{name: getattr(settings, name) for name in names})
     request.check()
     try_folder(folder)
-    if known := asset.kept(request, folder):
+    if known := asset.stored_figures(request, folder):
         say(f"{folder} already holds this mesh with these settings; nothing was computed")
         return _report(known)
-    taken = asset.take_in(request)
+    taken = asset.make_asset(request)
     figures = taken.figures()
     _write(taken, figures, folder)
     return _report(figures)

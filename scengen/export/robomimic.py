@@ -107,9 +107,15 @@ class Demonstrations:
             group.create_dataset(key, data=np.array(values))
         group.attrs["num_samples"] = len(seen)
         group.attrs["model_file"] = self._environment.model_text(row)
-        told = {"scenario": row.id, "lang": row.instruction, "task": row.task, "split": row.split, "success": success}
+        metadata = {
+            "scenario": row.id,
+            "lang": row.instruction,
+            "task": row.task,
+            "split": row.split,
+            "success": success,
+        }
         place = {"axes": list(row.axes), "seed": row.seed, "index": row.index, "id_twin": row.id_twin}
-        group.attrs["ep_meta"] = json.dumps({**told, **place, "params": dict(row.params)})
+        group.attrs["ep_meta"] = json.dumps({**metadata, **place, "params": dict(row.params)})
         for mask in (row.split, *([SUCCESS] if success else [])):
             self._masks[mask].append(name)
         self.episodes, self.rows = self.episodes + 1, self.rows + len(seen)
@@ -175,5 +181,5 @@ def environment(
         "has_offscreen_renderer": bool(views),
         **({"camera_names": views, "camera_widths": size[0], "camera_heights": size[1]} if views else {}),
     }
-    told = {"env_name": kind.__name__, "env_version": versions()["robosuite"], "type": ROBOSUITE_TYPE}
-    return made, {**told, "env_kwargs": arguments}
+    identity = {"env_name": kind.__name__, "env_version": versions()["robosuite"], "type": ROBOSUITE_TYPE}
+    return made, {**identity, "env_kwargs": arguments}

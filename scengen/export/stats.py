@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..pictures.render import Picture
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+"""Quantiles of the statistics, by LeRobot's names."""
 PIXEL_STRIDE = 4
 """Distance between the rows and columns of pictures that are counted; every fourth is enough for colours."""
 

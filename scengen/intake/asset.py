@@ -97,7 +97,7 @@ class DropResult:
         return self.creep <= MAX_CREEP and self.speed <= MAX_SPEED
 
 
-def dropped(prop: Prop) -> DropResult:
+def drop(prop: Prop) -> DropResult:
     """Drop a prop upright above the middle of the table, and test whether it comes to rest."""
     scene = table()
     place(scene, prop, "asset", [0.0, 0.0, TABLE_TOP + DROP_HEIGHT])
@@ -135,7 +135,7 @@ class MeshAsset:
     @cached_property
     def rest(self) -> DropResult:
         """Result of dropping the asset on the table."""
-        return dropped(self.prop)
+        return drop(self.prop)
 
     @cached_property
     def xml(self) -> str:
@@ -170,7 +170,7 @@ class MeshAsset:
         }
 
 
-def take_in(request: IntakeRequest) -> MeshAsset:
+def make_asset(request: IntakeRequest) -> MeshAsset:
     """Read a mesh and make an asset of it: one convex hull if that is near enough, else convex pieces.
 
     Raises:
@@ -225,7 +225,7 @@ def key(request: IntakeRequest, sha256: str) -> str:
     return hashlib.sha256(identity.encode()).hexdigest()
 
 
-def kept(request: IntakeRequest, folder: Path) -> dict[str, Any] | None:
+def stored_figures(request: IntakeRequest, folder: Path) -> dict[str, Any] | None:
     """The figures of an asset in a folder, if it was made of the same file content, settings and versions; else None.
 
     Raises:

@@ -169,8 +169,8 @@ def _manifold(path: str, points: Points, faces: NDArray[np.int64]) -> Manifold:
     if volumes[0] <= 0.0:
         raise BadConfig(f"{cut(path)} is inside out: its triangles face inwards; make all of them face outwards")
     if len(parts) > 1:
-        told = ", ".join(f"{1e6 * volume:.3g}" for volume in volumes[:5])
-        raise BadConfig(f"{cut(path)} holds {len(parts)} parts (of {told} cm3); give one file for each, or join them")
+        sizes = ", ".join(f"{1e6 * volume:.3g}" for volume in volumes[:5])
+        raise BadConfig(f"{cut(path)} holds {len(parts)} parts (of {sizes} cm3); give one file for each, or join them")
     return manifold
 
 

@@ -18,7 +18,7 @@ from ..geometry import UP, Mat3, about_z, shortest
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
 from ..work.targets import cache_folder, try_folder, write
-from .asset import IntakeRequest, MeshAsset, key, take_in
+from .asset import IntakeRequest, MeshAsset, key, make_asset
 from .feet import side_below
 from .solid import content
 
@@ -48,11 +48,11 @@ def other_files(task: Task, folder: str) -> list[str]:
         BadConfig: a scan is missing, or a mesh is not a solid.
     """
     wrong = []
-    for called, told in task.node["scans"].items():
+    for called, stored in task.node["scans"].items():
         made = _scan(by_name()[called], folder)
-        if told["sha256"] != made["sha256"]:
-            wrong.append(f"the scan of {called} was made of another file, {told['file']}")
-        elif told["settings"] == made["settings"] and told["solid"] != made["solid"]:
+        if stored["sha256"] != made["sha256"]:
+            wrong.append(f"the scan of {called} was made of another file, {stored['file']}")
+        elif stored["settings"] == made["settings"] and stored["solid"] != made["solid"]:
             wrong.append(f"the solid of {called} differs from the one that is made of its file")
     return wrong
 
@@ -82,13 +82,13 @@ def _scan(thing: Ycb, folder: str) -> dict[str, Any]:
     if kept.is_file():
         return json.loads(kept.read_text())
     try_folder(kept.parent)
-    taken = take_in(request)
-    figures = taken.figures()
+    asset = make_asset(request)
+    figures = asset.figures()
     found = {
         "file": f"{thing.row.folder}/{path.relative_to(Path(folder) / thing.row.folder)}",
-        "sha256": taken.solid.sha256,
+        "sha256": asset.solid.sha256,
         "settings": {**figures["settings"], "versions": figures["versions"]},
-        "solid": taken.turned(_upright(thing, taken)).written(),
+        "solid": asset.turned(_upright(thing, asset)).written(),
     }
     write(kept, json.dumps(found))
     return found
@@ -99,13 +99,13 @@ def _friction(proxy: Prop) -> float:
     return float(proxy.spec().compile().geom_friction[0, 0])
 
 
-def _upright(thing: Ycb, taken: MeshAsset) -> Mat3:
+def _upright(thing: Ycb, asset: MeshAsset) -> Mat3:
     """The rotation from a scan's axes to those of the proxy. Scans stand or lie as their proxies do, but askew.
 
     It turns the scan about the vertical, to align its narrow side with the proxy's; to its side, if it is a carton that
     lies; and by the tilt of the face on which it then stands, as otherwise it would turn while it comes to rest.
     """
-    corners, com = np.vstack(taken.pieces.corners), np.asarray(taken.solid.mesh.center_mass)
+    corners, com = np.vstack(asset.pieces.corners), np.asarray(asset.solid.mesh.center_mass)
     turn = about_z(_alignment(corners, _long_direction(thing.row.prop)))
     turn = LIES @ turn if thing.lies else turn
     side = side_below(corners @ turn.T, turn @ com)

@@ -1,1 +1,1 @@
-"""Pictures, films, reports: everything that is looked at."""
+"""Pictures and films of scenarios, and tables for reports."""

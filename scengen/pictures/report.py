@@ -130,8 +130,8 @@ def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Map
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("instruction")
     for task, after in zip_longest(tasks, tasks[1:]):
-        told = certified.get(task.name, {}).values()
-        share = f"{sum(t['certified'] for t in told)} of {sum(t['indices'] for t in told)}" if told else "-"
+        results = certified.get(task.name, {}).values()
+        share = f"{sum(t['certified'] for t in results)} of {sum(t['indices'] for t in results)}" if results else "-"
         each = certified.get(task.name, {}).get("id", {}).get("cpu")
         hands = task.embodiment.replace("panda_", "")
         cells = (task.name, hands, str(len(task.axes)), share, f"{each:.1f}" if each else "-", task.instruction)
@@ -164,13 +164,13 @@ def axes_table(axes: Sequence[tuple[Task, Axis]]) -> Table:
     for column in ("axis", "parameter", "training", "goes to", "gap", "proof", "why"):
         table.add_column(column)
     for task, axis in axes:
-        told = [*([task.name] if several else []), axis.name], f"{axis.why} ({axis.source or 'no source'})"
+        names, why = [*([task.name] if several else []), axis.name], f"{axis.why} ({axis.source or 'no source'})"
         for proof in task.proofs[axis.name]:
             relative = f" = {proof.relative:.2g} training widths" if proof.relative else ""
             gap = f"{proof.gap:.3g} {task.known[proof.parameter].unit}{relative}"
             spread = [spell(dist[proof.parameter]) for dist in (task.training, axis.replace)]
-            table.add_row(*told[0], proof.parameter, *spread, gap, proof.kind, told[1])
-            told = [""] * len(told[0]), ""  # shown once for all parameters of an axis
+            table.add_row(*names, proof.parameter, *spread, gap, proof.kind, why)
+            names, why = [""] * len(names), ""  # shown once for all parameters of an axis
         table.add_section()
     return table
 

@@ -122,7 +122,7 @@ WORK = (
     "scengen.pictures.film.Take.moments",
     "scengen.pictures.view.view",
     "scengen.commands.asset.encode",
-    "scengen.intake.asset.take_in",
+    "scengen.intake.asset.make_asset",
 )
 """Where work begins that takes seconds: a command line that gets so far has been accepted."""
 

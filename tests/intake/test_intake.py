@@ -13,7 +13,7 @@ from manifold3d import Manifold
 from scengen import cli
 from scengen.assets.turned import FOOT_PROTRUSION, FOOT_RADIUS
 from scengen.errors import BadConfig
-from scengen.intake.asset import IntakeRequest, dropped, take_in
+from scengen.intake.asset import IntakeRequest, drop, make_asset
 from scengen.intake.pieces import Pieces, Surface
 from scengen.intake.solid import as_mesh, read
 from scengen.sim import scene_text
@@ -113,7 +113,7 @@ def test_settings_that_mean_nothing_are_said_in_one_line(tmp_path, capsys, setti
 def taken(tmp_path):
     def take(mesh, **settings):
         mesh.export(tmp_path / "mesh.obj", digits=12)
-        return take_in(IntakeRequest(str(tmp_path / "mesh.obj"), **settings))
+        return make_asset(IntakeRequest(str(tmp_path / "mesh.obj"), **settings))
 
     return take
 
@@ -206,7 +206,7 @@ def test_an_l_stands_still_on_its_feet_and_would_creep_without(taken, thick):
     found = taken(ell(thick), error=0.001)
     assert found.rest.rests and found.rest.creep < 1e-6 and len(found.prop.feet) == 4
     assert found.prop.feet[:, 2] == pytest.approx(FOOT_RADIUS, abs=1e-6)
-    assert not dropped(replace(found.prop, feet=np.zeros((0, 3)))).rests
+    assert not drop(replace(found.prop, feet=np.zeros((0, 3)))).rests
 
 
 def test_what_would_fall_over_gets_no_feet(taken):
@@ -273,4 +273,4 @@ class TestCommand:
 
 def test_an_unknown_unit_is_no_matter_of_the_command_line_alone():
     with pytest.raises(BadConfig, match="give one of them"):
-        take_in(IntakeRequest("nowhere.stl", mass=1.0, density=1.0))
+        make_asset(IntakeRequest("nowhere.stl", mass=1.0, density=1.0))
