@@ -297,12 +297,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._spec
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
         if spec is not None and "pool" in spec.kwargs:
             pool = spec.kwargs["pool"]
             many = isinstance(pool, Sequence) and not isinstance(pool, str)
-            told = [str(folder) for folder in pool] if many else str(pool)
-            spec = replace(spec, kwargs={**spec.kwargs, "pool": told})
+            folders = [str(folder) for folder in pool] if many else str(pool)
+            spec = replace(spec, kwargs={**spec.kwargs, "pool": folders})
         self._spec = spec
 
     def _progress(self) -> dict[str, Any]:
