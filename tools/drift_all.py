@@ -37,8 +37,8 @@ numba, robosuite's files, scengen itself) is that of the running environment, so
 The version that made the pools is the control: if its scenarios do not all have the same bits, the machine is another
 one. Level `recheck` makes all checks that need no oracle. If the witness fails, the oracle is tried to find out whether
 the scenario can still be solved: `witness` without `solved` means that only the recording fails, and the scenario can
-be certified under the new version with a new witness. Whatever this page says, `scengen verify` reports a pool as
-`declined` under any MuJoCo but its own: certificates refer to the version that made them.
+be certified under the new version with a new witness. `scengen verify` always reports a pool as `declined` under any
+MuJoCo but its own: certificates refer to the version that made them.
 
 """
 LOCK = """

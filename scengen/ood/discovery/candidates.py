@@ -31,7 +31,7 @@ NOT_MOVED = -0.2
 """Number that the forest sees where a region is not moved: before the beginning of every region."""
 
 Reaches = Mapping[int, tuple[float, float]]
-"""By a region's number: the first and the last place at which some twin is feasible."""
+"""First and last place along each region at which some twin is feasible, by the number of the region."""
 
 
 def far_points(known: Sequence[Region], reaches: Reaches, random: np.random.Generator) -> list[Point]:
