@@ -43,16 +43,12 @@ from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_do
 
 MAX_TILT = math.radians(10.0)
 """Largest tilt of the rod [rad] (paper, App. B)."""
-CROSSING_TOLERANCE = math.radians(30.0)
-"""Largest angle between the rod and the level normal of the ridge [rad]."""
+CROSSING_TOLERANCE = math.radians(30.0)  # largest angle between the rod and the level normal of the ridge [rad]
 MISS_MARGIN = 0.006
 """Least distance beyond the ridge's edge of the centre of mass of a rod that is laid by its middle [m]."""
-LIFT_HEIGHT = 0.10
-"""Height to which the rod is lifted to be weighed [m]."""
-CARRY_HEIGHT = 0.015
-"""Height over the ridge at which the rod is aligned [m]."""
-EXPECTED_MASS = 0.125
-"""Mass that a guess assumes without having weighed the rod [kg]: the middle of training."""
+LIFT_HEIGHT = 0.10  # height to which the rod is lifted to be weighed [m]
+CARRY_HEIGHT = 0.015  # height over the ridge at which the rod is aligned [m]
+EXPECTED_MASS = 0.125  # mass that a guess assumes without having weighed the rod [kg]: the middle of training
 RIDGE = "stand/ridge"
 
 

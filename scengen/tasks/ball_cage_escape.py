@@ -57,8 +57,7 @@ passes at 1.2 deg above that angle or more (120 rollouts, filtered and raw); at 
 below."""
 GRIP_HEIGHT = 0.030
 """Height of the grip site above the foot of the cage [m]: the finger tips, 9 mm lower, stay 21 mm above the stool."""
-CARRY_PACE = Pace(0.20, 0.01)
-"""Pace with the cage in the hand: slow enough for the sill to hold the ball."""
+CARRY_PACE = Pace(0.20, 0.01)  # pace with the cage in the hand: slow enough for the sill to hold the ball
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,8 +57,7 @@ from .launched_ball import (
     LaunchedBall,
 )
 
-MAT_SIZE = (0.39, 0.39, 0.002)
-"""Half length, half width and height of the mat [m]."""
+MAT_SIZE = (0.39, 0.39, 0.002)  # half length, half width and height of the mat [m]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,18 +54,14 @@ from ..skills import jaw, motion, suction
 from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, turn_to, until, with_arm
 
-UPRIGHT_TOLERANCE = math.radians(8.0)
-"""Largest tilt of a bowl that stands [rad]."""
+UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a bowl that stands [rad]
 FALL_ANGLE = math.radians(30.0)
 """Largest tilt of a bowl that may touch anything but a hand [rad]: it tips over at 35 deg and more."""
-MAX_FALL_SPEED = 0.40
-"""Speed of a fall above which the bowl breaks [m/s]."""
-RIM_CLEARANCE = 0.004
-"""Gap between the rim and the ring [m]."""
+MAX_FALL_SPEED = 0.40  # speed of a fall above which the bowl breaks [m/s]
+RIM_CLEARANCE = 0.004  # gap between the rim and the ring [m]
 DOME_CLEARANCE = 0.012
 """Gap between the dome and the ring at the ring's upper edge [m]: a finger is 15 mm thick at its tip."""
-X_AXIS: Vec3 = np.array([1.0, 0.0, 0.0])
-"""Unit vector away from the robot."""
+X_AXIS: Vec3 = np.array([1.0, 0.0, 0.0])  # unit vector away from the robot
 HANDOVER_POINT: Vec3 = np.array([-0.10, -0.03, TABLE_TOP + 0.32])
 """Position of the middle of the bowl's foot during the handover [m]."""
 PARKED_HAND: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
@@ -74,8 +70,7 @@ RIM_OVERLAP = 0.007
 """Depth of the rim between the fingers, beyond the grip site [m]: with it the pads cover the 12 mm of the bead."""
 CARRY_PACE = Pace(0.20, 0.01)
 """Pace with the bowl in the jaw: on its way down clearly slower than a fall that breaks the bowl."""
-LOWER_SPEED = 0.04
-"""Speed at which the bowl is put down [m/s]."""
+LOWER_SPEED = 0.04  # speed at which the bowl is put down [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)

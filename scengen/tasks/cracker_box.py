@@ -12,10 +12,8 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Outline, Vec3, corners
 from ..scenario import Scenario
 
-FLAT_TOLERANCE = math.radians(3.0)
-"""Largest angle between the box' thin axis and the vertical [rad]."""
-HEIGHT_TOLERANCE = 0.003
-"""Largest difference between the heights of the box' middle and of its seat [m]."""
+FLAT_TOLERANCE = math.radians(3.0)  # largest angle between the box' thin axis and the vertical [rad]
+HEIGHT_TOLERANCE = 0.003  # largest difference between the heights of the box' middle and of its seat [m]
 
 
 class BoxAndSlot(Scenario):

@@ -43,30 +43,18 @@ from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_
 from ..skills.suction import carry_to
 from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 
-SEAT_TOLERANCE = 0.007
-"""Largest distance of the box' middle from its seat along the table [m]."""
-GRIP_DEPTH = 0.02
-"""Depth below the box' upper end at which it is held [m]: the palm allows 0.03."""
-LIFT_HEIGHT = 0.10
-"""Height by which the box is lifted before it is leant [m]."""
-STEEP_ANGLE = math.radians(45.0)
-"""Angle to the level at which the far end is brought into the slot [rad]."""
-WALL_CLEARANCE = 0.004
-"""Gap between the far wall and the box while it is leant [m]."""
-LEAN_PACE = Pace(0.25, 0.01)
-"""Pace at which the box is leant high over the slot."""
-INSERT_PACE = Pace(0.10, 0.004)
-"""Pace at which the far end is lowered into the slot."""
-MAX_SWING = 0.01
-"""Largest distance of a box that swings in the jaw from its target, before it is aimed [m]."""
-CARRY_HEIGHT = 0.07
-"""Height of the far end over the slot's floor before it is lowered [m]."""
-STAND_OFF = 0.05
-"""Distance from the box' near end at which the closed jaw comes down [m]."""
-KNOCK_TIMEOUT = 2.5
-"""Time for which one knock pushes [s]."""
-MIN_SLIDE_CLEARANCE = 0.0005
-"""Least clearance of the box as it is pushed between the slot's walls [m]."""
+SEAT_TOLERANCE = 0.007  # largest distance of the box' middle from its seat along the table [m]
+GRIP_DEPTH = 0.02  # depth below the box' upper end at which it is held [m]: the palm allows 0.03
+LIFT_HEIGHT = 0.10  # height by which the box is lifted before it is leant [m]
+STEEP_ANGLE = math.radians(45.0)  # angle to the level at which the far end is brought into the slot [rad]
+WALL_CLEARANCE = 0.004  # gap between the far wall and the box while it is leant [m]
+LEAN_PACE = Pace(0.25, 0.01)  # pace at which the box is leant high over the slot
+INSERT_PACE = Pace(0.10, 0.004)  # pace at which the far end is lowered into the slot
+MAX_SWING = 0.01  # largest distance of a box that swings in the jaw from its target, before it is aimed [m]
+CARRY_HEIGHT = 0.07  # height of the far end over the slot's floor before it is lowered [m]
+STAND_OFF = 0.05  # distance from the box' near end at which the closed jaw comes down [m]
+KNOCK_TIMEOUT = 2.5  # time for which one knock pushes [s]
+MIN_SLIDE_CLEARANCE = 0.0005  # least clearance of the box as it is pushed between the slot's walls [m]
 
 
 @dataclass(frozen=True, kw_only=True)

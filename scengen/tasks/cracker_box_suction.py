@@ -43,23 +43,18 @@ from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, p
 from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
 from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 
-SEAT_TOLERANCE = 0.006
-"""Largest distance of the box' middle from its seat along the table [m]."""
-MAX_FALL_SPEED = 0.35
-"""Speed of a corner on its way down above which the crackers break [m/s]."""
+SEAT_TOLERANCE = 0.006  # largest distance of the box' middle from its seat along the table [m]
+MAX_FALL_SPEED = 0.35  # speed of a corner on its way down above which the crackers break [m/s]
 GRIP_SHARE = 0.6
 """Share of the box' height at which the cup takes it. It is so high that links 6 and 7, which reach 47 mm below the
 middle of a level cup, pass over the slot, and so low that the box slides along: it tips where the friction exceeds
 thickness / (2 height), 0.28."""
-LIFT_PACE = Pace(0.15, 0.01)
-"""Pace at which the box is lifted once it is off the table."""
-TIP_SPEED = 0.8
-"""Speed at which the box is turned flat [rad/s]."""
+LIFT_PACE = Pace(0.15, 0.01)  # pace at which the box is lifted once it is off the table
+TIP_SPEED = 0.8  # speed at which the box is turned flat [rad/s]
 TURN_TOLERANCE = 0.1
 """Angle within which the hand is turned [rad]: under a load the wrist stays a few degrees short, and the moves that
 follow look at the box."""
-CARRY_HEIGHT = 0.02
-"""Height of the box over the slot's walls before it is lowered [m]."""
+CARRY_HEIGHT = 0.02  # height of the box over the slot's walls before it is lowered [m]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,20 +58,15 @@ from ..skills.grip import take
 from ..skills.jaw import release
 from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, hold, push, turn_to, until
 
-ROBOT_AXIS: Vec3 = BASE * [1.0, 1.0, 0.0]
-"""Point at which the robot's first axis meets the floor [m]."""
+ROBOT_AXIS: Vec3 = BASE * [1.0, 1.0, 0.0]  # point at which the robot's first axis meets the floor [m]
 RELEASE_SPEED = (0.33, 0.42)
 """Velocity outwards and upwards of a cube that a full swing releases [m/s]: the least measured at 30 to 75 deg."""
 RELEASE_DISTANCE = 0.90
 """Distance from the first axis at which a full swing releases a cube [m], measured at the same bearings."""
-RELEASE_HEIGHT = 1.15
-"""Height at which a full swing releases a cube [m], measured at the same bearings."""
-MAX_BEARING = 75.0
-"""Largest bearing at which throws were measured [deg]."""
-REST_SPEED = 0.02
-"""Speed relative to the tray below which the cube counts as at rest [m/s]."""
-RAIL = "rail"
-"""Hinge on which a tray rides around the robot."""
+RELEASE_HEIGHT = 1.15  # height at which a full swing releases a cube [m], measured at the same bearings
+MAX_BEARING = 75.0  # largest bearing at which throws were measured [deg]
+REST_SPEED = 0.02  # speed relative to the tray below which the cube counts as at rest [m/s]
+RAIL = "rail"  # hinge on which a tray rides around the robot
 
 Opens = Callable[[float, float, float], bool]
 """Whether to open the jaw, from the distance to the middle of the tray along the swing and across it [m], and the speed

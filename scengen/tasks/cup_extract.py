@@ -65,14 +65,10 @@ POUR_HEIGHT = 0.16
 """Height above the table at which the hand pours [m]. That leaves 2 cm under the cup: a block that falls 8 cm tumbles
 so chaotically that a nanometre at the start decides where it comes to rest, and a replay outside of this MuJoCo
 misses."""
-MAX_POUR_TILT = math.radians(130.0)
-"""Largest tilt of the cup to which a hand at `POUR_DISTANCE` turns it [rad]."""
-TURN_RATE = 1.2
-"""Rate at which the cup turns while the block cannot slide yet, and back [rad/s]."""
-POUR_RATE = 0.3
-"""Rate at which the cup turns while it pours [rad/s]."""
-REST_SPEED = 0.02
-"""Speed below which the block counts as at rest [m/s]."""
+MAX_POUR_TILT = math.radians(130.0)  # largest tilt of the cup to which a hand at `POUR_DISTANCE` turns it [rad]
+TURN_RATE = 1.2  # rate at which the cup turns while the block cannot slide yet, and back [rad/s]
+POUR_RATE = 0.3  # rate at which the cup turns while it pours [rad/s]
+REST_SPEED = 0.02  # speed below which the block counts as at rest [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,12 +49,9 @@ from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing, facing_do
 
 TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True)
 """Cup of the training distribution: 86 mm wide at its narrowest, and polished except for its bead."""
-UPRIGHT_TOLERANCE = math.radians(8.0)
-"""Largest tilt of a cup that counts as upright [rad]."""
-FALL_ANGLE = math.radians(25.0)
-"""Tilt above which a cup that touches the table is no longer upright [rad]."""
-INVERTED_ANGLE = math.radians(155.0)
-"""Tilt above which a cup that touches the table counts as upside down [rad]."""
+UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a cup that counts as upright [rad]
+FALL_ANGLE = math.radians(25.0)  # tilt above which a cup that touches the table is no longer upright [rad]
+INVERTED_ANGLE = math.radians(155.0)  # tilt above which a cup that touches the table counts as upside down [rad]
 MAX_FALL_SPEED = 0.5
 """Speed of a fall above which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
 checked every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
@@ -64,8 +61,7 @@ HANDOVER_POINT: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
 """Position of the middle of the base during the handover [m]; the palm is then at least 0.09 m above the table."""
 PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
 """Position of the suction hand while it is out of the way [m]; the jaw's hand waits at its mirror image."""
-CARRY_HEIGHT = 0.06
-"""Height above the square at which the cup is brought there and put upright [m]."""
+CARRY_HEIGHT = 0.06  # height above the square at which the cup is brought there and put upright [m]
 MAX_REACH = 0.77
 """Level distance from its base up to which the jaw's hand sets the cup down [m]: to its side it fails from 0.774 on,
 straight ahead from 0.79."""

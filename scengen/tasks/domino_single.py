@@ -31,8 +31,7 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import COARSE, FINE, go_to, push, wait
 
-PUSH_HEIGHT_SHARE = 0.8
-"""Height at which a piece is pushed, as a share of its own height."""
+PUSH_HEIGHT_SHARE = 0.8  # height at which a piece is pushed, as a share of its own height
 APPROACH_HEIGHT = 0.12
 """Height above the start of a push from which the hand comes down [m]; it passes over every piece."""
 CARRY_TOLERANCE = 0.01

@@ -50,19 +50,14 @@ thickest plate in the task file."""
 MIN_OVERHANG = 0.036
 """Least overhang that can be pinched [m]: palm and fingers of that hand reach 12 and 14 mm past the grip site towards
 the table, which leaves 4 mm of clearance beside the edge, and half of the pads is 11 mm wide."""
-TIPPING_MARGIN = 0.008
-"""Overhang that remains until the plate tips [m]: it coasts, and the jaw moves it as it closes."""
-GRIP_INSET = 0.014
-"""Distance of the pinch from the plate's side towards the robot [m]."""
+TIPPING_MARGIN = 0.008  # overhang that remains until the plate tips [m]: it coasts, and the jaw moves it as it closes
+GRIP_INSET = 0.014  # distance of the pinch from the plate's side towards the robot [m]
 GRIP_DEPTH = 0.018
 """Distance of the pinch from the plate's outer side [m]. The palm is 31 mm behind the grip site and must pass outside
 of the corner."""
-PUSH_SPEED = 0.06
-"""Speed of the push [m/s]."""
-END_SPEED = 0.03
-"""Speed of the last stretch of the push [m/s]."""
-PUSH_TIMEOUT = 10.0
-"""Time after which a push is given up [s]."""
+PUSH_SPEED = 0.06  # speed of the push [m/s]
+END_SPEED = 0.03  # speed of the last stretch of the push [m/s]
+PUSH_TIMEOUT = 10.0  # time after which a push is given up [s]
 
 
 @dataclass(frozen=True, kw_only=True)

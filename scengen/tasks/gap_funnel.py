@@ -49,18 +49,13 @@ from ..skills import motion
 from ..skills.jaw import carry, pick, release
 from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait
 
-MAX_RISE = 0.02
-"""Height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall."""
+MAX_RISE = 0.02  # height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall
 STANDOFF_DISTANCE = 0.03
 """Gap between hand and ball before a push, and distance that the hand goes back and up after it [m]."""
-APPROACH_HEIGHT = 0.09
-"""Height over the ball from which the hand comes down [m]."""
-SPEED_FACTOR = 1.1
-"""Speed of a push over the speed that the ball needs."""
-MAX_PUSH_SPEED = 0.27
-"""Largest speed of a push [m/s]."""
-CONTACT_SPEED = 0.04
-"""Speed at which the hand approaches the ball [m/s]."""
+APPROACH_HEIGHT = 0.09  # height over the ball from which the hand comes down [m]
+SPEED_FACTOR = 1.1  # speed of a push over the speed that the ball needs
+MAX_PUSH_SPEED = 0.27  # largest speed of a push [m/s]
+CONTACT_SPEED = 0.04  # speed at which the hand approaches the ball [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,30 +55,21 @@ from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, retreat, 
 
 COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (0.90, 0.72, 0.20, 1.0))
 """Colours of the blocks; the target is red."""
-ZONE_SIZE = 0.036
-"""Length of a side of the zone [m]."""
-MIN_DISTANCE = 0.36
-"""Least distance from the robot's first axis at which a hand that points down takes a block [m]."""
-MAX_DISTANCE = 0.72
-"""Largest such distance [m]."""
+ZONE_SIZE = 0.036  # length of a side of the zone [m]
+MIN_DISTANCE = 0.36  # least distance from the robot's first axis at which a hand that points down takes a block [m]
+MAX_DISTANCE = 0.72  # largest such distance [m]
 MAX_PUSH_DISTANCE = 0.829
 """Distance from the robot's first axis that the tips of an outwards leaning hand reach without trouble, at the height
 of a block's middle [m]. Measured; up to 25 mm farther the arm is nearly straight and jumps."""
 MAX_COAST_SPEED = 0.08
 """Speed at which the target may slide on without being pushed [m/s]: for half a millimetre. It is checked once in a
 control period: a blow that is over before that moves the target 2 mm farther at most."""
-CHAIN_DISTANCE = 0.690
-"""Distance from the robot's first axis at which the first block of the chain is put down [m]."""
-APPROACH_DISTANCE = 0.03
-"""Distance behind the chain at which the hand comes down [m]."""
-PUSH_SPEED = 0.12
-"""Speed of the push up to the target [m/s]."""
-CONTACT_SPEED = 0.05
-"""Speed of the push from just before the chain meets the target [m/s]."""
-CONTACT_DISTANCE = 0.02
-"""Distance between chain and target below which the push is slow [m]."""
-END_MARGIN = 0.004
-"""Distance inside the zone at which the push ends [m]."""
+CHAIN_DISTANCE = 0.690  # distance from the robot's first axis at which the first block of the chain is put down [m]
+APPROACH_DISTANCE = 0.03  # distance behind the chain at which the hand comes down [m]
+PUSH_SPEED = 0.12  # speed of the push up to the target [m/s]
+CONTACT_SPEED = 0.05  # speed of the push from just before the chain meets the target [m/s]
+CONTACT_DISTANCE = 0.02  # distance between chain and target below which the push is slow [m]
+END_MARGIN = 0.004  # distance inside the zone at which the push ends [m]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,38 +22,22 @@ from ..skills.motion import COARSE, OPEN, Condition, closing_along, go_to, hold,
 MIN_LIFT = 0.04
 """Height of the ball's centre above its height on the table at which it counts as lifted [m]: robosuite Lift,
 `_check_success`."""
-HAND_SPEED = 0.28
-"""Largest speed of the hand along one axis [m/s]; measured."""
-HAND_TURN_RATE = 1.2
-"""Rate at which the hand turns on its way [rad/s]; measured."""
-PARKED_HAND: Vec3 = np.array([-0.05, 0.0, TABLE_TOP + 0.10])
-"""Place where the hand waits until the ball rolls [m]."""
-SETTLING_TIME = 0.8
-"""Time that the hand needs besides its way, to come down and stand still [s]."""
-LEAD_TIME = 0.1
-"""Time by which the hand arrives before the ball [s]."""
-APPROACH_HEIGHT = 0.06
-"""Height from which the hand comes down, so that nothing strikes the ball [m]."""
-MIN_DISTANCE = 0.40
-"""Smallest distance from the robot's first axis at which the ball is taken [m]."""
-MAX_DISTANCE = 0.74
-"""Largest distance from the robot's first axis at which the ball is taken [m]."""
-EDGE_MARGIN = 0.03
-"""Distance from the table's edge within which no ball is taken [m]."""
-FORESIGHT_TIME = 6.0
-"""Time ahead in which a meeting is looked for [s]."""
-OBSERVATION_TIME = 0.05
-"""Time after the launch from which the motion of the ball is known [s]."""
-ARRIVAL_TOLERANCE = 0.02
-"""Distance from its place, or from the ball, within which the hand comes down [m]."""
-CATCH_TOLERANCE = 0.008
-"""Level distance from a ball that it follows, within which the hand closes [m]."""
-DIRECT_DISTANCE = 0.08
-"""Distance up to which the hand goes straight to a place, not from above [m]."""
-DIRECT_TIME = 0.10
-"""Time that the hand needs besides such a straight way [s]."""
-MIN_CLEARANCE = 0.006
-"""Gap between finger tips and table, and between palm and ball [m]."""
+HAND_SPEED = 0.28  # largest speed of the hand along one axis [m/s]; measured
+HAND_TURN_RATE = 1.2  # rate at which the hand turns on its way [rad/s]; measured
+PARKED_HAND: Vec3 = np.array([-0.05, 0.0, TABLE_TOP + 0.10])  # place where the hand waits until the ball rolls [m]
+SETTLING_TIME = 0.8  # time that the hand needs besides its way, to come down and stand still [s]
+LEAD_TIME = 0.1  # time by which the hand arrives before the ball [s]
+APPROACH_HEIGHT = 0.06  # height from which the hand comes down, so that nothing strikes the ball [m]
+MIN_DISTANCE = 0.40  # smallest distance from the robot's first axis at which the ball is taken [m]
+MAX_DISTANCE = 0.74  # largest distance from the robot's first axis at which the ball is taken [m]
+EDGE_MARGIN = 0.03  # distance from the table's edge within which no ball is taken [m]
+FORESIGHT_TIME = 6.0  # time ahead in which a meeting is looked for [s]
+OBSERVATION_TIME = 0.05  # time after the launch from which the motion of the ball is known [s]
+ARRIVAL_TOLERANCE = 0.02  # distance from its place, or from the ball, within which the hand comes down [m]
+CATCH_TOLERANCE = 0.008  # level distance from a ball that it follows, within which the hand closes [m]
+DIRECT_DISTANCE = 0.08  # distance up to which the hand goes straight to a place, not from above [m]
+DIRECT_TIME = 0.10  # time that the hand needs besides such a straight way [s]
+MIN_CLEARANCE = 0.006  # gap between finger tips and table, and between palm and ball [m]
 
 
 class LaunchedBall(Scenario):

@@ -41,12 +41,9 @@ ORDERS = tuple(permutations(range(CUBE_COUNT)))
 """Ranks of the cubes on the left, in the middle and on the right: 0 is the lightest. The first order is sorted."""
 MIN_MASS_DIFFERENCE = 0.025
 """Least difference in mass of two neighbours in rank [kg]: 0.25 N, ten times the error of a weighing under noise."""
-MIN_CLEARANCE = 0.010
-"""Least clearance of the fingers from other cubes and zones [m]."""
-APPROACH_HEIGHT = 0.03
-"""Height above a cube from which the hand comes down, and to which it moves up [m]."""
-CARRY_HEIGHT = 0.015
-"""Height above other cubes at which a cube is carried [m]."""
+MIN_CLEARANCE = 0.010  # least clearance of the fingers from other cubes and zones [m]
+APPROACH_HEIGHT = 0.03  # height above a cube from which the hand comes down, and to which it moves up [m]
+CARRY_HEIGHT = 0.015  # height above other cubes at which a cube is carried [m]
 
 
 @dataclass(frozen=True, kw_only=True)

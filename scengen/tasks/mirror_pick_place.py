@@ -53,13 +53,11 @@ LIFT_HEIGHT = 0.04
 MIN_PICTURE_OFFSET = 0.12
 """Least distance between the cube and where the picture shows it [m]: the open jaw reaches 66 mm to either side of the
 hand and half a diagonal of the cube is 42 mm, so that a hand that goes there does not even touch the cube."""
-APPROACH_HEIGHT = 0.10
-"""Height above the grasp from which the hand comes down [m]."""
+APPROACH_HEIGHT = 0.10  # height above the grasp from which the hand comes down [m]
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
 """Orientations by `view`: upright, turned by 180 deg, left and right exchanged, above and below exchanged, a quarter
 turn."""
-TRAINING_VIEW = VIEWS[1]
-"""Orientation that a policy learns here: the paper's."""
+TRAINING_VIEW = VIEWS[1]  # orientation that a policy learns here: the paper's
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -56,15 +56,12 @@ OTHER_COLOURS: tuple[tuple[Rgba, Rgba], ...] = (
 """Colours of the other cubes, by `likeness`: blue and yellow, orange and magenta."""
 PUSH_HEIGHT = TIP_BELOW + 0.010
 """Height of the grip site above the table during a push [m]: the tips are below the lid, the palm is 50 mm up."""
-PUSH_SPEED = 0.10
-"""Speed at which a lid is pushed [m/s]."""
-APPROACH_DISTANCE = 0.02
-"""Distance behind a lid at which the hand comes down [m]."""
+PUSH_SPEED = 0.10  # speed at which a lid is pushed [m/s]
+APPROACH_DISTANCE = 0.02  # distance behind a lid at which the hand comes down [m]
 PUSH_DISTANCE = 0.032
 """Distance past the cube's middle to which the hand pushes [m]: there the lid's edge is 3 cm past the cube, and the
 fingers come down beside the cube without touching the lid."""
-MIN_CLEARANCE = 0.008
-"""Least clearance between a pushed body and the bodies beside its way [m]."""
+MIN_CLEARANCE = 0.008  # least clearance between a pushed body and the bodies beside its way [m]
 CARRY_HEIGHT = 0.08
 """Height above the table to which the hand moves between two pushes, and to which a cube is lifted [m]: above piles."""
 

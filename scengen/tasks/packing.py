@@ -62,13 +62,11 @@ FLOOR_TOLERANCE = 0.0015
 """Largest height of the foot of a piece above the bin's floor at which the piece lies on it [m]."""
 MIN_CLEARANCE = 0.008
 """Least distance of two bodies on the table at the start [m]: a cup may be a little off, a piece a little turned."""
-CARRY_HEIGHT = 0.05
-"""Height above the table at which pieces are carried [m], twice the height of bin and pieces."""
+CARRY_HEIGHT = 0.05  # height above the table at which pieces are carried [m], twice the height of bin and pieces
 AIM_PACE = Pace(0.25, 0.0015)
 """Pace of the move above a slot; it ends within half the radius of the pieces' lower edges, which guide them from
 there."""
-LOWER_PACE = Pace(0.04, 0.0, give_up=2.0)
-"""Pace at which a piece is lowered, which takes one second."""
+LOWER_PACE = Pace(0.04, 0.0, give_up=2.0)  # pace at which a piece is lowered, which takes one second
 USUAL_LENGTHS = {"left": 2, "right": 2, "low": 2, "rise": 1}
 """Lengths that a plan assumes which does not look at the pieces [units]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))

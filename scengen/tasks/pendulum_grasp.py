@@ -46,21 +46,18 @@ from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing, go_to, hol
 
 BOB = "pendulum/bob"
 HINGE = "pendulum/hinge"
-APEX_SHARE = 0.98
-"""Share of the amplitude beyond which a place belongs to the turning point."""
+APEX_SHARE = 0.98  # share of the amplitude beyond which a place belongs to the turning point
 GRASP_TOLERANCE = 0.012
 """Largest distance of the bob's centre from the grip site at which it is between the pads [m], three quarters of a pad:
 below the finger tips of a jaw that it does not fit into it is 17 mm away."""
-MAX_HELD_SPEED = 0.05
-"""Largest speed of a bob that is held [m/s]."""
+MAX_HELD_SPEED = 0.05  # largest speed of a bob that is held [m/s]
 MISS_SHARE = 0.9
 """Gap of a jaw that has closed on nothing, as a share of the bob's diameter. At 60 % a jaw that opened and closed
 without looking caught every fifth bob."""
 HAND_TILT = 65.0
 """Angle of the hand below the horizontal [deg]. At 30 it would look along the bob's path, but below 60 it drifts away
 by a centimetre, as joint 6 comes near its end; above 70 the palm meets the rod."""
-NEAR_SIDE = -1
-"""Side of the turning point that is nearer to the robot."""
+NEAR_SIDE = -1  # side of the turning point that is nearer to the robot
 
 
 @dataclass(frozen=True, kw_only=True)

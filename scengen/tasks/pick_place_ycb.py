@@ -43,17 +43,14 @@ from ..skills.grip import take
 from ..skills.jaw import carry, put, release
 from ..skills.motion import Condition, Pace, retreat
 
-MIN_LIFT = 0.03
-"""Height of the object's centre of mass above its stand from which the object counts as lifted [m]."""
+MIN_LIFT = 0.03  # height of the object's centre of mass above its stand from which the object counts as lifted [m]
 CARRY_HEIGHT = 0.07
 """Height at which the oracle carries the object [m]; an object lost there falls on the face on which it stood."""
-CARRY_PACE = Pace(0.2, 0.01)
-"""Pace at which the oracle carries."""
+CARRY_PACE = Pace(0.2, 0.01)  # pace at which the oracle carries
 FIELD = np.array([[-0.22, 0.05], [-0.32, 0.32]])
 """Range of the middle of the square, in x and y [m]: 0.34 to 0.69 from the robot's first axis, where a hand that points
 down comes without leaning or folding up."""
-JUMP_MARGIN = 0.03
-"""Distance, in excess of `near`, of the object from the square after any jump [m]."""
+JUMP_MARGIN = 0.03  # distance, in excess of `near`, of the object from the square after any jump [m]
 
 
 @dataclass(frozen=True, kw_only=True)

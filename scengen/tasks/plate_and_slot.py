@@ -34,28 +34,19 @@ from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, alone, facing_do
 
 ANGLE_TOLERANCE = math.radians(10.0)
 """Largest angle between the plate's axis and the level, and between it and the slot's normal [rad]."""
-FLOOR_TOLERANCE = 0.005
-"""Largest height of the rim's lowest point above the slot's floor [m]."""
+FLOOR_TOLERANCE = 0.005  # largest height of the rim's lowest point above the slot's floor [m]
 ALONG_TOLERANCE = 0.03
 """Largest distance of the plate along the slot from its middle [m]: at an end a cup could pass outside the dividers."""
-MAX_FALL_SPEED = 0.35
-"""Speed of a fall above which the plate breaks [m/s]."""
+MAX_FALL_SPEED = 0.35  # speed of a fall above which the plate breaks [m/s]
 EDGE_MARGIN = 0.06
 """Distance that the rim of a lying plate must keep from the table's edge [m]: nearer, a palm has space for a grip."""
-FOOT_CLEARANCE = 0.002
-"""Gap between the plate's foot and the divider while the plate is lowered [m]."""
-CARRY_HEIGHT = 0.02
-"""Height of the plate's rim over the dividers before the plate is lowered [m]."""
-LOWER_SPEED = 0.05
-"""Speed at which the plate is lowered [m/s]."""
-LOWER_TIMEOUT = 12.0
-"""Time after which lowering the plate gives up [s]."""
-LIFT_HEIGHT = 0.25
-"""Height by which the plate is lifted before it is turned on edge [m]."""
-LIFT_PACE = Pace(0.10, 0.01)
-"""Pace of the lift: the plate turns in the pinch."""
-PROBE_PACE = Pace(0.06, 0.003, 1.5)
-"""Pace at which one hand alone tries to take the rim."""
+FOOT_CLEARANCE = 0.002  # gap between the plate's foot and the divider while the plate is lowered [m]
+CARRY_HEIGHT = 0.02  # height of the plate's rim over the dividers before the plate is lowered [m]
+LOWER_SPEED = 0.05  # speed at which the plate is lowered [m/s]
+LOWER_TIMEOUT = 12.0  # time after which lowering the plate gives up [s]
+LIFT_HEIGHT = 0.25  # height by which the plate is lifted before it is turned on edge [m]
+LIFT_PACE = Pace(0.10, 0.01)  # pace of the lift: the plate turns in the pinch
+PROBE_PACE = Pace(0.06, 0.003, 1.5)  # pace at which one hand alone tries to take the rim
 PARKED_HAND: Vec3 = np.array([-0.15, 0.35, TABLE_TOP + 0.35])
 """Position of the left hand while it is out of the way [m]; the right hand waits at its mirror image."""
 

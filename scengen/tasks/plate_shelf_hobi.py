@@ -56,12 +56,10 @@ from .plate_and_slot import (
     PlateAndSlot,
 )
 
-PRESS_OFFSET = 0.008
-"""Distance from the rim's edge at which the rim is pressed [m]."""
+PRESS_OFFSET = 0.008  # distance from the rim's edge at which the rim is pressed [m]
 SHIFT_MARGIN = 0.015
 """Distance that a pressed plate may move to either side [m]: it moves by 4 mm, as it turns about its foot."""
-PALM_CLEARANCE = 0.005
-"""Gap between palm and table [m]."""
+PALM_CLEARANCE = 0.005  # gap between palm and table [m]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,38 +43,24 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import COARSE, Pace, closing_along, go_to, push, wait
 
-MAX_BALLS = 6
-"""Largest number of balls."""
+MAX_BALLS = 6  # largest number of balls
 RED = (0.82, 0.20, 0.15, 1.0)
 BLUE = (0.15, 0.30, 0.80, 1.0)
-BOX_FLOOR = 0.004
-"""Thickness of the box's floor [m]."""
-BOX_DEPTH = 0.006
-"""Height of the box's walls over its floor [m]: lower than the finger tips."""
+BOX_FLOOR = 0.004  # thickness of the box's floor [m]
+BOX_DEPTH = 0.006  # height of the box's walls over its floor [m]: lower than the finger tips
 ROW_PITCH = 0.042
 """Distance of neighbours in the row [m]: beside a ball of 18 mm radius, a finger has 13 mm to the next ball."""
-BIN_LENGTH = 0.11
-"""Length of the bins along the ramp, inside [m]."""
-BIN_FLOOR = 0.004
-"""Thickness of the bins' floor [m]."""
-BIN_WALL = 0.006
-"""Thickness of the bins' walls [m]."""
-BIN_DEPTH = 0.040
-"""Depth of the bins [m]."""
-BIN_RIM = BIN_DEPTH + BIN_FLOOR
-"""Height of the bins' rim over the table [m]."""
-BIN_GAP = 0.014
-"""Gap between the low end of the ramp and the inside of the bins [m]."""
-BARRIER_START = 0.04
-"""Distance from the middle of the ramp to the start of the barrier [m]: the palm stays before it."""
-TOP_DISTANCE = 0.028
-"""Distance from the high end of the ramp at which balls are released [m]."""
-CARRY_HEIGHT = 0.19
-"""Height over the table at which balls are carried [m]."""
-RELEASE_HEIGHT = 0.012
-"""Height over the ramp from which balls are lowered [m]."""
-LOWER_PACE = Pace(0.25, 0.004)
-"""Pace down to a ball or to the ramp."""
+BIN_LENGTH = 0.11  # length of the bins along the ramp, inside [m]
+BIN_FLOOR = 0.004  # thickness of the bins' floor [m]
+BIN_WALL = 0.006  # thickness of the bins' walls [m]
+BIN_DEPTH = 0.040  # depth of the bins [m]
+BIN_RIM = BIN_DEPTH + BIN_FLOOR  # height of the bins' rim over the table [m]
+BIN_GAP = 0.014  # gap between the low end of the ramp and the inside of the bins [m]
+BARRIER_START = 0.04  # distance from the middle of the ramp to the start of the barrier [m]: the palm stays before it
+TOP_DISTANCE = 0.028  # distance from the high end of the ramp at which balls are released [m]
+CARRY_HEIGHT = 0.19  # height over the table at which balls are carried [m]
+RELEASE_HEIGHT = 0.012  # height over the ramp from which balls are lowered [m]
+LOWER_PACE = Pace(0.25, 0.004)  # pace down to a ball or to the ramp
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -56,27 +56,18 @@ from ..skills.jaw import grasp, release
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, STEADY, Condition, facing, go_to, push, retreat, steer, turn_to
 
 HINGE = "board/hinge"
-ALIGN_ANGLE = math.radians(6.0)
-"""Largest angle between peg and slot for the peg to be in line [rad]."""
-SIDE_TOLERANCE = 0.010
-"""Largest distance of the nose from the slot's axis for the peg to be in line [m]."""
-INSERTED_SHARE = 0.95
-"""Share of the peg's length beyond the mouth to which the oracle pushes (paper)."""
-MIN_INSERTED_SHARE = 0.93
-"""Least such share that counts."""
-MAX_INSERTED_SHARE = 1.03
-"""Largest such share that counts: a flush peg."""
+ALIGN_ANGLE = math.radians(6.0)  # largest angle between peg and slot for the peg to be in line [rad]
+SIDE_TOLERANCE = 0.010  # largest distance of the nose from the slot's axis for the peg to be in line [m]
+INSERTED_SHARE = 0.95  # share of the peg's length beyond the mouth to which the oracle pushes (paper)
+MIN_INSERTED_SHARE = 0.93  # least such share that counts
+MAX_INSERTED_SHARE = 1.03  # largest such share that counts: a flush peg
 GRIP_HEIGHT = 0.024
 """Height above the foot at which the peg is grasped [m]: the level hand's palm is 32 mm below, the table 54 mm."""
-BOARD_CLEARANCE = 0.006
-"""Clearance of the fingers from the board when they release the peg [m]."""
-WAITING_DISTANCE = 0.02
-"""Distance before the mouth at which the nose is aligned again after the turn [m]."""
-ENTER_SPEED = 0.08
-"""Speed at which the held peg enters the slot [m/s]."""
+BOARD_CLEARANCE = 0.006  # clearance of the fingers from the board when they release the peg [m]
+WAITING_DISTANCE = 0.02  # distance before the mouth at which the nose is aligned again after the turn [m]
+ENTER_SPEED = 0.08  # speed at which the held peg enters the slot [m/s]
 
-Line = tuple[Mat3, Vec3]
-"""Axes of a slot, x leading in, and the middle of its mouth."""
+Line = tuple[Mat3, Vec3]  # axes of a slot, x leading in, and the middle of its mouth
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,10 +59,8 @@ TARGET_TOLERANCE = 0.006
 against its stop, and the target hops by up to 3 mm; a hand that strikes the deck three times moves it by up to 7."""
 MIN_STOP_ERROR = 0.006
 """Least distance from balance of a counterweight that puts the deck on its stop [m]: 1.5 times the least margin."""
-MIN_LEVER = 0.055
-"""Least distance of the middle of a block from the axle, at which the palm passes the posts [m]."""
-DECK_MARGIN = 0.004
-"""Least length of deck beyond a block [m]."""
+MIN_LEVER = 0.055  # least distance of the middle of a block from the axle, at which the palm passes the posts [m]
+DECK_MARGIN = 0.004  # least length of deck beyond a block [m]
 EXPECTED_MASSES = {"seesaw.mass": 0.25, "target.mass": 0.30, "weight.mass": 0.30}
 """Masses that a guess assumes [kg]: a common beam, and blocks that look alike weighing alike."""
 CARRY_HEIGHT = 0.25

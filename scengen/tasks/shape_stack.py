@@ -45,16 +45,12 @@ high and 44 mm wide tips over its edge at 40 deg."""
 SLOPE_MARGIN = math.radians(10.0)
 """Least angle by which the cone's slope is steeper than friction holds [rad]: friction higher by 10 %, as in jittered
 runs, holds 3 deg more, and MuJoCo's friction cone gives 1 deg."""
-MIN_GRIP_HEIGHT = TIP_BELOW + 0.003
-"""Least height of the grip site above the foot of a shape [m]."""
-MIN_PAD_OVERLAP = 0.005
-"""Least height of the cone's collar between the pads [m]."""
-MIN_CLEARANCE = 0.010
-"""Total clearance that the jaw needs [m]: moves are exact to 3 mm."""
+MIN_GRIP_HEIGHT = TIP_BELOW + 0.003  # least height of the grip site above the foot of a shape [m]
+MIN_PAD_OVERLAP = 0.005  # least height of the cone's collar between the pads [m]
+MIN_CLEARANCE = 0.010  # total clearance that the jaw needs [m]: moves are exact to 3 mm
 CARRY_HEIGHT = 0.03
 """Height above the pile at which a shape is carried, and above a released shape to which the hand rises [m]."""
-CARRY_PACE = Pace(0.30, 0.008)
-"""Pace of the move above the pile to the next shape."""
+CARRY_PACE = Pace(0.30, 0.008)  # pace of the move above the pile to the next shape
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,8 +51,7 @@ GRIP_HEIGHT = 0.042
 """Height of the grip site above the floor of a storey [m]: the palm of a level hand reaches 32 mm below it."""
 MIN_CLEARANCE = 0.007
 """Least clearance between hand and rack on every side [m]: jitter takes 2 mm, moves are exact to 4 mm."""
-ENTER_PACE = Pace(0.15, 0.004)
-"""Pace of the moves into the rack and out of it."""
+ENTER_PACE = Pace(0.15, 0.004)  # pace of the moves into the rack and out of it
 LIFT_HEIGHT = 0.008
 """Height by which the cube is lifted before it is drawn out [m]; the clearance above the palm is larger."""
 RELEASE_HEIGHT = 0.09

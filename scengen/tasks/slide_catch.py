@@ -48,18 +48,15 @@ from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
 
-BLOCK_COUNT = 3
-"""Blocks on the ramp, and lanes."""
+BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
 """Lanes, counted from the left, of the lowest, the middle and the highest block."""
 FRICTION_TOLERANCE = 0.10
 """Share by which the friction of a block may differ from its known value: the jitter of certificates."""
 FALL_TIME = 0.16
 """Time from when a block's middle is over the lip until it is in the bin [s]; it tips first. Measured: 0.13 to 0.17."""
-VISIBLE_SLIDE = 0.002
-"""Distance after which a block is seen to slide [m]."""
-DRAW_PACE = Pace(0.30, 0.004)
-"""Pace of the bin."""
+VISIBLE_SLIDE = 0.002  # distance after which a block is seen to slide [m]
+DRAW_PACE = Pace(0.30, 0.004)  # pace of the bin
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,23 +55,19 @@ from ..skills.motion import Pace, go_to, retreat
 MIN_LIFT = 0.05
 """Height above its stand to which an object must be lifted to count as carried [m]: more than `PALM_ABOVE` +
 `TIP_BELOW`."""
-MIN_CARRY_HEIGHT = 0.042
-"""Height to which a carried object may sink [m]: also more than `PALM_ABOVE` + `TIP_BELOW`."""
+MIN_CARRY_HEIGHT = 0.042  # height to which a carried object may sink [m]: also more than `PALM_ABOVE` + `TIP_BELOW`
 MAX_SLIDE = 0.04
 """Total distance that the robot may push the object over the table [m]; a grasp and a landing move it by less."""
 CARRY_HEIGHT = 0.07
 """Height at which the oracle carries the object [m]; from 12 cm objects fall on the face on which they stood."""
-CARRY_PACE = Pace(0.2, 0.01)
-"""Pace at which the oracle carries."""
-REST_SPEED = 0.02
-"""Speed below which the object counts as at rest [m/s]."""
+CARRY_PACE = Pace(0.2, 0.01)  # pace at which the oracle carries
+REST_SPEED = 0.02  # speed below which the object counts as at rest [m/s]
 FALL_TIME = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP_BELOW) / GRAVITY)
 """Time from the start of a slip until the object is below the finger tips [s]: 20 ms until its release, then free
 fall."""
 FLIGHT_DISTANCE = 0.018
 """Distance along the way that an object flies when it is lost at the oracle's pace [m]: 16 to 22 mm measured."""
-MAX_FLIGHT_DISTANCE = 0.03
-"""Distance that is allowed for this flight [m]."""
+MAX_FLIGHT_DISTANCE = 0.03  # distance that is allowed for this flight [m]
 MIN_CARRY_DISTANCE = 0.015
 """Least distance that the object is carried before a slip, and that remains after the last one [m]."""
 MEMORY = ("slips", "jam_ends", "stood", "high", "high_x", "high_y", "recovered", "pushed", "slid", "x", "y")

@@ -53,19 +53,15 @@ from ..skills.jaw import carry, pick, put, release
 from ..skills.motion import FINE, OPEN, Pace, facing_down, go_to, hand_yaw, retreat, wait
 
 NAMES = ("bottom", "middle", "top")
-REST_SPEED = 0.01
-"""Speed below which a cube counts as at rest [m/s]."""
+REST_SPEED = 0.01  # speed below which a cube counts as at rest [m/s]
 CARRY_HEIGHT = 0.03
 """Height above the tower at which a cube is carried, and above a released cube to which the hand rises [m]."""
-CARRY_PACE = Pace(0.30, 0.008)
-"""Pace of moves above the cubes."""
-MIN_EDGE_DIFFERENCE = 0.004
-"""Least difference between the edges of two cubes [m]."""
+CARRY_PACE = Pace(0.30, 0.008)  # pace of moves above the cubes
+MIN_EDGE_DIFFERENCE = 0.004  # least difference between the edges of two cubes [m]
 MIN_DISTANCE = 0.30
 """Least distance from the robot's first axis at which a hand that points down takes a cube from the table [m]:
 measured."""
-MAX_DISTANCE = 0.75
-"""Largest such distance [m]: measured."""
+MAX_DISTANCE = 0.75  # largest such distance [m]: measured
 MEMORY = ("blows", "stood", "fell")
 """Number of blows so far; time for which the tower has stood untouched [s]; whether its top cube has lain on the table
 since the last blow."""

@@ -48,10 +48,8 @@ MIN_LIFT = 0.04
 `_check_success`."""
 L_HOOK = 0
 """Number of the L hook among the kinds: the paper's T23 has an L, its App. C says "J-shape and T-shape"."""
-J_HOOK = 1
-"""Number of the J hook."""
-T_HOOK = 2
-"""Number of the T hook."""
+J_HOOK = 1  # number of the J hook
+T_HOOK = 2  # number of the T hook
 MAX_DISTANCE = 0.72
 """Largest distance from the robot's first axis of a grasp from above at table height that plans use [m]; inverse
 kinematics allows 0.76."""
