@@ -353,7 +353,7 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
     known = REGISTERED_ENVS.get(name, RobosuiteEnv)
     if not issubclass(known, RobosuiteEnv):
         raise BadConfig(f"task {task}: robosuite has its own environment {name}; rename the task")
-    if (known.NAME, known.SEARCH) == (task, search):
+    if (task, search) == (known.NAME, known.SEARCH):
         return known
     about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
     return type(name, (RobosuiteEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})

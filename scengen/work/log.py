@@ -78,7 +78,7 @@ class Log:
             names = ", ".join(different(whole[0], self.identity))
             raise BadConfig(f"{self.path.parent} holds results of other pools or settings ({names}); {self.remedy}")
         self.records = whole[1:]
-        self._file = open(self.path, "ab", buffering=0)
+        self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
         self._file.truncate(size)
         if not whole:
             self._write(self.identity)

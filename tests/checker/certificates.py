@@ -50,7 +50,7 @@ def _first_number(name: str, *below: str, **numbers: Any) -> Change:
 
     def change(draft: Draft) -> None:
         found = draft.check(name)["numbers"]
-        found = found[sorted(found)[0]]
+        found = found[min(found)]
         for key in below:
             found = found[key]
         found.update(numbers)
@@ -60,7 +60,7 @@ def _first_number(name: str, *below: str, **numbers: Any) -> Change:
 
 def _drop_try(draft: Draft) -> None:
     numbers = draft.check("shortcuts")["numbers"]
-    del numbers[sorted(numbers)[0]]["raw"]
+    del numbers[min(numbers)]["raw"]
 
 
 def _swapped(draft: Draft) -> None:

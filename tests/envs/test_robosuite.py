@@ -96,7 +96,7 @@ def names(model, kind, count):
 def test_robosuite_knows_every_task():
     for task in list_tasks():
         name = "".join(part.capitalize() for part in task.split("_"))
-        assert robosuite.environments.base.REGISTERED_ENVS[name].NAME == task
+        assert task == robosuite.environments.base.REGISTERED_ENVS[name].NAME
 
 
 def test_robosuite_does_not_tell_where_files_lie_on_this_machine(row, caplog):

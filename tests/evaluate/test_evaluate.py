@@ -75,8 +75,15 @@ def test_a_run_cut_short_goes_on_where_it_was(tmp_path):
 def test_the_table_pairs_each_split_with_training(tmp_path):
     def episode(task, split, scenario, success):
         return {
-            **{"task": task, "category": "P3", "split": split, "pool": split, "scenario": scenario},
-            **{"rollout": 0, "success": success, "seed": 0, "index": int(scenario)},
+            "task": task,
+            "category": "P3",
+            "split": split,
+            "pool": split,
+            "scenario": scenario,
+            "rollout": 0,
+            "success": success,
+            "seed": 0,
+            "index": int(scenario),
         }
 
     lines = table(

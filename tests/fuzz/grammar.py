@@ -196,7 +196,7 @@ class Grammar:
         if verb in WITH_TASK and not (verb == "attack" and self.random.random() < 0.5):
             found.append(("task", "domino_single"))
         if "pool" in names:
-            made = verb in ("generate",)
+            made = verb == "generate"
             found.append(("pool", str(self.place / "new" / "pool") if made else str(self.pool)))
         if "to" in names:
             suffix = {"film": ".png", "report": ".html", "asset": ".stl"}.get(verb, "")

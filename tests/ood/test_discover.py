@@ -75,7 +75,7 @@ def test_regions_lie_between_training_values_and_beyond_them():
 
 
 def test_a_hypercube_uses_every_region_alike_and_spreads_its_places():
-    reaches = {k: (0.0, 1.0) for k in range(len(KNOWN))}
+    reaches = dict.fromkeys(range(len(KNOWN)), (0.0, 1.0))
     points = candidates.hypercube(30 * len(KNOWN), reaches, np.random.default_rng(0))
     uses = [sum(i == k for point in points for i, _ in point) for k in range(len(KNOWN))]
     assert max(uses) - min(uses) <= 2 and {len(point.places) for point in points} == {1, 2}
@@ -84,7 +84,7 @@ def test_a_hypercube_uses_every_region_alike_and_spreads_its_places():
 
 
 def test_a_point_far_out_is_in_the_outer_quarter_of_what_is_feasible_or_in_the_middle_between_training_values():
-    reaches = {k: (0.0, 0.5) for k in range(len(KNOWN))}
+    reaches = dict.fromkeys(range(len(KNOWN)), (0.0, 0.5))
     points = dict(point.places[0] for point in candidates.far_points(KNOWN, reaches, np.random.default_rng(0)))
     assert points.keys() == reaches.keys()
     for k, place in points.items():
@@ -98,7 +98,7 @@ def planted(monkeypatch):
 
     def outcome(self, trained, memory, point):
         place = {self.known[i].name: p for i, p in point}
-        if 0.8 < place.get("starter_height_low", 0.0):
+        if place.get("starter_height_low", 0.0) > 0.8:
             return INFEASIBLE
         pair = place.get("starter_mass_high", 0) > 0.2 and place.get("starter_thickness_high", 0) > 0.2
         return BREAKS if place.get("starter_height_low", 0.0) > 0.4 or pair else HOLDS

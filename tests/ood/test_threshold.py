@@ -92,7 +92,7 @@ def test_the_exact_bound_is_clopper_and_pearsons():
 
 
 def test_the_guess_points_at_the_first_fall_and_at_a_hole():
-    flat = {point: "11" for point in range(0, 101, 8)}
+    flat = dict.fromkeys(range(0, 101, 8), "11")
     fall = guess(*looks(*((p, "11" if p < 50 else "00") for p in flat)), LAST)
     assert fall.sum() == pytest.approx(1) and fall[49:57].sum() > 0.8
     hole = guess(*looks(*(flat | {40: "0000"}).items()), LAST)

@@ -181,4 +181,4 @@ def test_a_scene_in_the_order_in_which_the_cubes_lie_would_be_solved_blindly():
 
 
 def test_masses_that_are_refuted_as_too_near_differ_by_less_than_ten_errors_of_a_weighing():
-    assert 9.81 * MIN_MASS_DIFFERENCE > 0.02 * 9.81 * SCENE.light * 10
+    assert 0.02 * 9.81 * SCENE.light * 10 < 9.81 * MIN_MASS_DIFFERENCE

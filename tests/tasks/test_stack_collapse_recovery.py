@@ -126,7 +126,7 @@ def test_a_collapse_goes_on_bit_by_bit_from_a_state_in_its_midst():
     world, again = load(TASK, NOMINAL), load(TASK, NOMINAL)
     watched(NOMINAL, lambda w: None, NOMINAL.blow_0.when + 0.12, world)
     again.restore(world.state())
-    assert 0.0 < world.memory["blows"] and np.abs(world.velocity("top")).max() > 0.3
+    assert world.memory["blows"] > 0.0 and np.abs(world.velocity("top")).max() > 0.3
     watched(NOMINAL, lambda w: None, world=world)
     watched(NOMINAL, lambda w: None, world=again)
     assert world.digest == again.digest

@@ -114,7 +114,7 @@ def first_of(name, **changed):
 
     def forge(row):
         found = of(row, name).numbers
-        first = sorted(found)[0]
+        first = min(found)
         return check(name, numbers={**found, first: {**found[first], **changed}})(row)
 
     return forge
@@ -123,7 +123,7 @@ def first_of(name, **changed):
 def fewer(name):
     def forge(row):
         found = dict(of(row, name).numbers)
-        del found[sorted(found)[0]]
+        del found[min(found)]
         return check(name, numbers=found)(row)
 
     return forge
