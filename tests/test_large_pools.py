@@ -157,9 +157,10 @@ def test_an_environment_reads_scenes_when_they_are_played(large, touched):
     env = PoolEnv("domino_single", large)
     assert touched.rows("scene_xml") == 20  # those of the first
     ids = env.scenarios
-    assert env.reset(seed=N + 500)[1]["scenario"] == ids[500]
-    assert env.reset()[1]["scenario"] == ids[501]
-    assert env.reset(options={"scenario": ids[3]})[1]["scenario"] == ids[3]
+    asked = ({"seed": N + 500}, {}, {"options": {"scenario": ids[3]}})
+    for arguments, expected in zip(asked, (ids[500], ids[501], ids[3]), strict=True):
+        env.reset(**arguments)
+        assert env.row.id == expected
     assert not touched.rows("witness") and touched.rows("scene_xml") <= 4 * 40
 
 

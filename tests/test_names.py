@@ -84,7 +84,8 @@ def test_commands_and_environments_take_names(capsys):
         assert shown.out.startswith(str(row.name)) and shown.err.count("\n") == text.startswith("wrong")
     env = PoolEnv(row.task, REFERENCE)
     for text in (row.id, str(row.name), row.id[:3]):
-        assert env.reset(options={"scenario": text})[1]["scenario"] == row.id
+        env.reset(options={"scenario": text})
+        assert env.row.id == row.id
     with pytest.raises(NoScenario, match="no scenario in these pools named 'nothing'"):
         env.reset(options={"scenario": "nothing"})
 

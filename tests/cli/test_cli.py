@@ -254,7 +254,9 @@ def test_a_contact_sheet_shows_the_training_twin_and_what_has_moved(tmp_path):
     pool, page = BASE / "single_severity", tmp_path / "sheet.html"
     assert cli.run(("show", f"pool={pool}", f"to={page}", "films=0")) == 0
     text = page.read_text()
-    assert "gap ratio 1.476 tile widths (training 0.6 to 1.2)" in text and "later, lower and with less to spare" in text
+    assert (
+        "gap ratio 1.476 tile widths (training 0.6 to 1.2)" in text and "later, lower and with a smaller margin" in text
+    )
     assert (text.count("data:image/webp") == 2) != ("No pictures: no OpenGL" in text)
     assert 'title="passed">witness' in text
 
