@@ -108,6 +108,54 @@ def test_progress_tells_nodes_rate_and_end(monkeypatch):
     assert lines[1] == "packing/id: 100 of 100 2 nodes, 8 workers, 2.2/s"
 
 
+def test_a_cluster_that_does_not_start_in_time_is_one_line(monkeypatch, capsys):
+    ray = pytest.importorskip("ray")
+
+    def late(*_, **__):
+        raise Exception("The current node timed out during startup.\nThis could happen")
+
+    monkeypatch.setattr(ray, "is_initialized", lambda: False)
+    monkeypatch.setattr(ray, "init", late)
+    assert cli.run(["verify", "pool=nowhere", "executor=ray"]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "timed out during startup. This could happen; repeat the command" in told
+
+
+@on_nodes
+def test_a_cluster_of_this_machine_listens_on_loopback_and_keeps_its_token_to_itself(tmp_path):
+    """The listening sockets of the command's processes, from the tables of the kernel."""
+    program = """
+import os, sys
+from pathlib import Path
+import logging
+from scengen.work.cluster import Cluster
+logging.basicConfig()
+Cluster("local").connect()
+sockets = set()
+for folder in Path("/proc").glob("[0-9]*"):
+    try:
+        if b"" == (environ := (folder / "environ").read_bytes()) or os.environ["MARK"].encode() not in environ:
+            continue
+        sockets |= {os.readlink(file) for file in (folder / "fd").iterdir()}
+    except OSError:
+        continue
+for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+    for line in Path(table).read_text().splitlines()[1:]:
+        local, state, inode = (line.split()[i] for i in (1, 3, 9))
+        if state == "0A" and f"socket:[{inode}]" in sockets:
+            print(local.partition(":")[0])
+"""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
+    environment |= {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache"), "MARK": secrets.token_hex(8)}
+    line = [sys.executable, "-c", program]
+    done = subprocess.run(line, capture_output=True, text=True, env=environment, cwd=Path(__file__).parents[1])
+    addresses = set(done.stdout.split())
+    assert addresses and addresses <= {"0100007F", "0000000000000000FFFF00000100007F"}, done
+    token = tmp_path / "cache" / "scengen" / "ray" / "token"
+    assert (token.stat().st_mode & 0o777, token.parent.stat().st_mode & 0o777) == (0o600, 0o700)
+    assert not (tmp_path / ".ray").exists() and str(token) in done.stderr
+
+
 # --- with one, started here -------------------------------------------------------------------------
 
 

@@ -1,8 +1,13 @@
 """Workers end when they must, and what they worked on is named."""
 
+import errno
 import os
+import shlex
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from faults import lost, work
@@ -14,6 +19,7 @@ from scengen.work import parallel
 from scengen.work.parallel import Limits, WorkerDied, cores, each
 
 LIMITS = Limits(0.5, 200)
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -74,3 +80,49 @@ def test_workers_auto_are_as_many_as_there_are_cores(monkeypatch):
     assert read("verify", ["pool=x", "workers=auto"], VerifySettings).workers == 5
     with pytest.raises(BadConfig, match="workers = 'many'"):
         read("verify", ["pool=x", "workers=many"], VerifySettings)
+
+
+# --- machines that have no room ---------------------------------------------------------------------
+
+
+def limited(limit, value, *argv):
+    """Run a command under a limit of the shell: its exit status, and what it says on standard error."""
+    line = [sys.executable, "-m", "scengen", *map(str, argv)]
+    shell = f"ulimit {limit} {value}; exec {shlex.join(line)}"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, cwd=ROOT)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("files", [10, 16, 20])
+def test_a_machine_without_file_descriptors_is_one_line(files, tmp_path):
+    status, told = limited("-n", files, "verify", "pool=generated/reference", "level=replay", "workers=6")
+    assert status == 2 and "too many open files; raise the limit of open files (ulimit -n)" in told
+    assert told.count("scengen: ") == 1 and told.splitlines()[-1].startswith("scengen: ")
+
+
+def test_a_worker_that_could_not_start_can_be_ended(monkeypatch):
+    def full(*_):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr("multiprocessing.process.BaseProcess.start", full)
+    with pytest.raises(OSError, match="Too many open files"):
+        list(each(abs, [-1, -2], 2, LIMITS))
+
+
+@pytest.mark.parametrize("kilobytes", [1_000_000, 1_200_000, 2_000_000, 2_600_000])
+def test_pictures_in_a_small_address_space_are_refused_in_one_line(kilobytes, tmp_path):
+    status, told = limited("-v", kilobytes, "show", "pool=generated/reference", "id=8ed4", f"to={tmp_path / 'x.png'}")
+    assert status == 2 and told.count("\n") == 1 and "raise it" in told and not list(tmp_path.iterdir())
+
+
+def test_a_lack_of_memory_that_comes_from_outside_is_not_the_fault_of_an_item(monkeypatch):
+    """Under `ulimit -v` a worker has less than its limit: what does not fit then says nothing about the item."""
+    monkeypatch.setattr(parallel, "_bound_memory", lambda megabytes: False)
+    with pytest.raises(MemoryError):
+        list(each(hungry, [1], 1, LIMITS, lost))
+    monkeypatch.undo()
+    assert list(each(hungry, [1], 1, LIMITS, lost)) == ["1 needs more than 200 MB"]
+
+
+def hungry(item):
+    raise MemoryError

@@ -28,6 +28,10 @@ COMPLETING = ("--completion", "--complete")
 """Options that shells use."""
 GRACE = 1.5
 """Time that an interrupted command has to clean up before it is ended [s]."""
+OUT_OF_MEMORY = "out of memory; ask for less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
+"""Message for a command that has no memory left."""
+NO_MEMORY = "Could not allocate memory"
+"""Words with which MuJoCo reports a lack of memory, in exceptions of multiple types."""
 MAX_LINE = 3000
 """Largest length of an error line [characters]: longer than any list of known names."""
 
@@ -102,7 +106,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
         sys.stderr.close()
         return OK
     except MemoryError as error:
-        return _failed("out of memory; ask for less at once, or use fewer workers", _write_traceback(error))
+        return _failed(OUT_OF_MEMORY, _write_traceback(error))
     except OSError as error:
         from ..work.targets import remedy as disk_remedy
 
@@ -110,6 +114,8 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
             return _failed(f"{cut(str(error.filename or 'a file'))}: {what}")
         return _unforeseen(error)
     except Exception as error:
+        if NO_MEMORY in str(error):
+            return _failed(OUT_OF_MEMORY, _write_traceback(error))
         return _unforeseen(error)
 
 
@@ -236,7 +242,7 @@ def _write_traceback(error: BaseException) -> str:
         ) as file:
             traceback.print_exception(error, file=file)
             return file.name
-    except OSError:
+    except (OSError, MemoryError):
         return ""
 
 

@@ -76,6 +76,19 @@ def several(pool: str | list[str]) -> list[str]:
     return collection.folders(pool)
 
 
+def filled(folder: str) -> Pool:
+    """The checked pool in a folder, for a command that computes something from its scenarios.
+
+    Raises:
+        BadConfig: it holds no scenario.
+    """
+    pool = Pool.open(folder).check()
+    if not len(pool):
+        why = f"none of its {pool.manifest.indices} indices was certified"
+        raise BadConfig(f"{pool.folder} holds no scenario: {why}; see scengen show pool={pool.folder} for the reasons")
+    return pool
+
+
 def holder(pool: str | list[str] | None, name: str) -> Pool:
     """The pool with the scenario `name`: the only pool given, or the one of several that holds it."""
     found = [Pool.open(folder) for folder in several(pool or "")]

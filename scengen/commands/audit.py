@@ -9,11 +9,10 @@ from ..analysis.bias import Bias, acceptance_map, bias
 from ..analysis.redraw import MAX_REDRAWN, Redrawn, redrawn, sampled_indices
 from ..analysis.space import measured
 from ..analysis.tables import bias_table, map_table
-from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..work.targets import try_file
-from . import OK, Arguments, err, one, out, say, write_json
+from . import OK, Arguments, err, filled, one, out, say, write_json
 from .settings import read
 
 
@@ -28,7 +27,7 @@ class AuditSettings:
 def command(arguments: Arguments) -> int:
     settings = read("audit", arguments, AuditSettings)
     try_file(settings.json)
-    pool = Pool.open(one(settings.pool)).check()
+    pool = filled(one(settings.pool))
     with ProgressBar(err, f"draw {pool.folder} again", min(pool.manifest.indices, MAX_REDRAWN)) as progress_bar:
         drawn = redrawn(pool, lambda done, total: progress_bar.show(done), search_path(arguments))
     if sampled_indices(pool):

@@ -16,7 +16,7 @@ from ..pool import Pool
 from ..samplers.task import Task
 from ..task_files import search_path
 from ..work.targets import try_file
-from . import FAILED, OK, Arguments, names, out, say, several, write_json
+from . import FAILED, OK, Arguments, filled, names, out, say, several, write_json
 from .settings import read
 
 
@@ -36,7 +36,7 @@ def command(arguments: Arguments) -> int:
     at_least(settings, permutations=1)
     if not 0 < settings.within <= 1000:
         raise BadConfig(f"within = {settings.within:g}; it must lie above 0 and at most at 1000 training widths")
-    pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+    pools = [filled(folder) for folder in several(settings.pool)]
     search = search_path(arguments)
     task, names = task_of(pools[0], search), {task_of(pool, search).name for pool in pools}
     if len(names) > 1:

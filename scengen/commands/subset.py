@@ -8,13 +8,12 @@ from ..analysis.coverage import farthest_points
 from ..analysis.redraw import batch_of, task_of
 from ..analysis.space import of_tables
 from ..errors import BadConfig, PoolError
-from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..pool.writing import write_pool
 from ..task_files import search_path
 from ..validate import lock
 from ..work.targets import try_folder
-from . import OK, Arguments, one, say
+from . import OK, Arguments, filled, one, say
 from .settings import read
 
 
@@ -29,7 +28,7 @@ class SubsetSettings:
 
 def command(arguments: Arguments) -> int:
     settings = read("subset", arguments, SubsetSettings)
-    pool, target = Pool.open(one(settings.pool)).check(), Path(settings.to)
+    pool, target = filled(one(settings.pool)), Path(settings.to)
     if not target.name:
         raise BadConfig(f"to = {settings.to}; give a folder for the new pool")
     if not 1 <= settings.n <= len(pool):

@@ -156,6 +156,8 @@ def _scenarios(pools: Sequence[Pool], settings: EvaluateSettings) -> tuple[Scena
 
 def _first_scenarios(pool: Pool, seeds: int) -> Scenarios:
     """The first scenarios of a pool."""
+    if not len(pool):
+        raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
     if len(pool) < seeds:
         raise BadConfig(f"seeds = {seeds}, but {pool.folder} holds {len(pool)} scenarios; say seeds={len(pool)}")
     names = ("task", "category", "split", "seed", "index")

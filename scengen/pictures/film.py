@@ -15,7 +15,7 @@ from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.rollout import Rollout, try_shortcut
-from .render import Camera, Picture
+from .render import Camera, Picture, check_pictures
 from .video import Movie
 
 WITNESS = "witness"
@@ -48,7 +48,12 @@ class Take:
         return round(len(self.actions) * Loop.PERIOD, 2)
 
     def world(self) -> World:
-        """Its world at the start, with the visual geoms."""
+        """Its world at the start, with the visual geoms.
+
+        Raises:
+            NoPictures: pictures of it cannot be made here.
+        """
+        check_pictures()
         return World.load(self.scene_xml, self.embodiment, visual=True)
 
     def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:

@@ -22,6 +22,7 @@ from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
 from ..robots.panda import arms
 from ..sim.world import World
+from ..work.parallel import free_address_space
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
@@ -33,6 +34,9 @@ State = NDArray[np.float64]
 SHADOW_MAP_SIZE = 1024
 """Edge of the shadow map [pixels]. MuJoCo's 4096 looks hardly better, and a picture takes 1.6 times as long without a
 graphics card."""
+MIN_ADDRESS_SPACE = 2.5e9
+"""Address space that a process needs for its first picture [bytes]: OpenGL in software takes 2.2 GB, most of it for the
+stacks of its threads."""
 
 
 class NoPictures(ScengenError):
@@ -52,7 +56,7 @@ class Camera:
             NoPictures: OpenGL is missing.
         """
         self.world = world
-        _check_backend()
+        check_pictures()
         world.model.vis.quality.shadowsize = SHADOW_MAP_SIZE
         try:
             self._renderer = mujoco.Renderer(world.model, height, width)
@@ -244,12 +248,17 @@ def _box(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
     return world.data.geom_xpos[geom] + (centre + scale * half * CORNER_SIGNS) @ frame.T
 
 
-def _check_backend() -> None:
-    """Refuse the back end that needs a display if there is none: using it twice ends the process."""
+def check_pictures() -> None:
+    """Raise `NoPictures` if OpenGL would end the process: without a display, or with too little address space."""
     if "glfw" in gl_context.GLContext.__module__ and sys.platform == "linux" and not os.environ.get("DISPLAY"):
         raise NoPictures(
             "no OpenGL for pictures without a display; on Debian install libegl1 libgl1 libosmesa6, and set "
             "MUJOCO_GL=egl or import scengen before mujoco"
+        )
+    if (free := free_address_space()) < MIN_ADDRESS_SPACE:  # OpenGL would end the process without a message
+        raise NoPictures(
+            f"pictures need {MIN_ADDRESS_SPACE / 1e9:g} GB of address space, and the limit (ulimit -v) leaves "
+            f"{free / 1e9:.1f} GB; raise it"
         )
 
 
@@ -262,6 +271,7 @@ def camera(
     Raises:
         NoPictures: OpenGL is missing.
     """
+    check_pictures()  # before the meshes of the robot, which take a part of the address space
     view = Camera(World.load(scene_xml, embodiment, visual=True), width, height, where)
     try:
         yield view

@@ -5,6 +5,7 @@ import logging
 import os
 import pickle
 import re
+import secrets
 import signal
 import socket
 import tempfile
@@ -20,6 +21,9 @@ from ..errors import BadConfig, cut
 from .crew import Crew
 from .nodes import ClusterError, code_sha256, one_line
 from .parallel import Limits
+from .targets import cache_folder, refused
+
+log = logging.getLogger("scengen.cluster")
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -28,6 +32,11 @@ AUTO = "auto"
 """Address of the cluster that this machine is a node of; also the number of workers of one on each core."""
 LOCAL = "local"
 """Address of a cluster that is started on this machine for one command."""
+LOOPBACK = "127.0.0.1"
+"""Address of the servers of a cluster that is started on this machine: no other machine reaches them."""
+ON_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""Environment that lets Ray's servers listen on `LOOPBACK` only, which is its choice where it supports no clusters.
+Otherwise it replaces `LOOPBACK` by the address of the machine, and listens on all interfaces."""
 CONNECT_TIMEOUT = 5.0
 """Time in which an address must answer [s]."""
 MAX_WORKERS = 10_000
@@ -76,11 +85,13 @@ class Cluster:
             self._check_answer()
         code_sha256()  # soon after this process has imported the code, before the files can change
         given = f"executor.address = {cut(self.address)}"
-        settings = {"include_dashboard": False} if self.address == LOCAL else {}
+        settings = {"include_dashboard": False, "_node_ip_address": LOOPBACK} if self.address == LOCAL else {}
         with _sigterm_restored(), tempfile.TemporaryFile("w+") as output:
             try:
                 with _stderr_to(output):
                     ray.init(self.address, log_to_driver=False, logging_level=logging.CRITICAL, **settings)
+                if self.address == LOCAL:
+                    self._check_loopback(ray)
                 return ray
             except ray.exceptions.AuthenticationError as error:
                 why = one_line(error).partition(". ")[0]
@@ -91,8 +102,11 @@ class Cluster:
                     remedy = f"start one with ray start --head, or give executor.address=HOST:PORT or {LOCAL}"
                     raise ClusterError(f"{given}: {why}; {remedy}") from None
                 why = "the token is missing or wrong"
-            except (RuntimeError, ValueError, OSError, ray.exceptions.RayError) as error:
-                raise ClusterError(f"{given}: Ray cannot join: {cut(one_line(error), 400)}") from None
+            except ClusterError:
+                raise
+            except Exception as error:  # Ray raises a bare Exception if its processes do not start in time
+                remedy = "repeat the command, on a machine that is less busy"
+                raise ClusterError(f"{given}: Ray cannot join: {cut(one_line(error), 400)}; {remedy}") from None
         raise ClusterError(f"{given}: {why}; give the file with the cluster's token as executor.token=")
 
     def each(
@@ -129,11 +143,23 @@ class Cluster:
             if not Path(self.token).is_file():
                 raise BadConfig(f"executor.token = {cut(self.token)}; there is no such file; give that with the token")
             os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN_PATH=self.token)
+        elif self.address == LOCAL:
+            _use_own_token()
+        if self.address == LOCAL:
+            os.environ.update(ON_LOOPBACK)
         for name, value in QUIET.items():
             os.environ.setdefault(name, value)
         import ray
 
         return ray
+
+    def _check_loopback(self, ray: ModuleType) -> None:
+        """End the cluster of this machine, and raise `ClusterError`, if other machines can reach its servers."""
+        addresses = sorted({str(node["NodeManagerAddress"]) for node in ray.nodes()})
+        if addresses != [LOOPBACK]:
+            ray.shutdown()
+            why = f"Ray's servers are on {', '.join(addresses)} and not on {LOOPBACK}"
+            raise ClusterError(f"executor.address = {LOCAL}: {why}; import scengen before ray, or give HOST:PORT")
 
     def _check_answer(self) -> None:
         """Raise `ClusterError` if the address does not answer: Ray would wait for minutes and end the process."""
@@ -143,6 +169,30 @@ class Cluster:
         except (OSError, OverflowError, UnicodeError) as error:
             why = f"no answer ({one_line(error)}); check that the cluster runs, and give its HOST:PORT"
             raise ClusterError(f"executor.address = {cut(self.address)}: {why}") from None
+
+
+def _use_own_token() -> None:
+    """Let the cluster of this machine use a token that scengen keeps, unless the environment names one.
+
+    Ray would write one into the home folder that every user can read.
+
+    Raises:
+        BadConfig: the token cannot be written.
+    """
+    if os.environ.get("RAY_AUTH_MODE") or os.environ.get("RAY_AUTH_TOKEN_PATH"):
+        return
+    path = cache_folder() / "ray" / "token"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.chmod(0o700)
+        if not path.exists():
+            with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as part:  # readable by its owner only
+                part.write(secrets.token_hex(32))
+            os.replace(part.name, path)
+    except OSError as error:
+        raise refused(path, error) from None
+    os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN_PATH=str(path))
+    log.warning("scengen: a Ray cluster of this machine, on %s; its token is in %s", LOOPBACK, path)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Work in multiple processes with limits on time and memory; results come as they are ready."""
 
 import ctypes
+import math
 import multiprocessing
 import os
 import pickle
@@ -220,22 +221,34 @@ class _Worker:
 
     def _begin(self) -> None:
         if self._process is None:
-            self.connection, theirs = self._context.Pipe()
-            arguments = (theirs, self._function, self._limits, os.getpid())
-            self._process = self._context.Process(target=_serve, args=arguments, daemon=True)
-            # Inherited: Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-            try:
-                self._process.start()
-            finally:
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-            theirs.close()
-            if self._limits:  # an item does not pay for the start of a process
-                with suppress(EOFError, OSError):
-                    self.connection.recv_bytes()
+            self._start()
         with suppress(OSError):  # it has died, which the answer shows
             self.connection.send(self._item)
         self.deadline = time.monotonic() + (self._limits.seconds if self._limits else float("inf"))
+
+    def _start(self) -> None:
+        """Start the process.
+
+        Raises:
+            OSError: the machine has no room for a process or its pipe. The worker is as it was before.
+        """
+        ours, theirs = self._context.Pipe()
+        with theirs:
+            arguments = (theirs, self._function, self._limits, os.getpid())
+            process = self._context.Process(target=_serve, args=arguments, daemon=True)
+            # Inherited: Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+            try:
+                process.start()
+            except BaseException:
+                ours.close()
+                raise
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+        self.connection, self._process = ours, process
+        if self._limits:  # an item does not pay for the start of a process
+            with suppress(EOFError, OSError):
+                self.connection.recv_bytes()
 
     def _died(self) -> _Lost | None:
         self._process.join(EXIT_TIMEOUT)
@@ -247,6 +260,8 @@ class _Worker:
             return None
         self.busy = False
         how = f"was ended by {signal.Signals(-code).name}" if code is not None and code < 0 else f"ended with {code}"
+        if free_address_space() < math.inf:
+            how += ", in an address space that is limited from outside (ulimit -v)"
         return _Lost(self._item, f"died: it {how}")
 
     def _kill(self) -> None:
@@ -285,9 +300,11 @@ def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | 
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+    counted = limits
     if limits is not None:
         _close_all_but(orders.fileno())
-        _bound_memory(limits.megabytes)
+        if not _bound_memory(limits.megabytes):  # then a lack of memory is the machine's, and not the item's
+            counted = None
     native.silence()
     if limits is not None:
         orders.send_bytes(_READY)
@@ -296,7 +313,7 @@ def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | 
             item = orders.recv()
         except (EOFError, OSError):
             os._exit(0)
-        orders.send_bytes(_reply(function, item, limits))
+        orders.send_bytes(_reply(function, item, counted))
 
 
 def _reply(function: Callable[[Any], Any], item: Any, limits: Limits | None) -> bytes:
@@ -336,8 +353,26 @@ def _close_all_but(kept: int) -> None:
                 pass
 
 
-def _bound_memory(megabytes: int) -> None:
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    bound = pages * resource.getpagesize() + megabytes * 1_000_000
-    resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
+def free_address_space() -> float:
+    """Address space that this process may still take [bytes]: infinite unless it is limited (`ulimit -v`)."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if soft == resource.RLIM_INFINITY else soft - _address_space()
+
+
+def _bound_memory(megabytes: int) -> bool:
+    """Limit the address space of this process to what it has now and `megabytes` more.
+
+    Returns:
+        Whether it has this room. It has less if the command was started under a lower limit (`ulimit -v`).
+    """
+    room = free_address_space()
+    if wide_enough := room >= megabytes * 1_000_000:
+        bound = _address_space() + megabytes * 1_000_000
+        resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    return wide_enough
+
+
+def _address_space() -> int:
+    """Address space of this process [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
