@@ -14,8 +14,10 @@ Decisions, where the paper (App. B, T09) says no more than "tight slot outline" 
 
 * The slot and the box are those of T08 (`assets.cracker_box`), the box no thicker than the jaw opens. Its thickness is
   the "narrow side": across its width, "the flat side", no jaw reaches.
-* No rule punishes a failed attempt: a box that falls beside the slot lies flat, with nothing that a jaw reaches around,
-  and a box that is toppled over in the slot leans on its far wall.
+* A box that falls beside the slot is no failure by rule: it lies flat, with nothing that a jaw reaches around.
+* A strict rule that the paper lacks: a box that touches the slot, steeper than `MAX_RELEASE_ANGLE` and not touched by
+  the robot, loses the episode. Stood up in the slot and toppled, the box comes in by gravity alone, and a few shoves
+  finish it (12 of 12). A held box may stand in the slot at any angle. The rule closes a way, it opens none.
 * One arm, as in the catalogue (App. B.1); the text has a second one, which is frozen.
 """
 
@@ -37,7 +39,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
-from ..sim.world import Arm, World
+from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from ..skills.suction import carry_to
@@ -47,6 +49,8 @@ SEAT_TOLERANCE = 0.007  # largest distance of the box' middle from its seat alon
 GRIP_DEPTH = 0.02  # depth below the box' upper end at which it is held [m]: the palm allows 0.03
 LIFT_HEIGHT = 0.10  # height by which the box is lifted before it is leant [m]
 STEEP_ANGLE = math.radians(45.0)  # angle to the level at which the far end is brought into the slot [rad]
+MAX_RELEASE_ANGLE = math.radians(40.0)
+"""Largest angle to the level of a box in the slot that the robot does not touch [rad]; the palm permits 28 deg."""
 WALL_CLEARANCE = 0.004  # gap between the far wall and the box while it is leant [m]
 LEAN_PACE = Pace(0.25, 0.01)  # pace at which the box is leant high over the slot
 INSERT_PACE = Pace(0.10, 0.004)  # pace at which the far end is lowered into the slot
@@ -82,7 +86,14 @@ class CrackerBoxJaw(BoxAndSlot):
         return flat and seated(world, "box", "slot", self.seat, SEAT_TOLERANCE, HEIGHT_TOLERANCE)
 
     def failure(self, world: World) -> str | None:
+        if self.let_go_steep(world):
+            return "the box was let go steeply in the slot"
         return "the box fell off the table" if fallen(world, "box") else None
+
+    def let_go_steep(self, world: World) -> bool:
+        """Whether the box stands in the slot, or falls in it, from more than the angle at which it may be let go."""
+        steep = abs(world.rot("box")[2, 2]) > math.sin(MAX_RELEASE_ANGLE)
+        return steep and world.touching("box", "slot") and not world.touching(ROBOT, "box")
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from controls import (
@@ -14,12 +15,14 @@ from controls import (
     replayed,
     solution,
     unchecked,
+    unguarded,
 )
 
 from scengen import load_task
+from scengen.geometry import UP
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
-from scengen.tasks.cracker_box_jaw import GRIP_DEPTH, MIN_SLIDE_CLEARANCE, CrackerBoxJaw
+from scengen.tasks.cracker_box_jaw import GRIP_DEPTH, MAX_RELEASE_ANGLE, MIN_SLIDE_CLEARANCE, CrackerBoxJaw
 
 TASK = load_task("cracker_box_jaw")
 NOMINAL = CrackerBoxJaw()
@@ -50,6 +53,28 @@ def test_a_shallow_slot_needs_no_knock():
 
     shallow = with_values(unchecked(Shallow)(), values(NOMINAL))
     assert play(TASK, shallow, shallow.shortcuts()["insert_and_leave"].plan).solved
+
+
+@pytest.mark.parametrize(("over", "steep"), [(0.01, True), (-0.01, False)])
+def test_a_box_may_be_let_go_in_the_slot_up_to_an_angle(over, steep):
+    """It leans on the near wall there, and slides down: the rule looks at it in the first period of contact."""
+    world = load(TASK, NOMINAL)
+    middle, rot = NOMINAL.leaning(world, MAX_RELEASE_ANGLE + over)
+    free = world.data.joint("box_free").qpos
+    mujoco.mju_mat2Quat(free[3:], rot.ravel())
+    free[:3] = middle - BOX.size[2] / 2 * rot[:, 2] - 0.001 * UP
+    while not world.touching("box", "slot"):
+        world.step(world.idle)
+    assert elevation(world) == pytest.approx(MAX_RELEASE_ANGLE + over, abs=0.008)
+    assert (NOMINAL.failure(world) == "the box was let go steeply in the slot") == steep
+
+
+def test_without_the_rule_a_toppled_box_is_still_to_be_shoved():
+    """The shortcut alone reaches the goal neither way; it is the rule that ends the episode."""
+    free = unguarded(CrackerBoxJaw)()
+    topple = "stand_it_up_and_topple_it"
+    assert play_shortcut(TASK, free, topple).outcome == "timeout"
+    assert play_shortcut(TASK, NOMINAL, topple).reason == "the box was let go steeply in the slot"
 
 
 @pytest.mark.parametrize(("room", "passes"), [(0.0015, True), (-0.0015, False)])
