@@ -20,7 +20,10 @@ Decisions, where the paper (App. B, T02) is silent:
   together.
 * When "the peg aligns with the slot": its axis is within `ALIGN_ANGLE` of the slot's, its nose within `SIDE_TOLERANCE`
   of the slot's axis and as near to a mouth as `distance` says, on either side of the board. A larger angle does not
-  pass the slot, so no peg gets in before the turn; without the turn no goal counts.
+  pass the slot, and without the turn no goal counts.
+* A strict rule that the paper lacks: a peg that is partly in the board does not turn it. A nose that came in askew and
+  was squared up inside would turn the board around the inserted peg, with nothing to recover (12 of 12). Such a peg
+  must come out again. The rule closes a way, it opens none.
 * The slot has walls only at both ends. In a channel the walls square a compliant arm: a peg that was only shifted, not
   turned, went in 6 times out of 6. Between two windows nothing squares it.
 * "95 % of its length": this share of the peg is beyond the mouth, with its middle within the slot. Up to 103 % counts,
@@ -34,7 +37,7 @@ line. This corrects a peg that sits askew in the jaw, a board that has turned, a
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -129,7 +132,8 @@ class RecoverPegInsert(Scenario):
 
     def in_line(self, world: World) -> bool:
         """Whether the peg points into the slot from near outside, on either side of the board."""
-        outwards = [abs(end[0] - self.board.depth / 2) - self.board.depth / 2 for end in self.ends(world)]
+        lengthwise = [end[0] - self.board.depth / 2 for end in self.ends(world)]
+        outwards = [abs(x) - self.board.depth / 2 for x in lengthwise]
         nose = self.ends(world)[int(np.argmin(outwards))]
         axis = self.ends(world)[1] - self.ends(world)[0]
         askew = math.atan2(math.hypot(axis[1], axis[2]), abs(axis[0]))
@@ -137,7 +141,12 @@ class RecoverPegInsert(Scenario):
             askew < ALIGN_ANGLE
             and math.hypot(nose[1], nose[2]) < SIDE_TOLERANCE
             and 0.0 < min(outwards) < self.distance
+            and self.outside(lengthwise)
         )
+
+    def outside(self, lengthwise: Sequence[float]) -> bool:
+        """Whether both ends of the peg, given along the slot from the board's middle [m], are on one side of it."""
+        return min(lengthwise) * max(lengthwise) > 0.0
 
     def slot(self, world: World) -> Line:
         """Present pose of the slot."""

@@ -84,6 +84,16 @@ def test_in_line_is_near_straight_and_in_front(world, pose, counts, back):
     assert NOMINAL.in_line(world) == counts
 
 
+@pytest.mark.parametrize("back", [1, -1])
+def test_a_peg_that_is_partly_in_the_board_is_not_in_line(world, back):
+    """Negative control: the same nose, as far behind the board, is in line once the whole peg is behind it."""
+    depth, length = NOMINAL.board.depth, NOMINAL.peg.length
+    put(world, -depth - NOMINAL.distance / 2, back=back)
+    assert not NOMINAL.in_line(world)
+    put(world, -depth - NOMINAL.distance / 2 - length, back=back)
+    assert NOMINAL.in_line(world)
+
+
 @pytest.fixture(scope="module")
 def history():
     """The oracle in the nominal scenario, as the controller gets it, and what it sees before and after every period."""
