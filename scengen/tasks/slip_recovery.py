@@ -21,6 +21,9 @@ and "sliding the object is not allowed":
   time for a second attempt.
 * During the window the gripper is open whatever the command, and obeys afterwards. The window lasts longer than the
   fall; scenarios with shorter ones are refuted.
+* A strict rule that the paper lacks: the episode is lost if the robot touches the object at the end of a slip, unless
+  the object has lain on the table untouched in the meantime. A hand on its side, with one finger below the object,
+  keeps it through the slip, and nothing is left to recover. The rule closes this way, it opens none.
 * Placed means: lifted again after the last slip, and released in the region, at rest. An object that falls into the
   region is not placed.
 * The paper names no YCB object. These are proxies, solids of their size, mass and balance (`assets.ycb`), or the scans
@@ -70,10 +73,12 @@ FLIGHT_DISTANCE = 0.018
 MAX_FLIGHT_DISTANCE = 0.03  # distance that is allowed for this flight [m]
 MIN_CARRY_DISTANCE = 0.015
 """Least distance that the object is carried before a slip, and that remains after the last one [m]."""
-MEMORY = ("slips", "jam_ends", "stood", "high", "high_x", "high_y", "recovered", "pushed", "slid", "x", "y")
-"""Number of slips and end of the present one; height of the object's centre of mass at the last contact with the table
-[m]; whether it is carried high enough to slip, and since which place [m]; whether it has been so since the last slip;
-whether it lies where the robot pushed it, and the total distance of the pushes [m]; its place one period ago [m]."""
+MEMORY = ("slips", "jam_ends", "lost", "kept", "stood", "high", "high_x", "high_y", "recovered")
+"""Number of slips and end of the present one; whether the object has lain on the table untouched since the slip began,
+and whether the hand kept it through one; height of the object's centre of mass at the last contact with the table [m];
+whether it is carried high enough to slip, and since which place [m]; whether it has been so since the last slip."""
+PUSHES = ("pushed", "slid", "x", "y")
+"""Whether the object lies where the robot pushed it, the total distance of the pushes, its place one period ago [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +115,7 @@ class SlipRecovery(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
-        remember(scene, *MEMORY)
+        remember(scene, *MEMORY, *PUSHES)
         place(scene, self.thing, "thing", [self.x, self.y, TABLE_TOP], math.radians(self.yaw))
         place(scene, self.patch, "patch", self.goal, free=False)
         return scene
@@ -126,6 +131,8 @@ class SlipRecovery(Scenario):
     def failure(self, world: World) -> str | None:
         if world.memory["slid"] > MAX_SLIDE:
             return "the robot slid the thing over the table"
+        if world.memory["kept"]:
+            return "the hand kept the thing through a slip"
         return "the thing fell off the table" if fallen(world, "thing") else None
 
     def events(self, world: World) -> None:
@@ -138,6 +145,9 @@ class SlipRecovery(Scenario):
         memory["x"], memory["y"] = at[:2]
         if lies:
             memory["stood"] = at[2]
+        memory["lost"] = max(memory["lost"], float(lies and not touched))
+        if world.passes(memory["jam_ends"]):
+            memory["kept"] = max(memory["kept"], float(self.kept(world)))
         raised = at[2] - memory["stood"] >= (MIN_CARRY_HEIGHT if memory["high"] else MIN_LIFT)
         carried = raised and touched and not lies and not self.pending(world)
         if carried and not memory["high"]:
@@ -146,8 +156,12 @@ class SlipRecovery(Scenario):
         slips, carried_by = int(memory["slips"]), math.hypot(at[0] - memory["high_x"], at[1] - memory["high_y"])
         if carried and slips < self.slips and carried_by >= self.distance(slips):
             memory["slips"], memory["jam_ends"] = slips + 1, world.time + self.planned[slips].seconds
-            memory["high"] = memory["recovered"] = 0.0
+            memory["high"] = memory["recovered"] = memory["lost"] = 0.0
         world.arm.jam(self.pending(world))
+
+    def kept(self, world: World) -> bool:
+        """Whether the robot touches the object at the end of a slip, and has done so whenever it was on the table."""
+        return world.touching(ROBOT, "thing") and not world.memory["lost"]
 
     def pending(self, world: World) -> bool:
         """Whether the gripper is forced open."""

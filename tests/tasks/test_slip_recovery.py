@@ -24,7 +24,7 @@ from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW
 from scengen.sim.world import ROBOT
-from scengen.skills.grip import extent
+from scengen.skills.grip import extent, take
 from scengen.skills.motion import go_to
 from scengen.tasks.slip_recovery import (
     FALL_TIME,
@@ -153,6 +153,30 @@ def test_its_middle_must_be_on_the_square(solved, beyond, counts):
     solved.loop.touching[:] = touching
     assert NOMINAL.success(solved) == counts
     solved.restore(state)
+
+
+@pytest.fixture(scope="module")
+def held():
+    """The world after the object has been lifted by 7 cm."""
+    world = load(TASK, NOMINAL)
+    for action in take(world.arm, "thing", lift=0.07):
+        world.step(action)
+    return world
+
+
+@pytest.mark.parametrize(("lost", "kept"), [(0.0, True), (1.0, False)])
+def test_a_thing_is_kept_if_the_hand_holds_it_that_has_not_lain_on_the_table(held, lost, kept):
+    with held.events():
+        held.memory["lost"] = lost
+    assert NOMINAL.kept(held) == kept
+
+
+def test_a_thing_that_the_hand_keeps_through_a_slip_loses_the_episode(held, solved):
+    """Negative control: the oracle's object has lain on the table before the shortest slip ends."""
+    with held.events():
+        held.memory["kept"] = 1.0
+    assert NOMINAL.failure(held) == "the hand kept the thing through a slip"
+    assert solved.memory["lost"] and not solved.memory["kept"] and NOMINAL.failure(solved) is None
 
 
 @pytest.mark.parametrize("name", ["drag_it", "push_the_rest"])
