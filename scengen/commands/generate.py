@@ -10,7 +10,7 @@ from typing import TypeVar
 from rich.table import Table
 
 from ..compose import Combination, combinations
-from ..errors import BadConfig, ScengenError
+from ..errors import BadConfig, ScengenError, cut
 from ..pictures.report import attack_table, funnel_table, summary_lines
 from ..pool import collection
 from ..runs.generate import GenerateSettings, Summary, generate
@@ -28,6 +28,12 @@ GENERATED = "generated"
 """Default folder of the pools of a sweep."""
 
 
+MAX_REASONS = 8
+"""Largest number of reasons that an interrupted run prints, as many as the rejection report."""
+REASON_LENGTH = 90
+"""Length up to which the line of progress repeats a reason [characters], as in the rejection report."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One pool to make."""
@@ -42,13 +48,21 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
-        with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
+        rejections: Counter[str] = Counter()
+        try:
+            with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
 
-            def progress(certified: int, finished: int, verdicts: Mapping[str, int]) -> None:
-                lost = ", ".join(f"{n} {v}" for v, n in sorted(verdicts.items()) if v != "certified")
-                progress_bar.show(min(certified, settings.n), f"{finished} tried" + (f", {lost}" if lost else ""))
+                def progress(
+                    certified: int, finished: int, verdicts: Mapping[str, int], reasons: Mapping[str, int]
+                ) -> None:
+                    rejections.update({reason: n - rejections[reason] for reason, n in reasons.items()})
+                    progress_bar.show(min(certified, settings.n), _progress_note(finished, verdicts, rejections))
 
-            summary = generate(task, self.certify_settings, settings, progress)
+                summary = generate(task, self.certify_settings, settings, progress)
+        except KeyboardInterrupt:
+            for reason, n in rejections.most_common(MAX_REASONS):
+                warn(f"scengen: {n}x {reason}", "yellow")
+            raise
         out.print(funnel_table(summary.funnel, summary.reasons))
         if summary.attack is not None:
             out.print(attack_table(summary.attack))
@@ -57,7 +71,7 @@ class Run:
         if summary.certified < settings.n:
             warn(
                 f"scengen: only {summary.certified} of {settings.n} could be certified among {summary.indices} "
-                "indices; see the reasons above, or raise limit="
+                "indices; see the reasons above, play one with scengen try, or raise limit="
             )
         return summary
 
@@ -80,6 +94,16 @@ def command(arguments: Arguments) -> int:
     say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
     short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
     return FAILED if short else OK
+
+
+def _progress_note(finished: int, verdicts: Mapping[str, int], rejections: "Counter[str]") -> str:
+    """Numbers of indices by verdict, and the most frequent reason of a rejection with its number."""
+    lost = [f"{n} {verdict}" for verdict, n in sorted(verdicts.items()) if verdict != "certified"]
+    note = ", ".join([f"{finished} tried", *lost])
+    if rejections:
+        ((reason, n),) = rejections.most_common(1)
+        note += f" ({n}x {cut(reason, REASON_LENGTH)})"
+    return note
 
 
 def _run(asked: Combination) -> Run:

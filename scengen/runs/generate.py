@@ -77,8 +77,9 @@ MAX_LOST = 100
 """Number of scenarios in a row that crash or reach a limit, at which a run ends: of a sound family hardly one in a
 hundred does."""
 
-Progress = Callable[[int, int, Mapping[str, int]], None]
-"""Called with the number of certified scenarios, the number of finished indices, and the verdicts so far."""
+Progress = Callable[[int, int, Mapping[str, int], Mapping[str, int]], None]
+"""Called with the numbers of certified scenarios and of finished indices, and the numbers of indices by verdict and of
+rejected ones by "check: reason"."""
 
 
 @dataclass(frozen=True)
@@ -232,6 +233,7 @@ def _extend(
     missing = (i for i in range(limit) if i not in records)
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     verdicts = Counter(r.verdict for r in records.values())
+    reasons = Counter(_rejection(r) for r in records.values() if r.check)
     lost_in_a_row = 0
     filling = Filling(
         journal, 0 if settings.attack else settings.n
@@ -251,11 +253,18 @@ def _extend(
         with _writing(journal.folder):
             filling.follow(records)
         verdicts[record.verdict] += 1
+        if record.check:
+            reasons[_rejection(record)] += 1
         lost_in_a_row = lost_in_a_row + 1 if record.check == PROCESS else 0
         if lost_in_a_row == MAX_LOST:
             why = f"{MAX_LOST} scenarios in a row have no verdict, the last because it {record.reason}"
             raise PoolError(f"{why}; raise limit_seconds= and limit_mb=, or debug one with workers=1")
-        progress(verdicts["certified"], len(records), verdicts)
+        progress(verdicts["certified"], len(records), verdicts, reasons)
+
+
+def _rejection(record: Record) -> str:
+    """Check and reason of a rejected index, the same for rejections of the same kind."""
+    return without_numbers(f"{record.check}: {record.reason}")
 
 
 def _attack(
@@ -275,7 +284,7 @@ def _attack(
     key = sha256(" ".join([str(settings.attack), *(one.scenario.id for one in subjects)]))
 
     def attacked_so_far(done: int, hits: int) -> None:
-        progress(len(indices), len(records), {f"attacked, {hits} hits": done})
+        progress(len(indices), len(records), {f"attacked, {hits} hits": done}, {})
 
     report = attacks.attack(job.task, subjects, wanted, journal.folder / f"attack-{key[:12]}", attacked_so_far)
     around = {hit.scenario: hit for hit in reversed(report.refuting)}
@@ -305,7 +314,7 @@ def _finish(
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
     kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in _WITHOUT_ROW]
-    reasons = Counter(without_numbers(f"{r.check}: {r.reason}") for r in counted if r.check not in ("", "feasible"))
+    reasons = Counter(_rejection(r) for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
     counts = funnel(counted)

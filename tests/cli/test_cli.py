@@ -1,5 +1,6 @@
 """The command line as its users meet it: exit status, one clear line, nothing lost."""
 
+import importlib
 import os
 import re
 import subprocess
@@ -30,6 +31,7 @@ from scengen.pool import Pool
 from scengen.runs import generate
 from scengen.sim import scene_text
 from scengen.sim.world import World
+from scengen.validate.settings import QUICK
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 
@@ -318,3 +320,35 @@ def test_a_scene_that_reaches_outside_itself_is_refused(text, says):
 def test_every_task_file_is_found_without_registration():
     files = {path.stem for path in (task_files.conf_dir() / "task").glob("*.yaml")}
     assert set(list_tasks()) == files and "domino_single" in files
+
+
+def test_a_run_that_fails_says_why_while_it_fails_and_when_it_is_interrupted(monkeypatch, capsys, tmp_path):
+    run = importlib.import_module("scengen.commands.generate")
+    notes = []
+
+    def fails(task, certify_settings, settings, progress):
+        for done in (1, 2, 3):
+            progress(0, done, {"unknown": done - 1, "refuted": 1}, {"solved: the hand": done - 1, "rest: it fell": 1})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "generate", fails)
+    monkeypatch.setattr("scengen.runs.progress.ProgressBar.show", lambda self, done, note="": notes.append(note))
+    status, told = said(capsys, *GENERATE, f"pool={tmp_path / 'pool'}")
+    assert notes[-1] == "3 tried, 1 refuted, 2 unknown (2x solved: the hand)"
+    assert status == 130 and told.splitlines()[:2] == ["scengen: 2x solved: the hand", "scengen: 1x rest: it fell"]
+    assert "finished work is kept" in told.splitlines()[2]
+
+
+def test_reasons_are_counted_with_those_of_an_earlier_run(tmp_path):
+    told = []
+    task = load_task("domino_single", ["task.horizon=0.5"])
+    for limit in (1, 2):
+        settings = generate.GenerateSettings(n=1, limit=limit, pool=str(tmp_path / "pool"))
+        generate.generate(task, QUICK, settings, lambda *all: told.append(all))
+    assert [(finished, dict(reasons)) for _, finished, _, reasons in told][-1] == (2, {told_reason(told): 2})
+
+
+def told_reason(told):
+    ((reason, _),) = told[-1][3].items()
+    assert reason.startswith("solved: the oracle failed: ") and "#" in reason
+    return reason
