@@ -26,7 +26,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .samplers.task import Task, load
-from .task_files import ORIGINS, category, conf_dir, groups, packages, search_path, tasks
+from .task_files import ORIGINS, category, conf_dir, groups, is_folder, packages, search_path, tasks
 from .typed import typed
 from .validate.settings import CertifySettings
 
@@ -245,10 +245,21 @@ def _check_override(verb: str, text: str) -> None:
         for folder in folders if isinstance(folders, list) else [folders]:
             if not re.match(r"(file|pkg)://.", str(folder)):
                 raise BadConfig(f"{quoted}: give a folder of configuration as file:///folder or pkg://package")
-    if key in ("task", "certify") and key in groups(verb) and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
-        raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; see scengen tasks")
-    if key in ("task", "certify") and override.value() is None:
+            if not is_folder(str(folder)):  # Hydra only warns, and goes on without it
+                raise BadConfig(
+                    f"{quoted}: there is no folder {cut(str(folder))}; give one that holds task/<task>.yaml"
+                )
+    in_group = key in ("task", "certify", "executor") and key in groups(verb)
+    if in_group and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
+        raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
+    if key in ("task", "certify", "executor") and override.value() is None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _files_of(group: str) -> str:
+    """Where the files of a group are listed, or their names."""
+    names = sorted(path.stem for path in (conf_dir() / group).glob("*.yaml"))
+    return "see scengen tasks" if group == "task" else f"known: {', '.join(names)}"
 
 
 def _parsed(text: str, parser: OverridesParser | None = None) -> Override | None:

@@ -174,8 +174,17 @@ def _plain(folder: str) -> str:
     scheme, _, rest = folder.strip(" '\"").partition("://")
     if scheme != "pkg":
         return rest
-    spec = find_spec(rest.replace("/", "."))
+    try:
+        spec = find_spec(rest.replace("/", "."))
+    except (ImportError, ValueError):
+        spec = None
     return next(iter((spec and spec.submodule_search_locations) or [""]))
+
+
+def is_folder(folder: str) -> bool:
+    """Whether a folder that Hydra spells with a scheme exists."""
+    path = _plain(folder)
+    return bool(path) and Path(path).is_dir()
 
 
 @cache

@@ -1,13 +1,14 @@
 """list assets, write one as a mesh, or import a mesh as a new asset"""
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
 from ..assets.kits import kit, kits
+from ..compose import composed
 from ..errors import BadConfig, cut
 from ..export.mesh import FORMATS, encode
 from ..params import parameters
@@ -18,6 +19,10 @@ from .settings import read
 
 if TYPE_CHECKING:
     from ..intake.asset import MeshAsset
+
+
+_NAMES = ("name", "to", "mesh")
+"""Settings that say what to do. All others are about an imported mesh."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,14 @@ class AssetSettings:
             raise BadConfig(f"asset needs {where}; see scengen asset --help")
         if self.to is not None and self.name is None and self.mesh is None:
             raise BadConfig(f"to = {cut(self.to)}, without an asset; give name=ASSET or mesh=FILE")
+        if self.mesh is None and (
+            unused := [f.name for f in fields(self) if f.name not in _NAMES and self._is_given(f)]
+        ):
+            raise BadConfig(f"{', '.join(unused)}: settings of an imported mesh; give mesh=FILE, or leave them out")
+
+    def _is_given(self, setting: "Field[Any]") -> bool:
+        """Whether a setting differs from its default."""
+        return getattr(self, setting.name) != composed("asset", [])[0][setting.name]
 
 
 def command(arguments: Arguments) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .. import compose
 from ..analysis.redraw import task_of
+from ..attack.adversary import TIERS
 from ..attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
@@ -24,6 +25,8 @@ from .settings import read
 def command(arguments: Arguments) -> int:
     settings = read("attack", arguments, AttackSettings)
     settings.check()
+    if settings.tiers is not None and not settings.tiers:
+        raise BadConfig(f"tiers = []; an attack without tiers finds nothing; give some of {', '.join(TIERS)}")
     try_file(settings.json)
     try_folder(settings.to)
     task, subjects = _subjects(arguments, settings)

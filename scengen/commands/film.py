@@ -50,6 +50,8 @@ class FilmSettings:
             raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
+        if self.raw and self.of == WITNESS:
+            raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
         at_least(self, frames=1, fps=1, width=1, height=1)
         if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > MAX_STRIP_PIXELS:
             size = f"{self.frames} frames of {self.width} x {self.height} pixels"

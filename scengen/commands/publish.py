@@ -13,6 +13,7 @@ from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report
 from ..work.parallel import Workers
+from ..work.printed import printable
 from . import OK, Arguments, err, say, several
 from .settings import read
 from .verify import EXPIRED, verified
@@ -41,6 +42,9 @@ def command(arguments: Arguments) -> int:
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
     at_least(settings, workers=1, sample=1)
+    for name in ("title", "license"):
+        if (text := getattr(settings, name)) is not None and (not text.strip() or printable(text) != text):
+            raise BadConfig(f"{name} = {cut(repr(text))}; it must be one line of text without control characters")
     check_target(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_pools(pools)

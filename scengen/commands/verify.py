@@ -77,6 +77,10 @@ def command(arguments: Arguments) -> int:
     if settings.pool is None:
         raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
     folders = several(settings.pool)
+    if settings.ycb is not None:
+        for folder in folders:
+            if not Pool.open(folder).manifest.task_node.get("scans"):
+                raise BadConfig(f"ycb = {cut(settings.ycb)}, but {folder} holds no scans; leave it out")
     limits = Limits(settings.limit_seconds, settings.limit_mb)
     options = Options(
         settings.level,
@@ -138,11 +142,9 @@ def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
     """The report on a pool, with remarks and faults of the scans in its manifest.
 
     Raises:
-        BadConfig: a folder is given but lacks one of the scans, or the pool holds none.
+        BadConfig: a folder is given but lacks one of the scans.
     """
     scans = pool.manifest.task_node.get("scans", {})
-    if folder is not None and not scans:
-        raise BadConfig(f"ycb = {cut(folder)}, but {pool.folder} holds no scans; leave it out")
     if report.verdict != "sound" or not scans:
         return report
     solids = f"{len(scans)} solids of scans ({', '.join(scans)})"
