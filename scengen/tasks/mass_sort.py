@@ -6,10 +6,15 @@
         (?)      (?)     (?)
 
 Bottleneck: only the wrist can measure the mass of a cube; nothing shows it. A cube that is released in a wrong zone
-loses the episode (paper, App. B, T25), so the robot must lift all of them before it puts the first one down for good.
+loses the episode (paper, App. B, T25).
 
 Decisions where the paper is silent:
 
+* A strict rule, which the paper states as a plan only ("each cube must be probed before placement"): a cube that is
+  released in a zone loses the episode unless each cube has been lifted by `PROBE_HEIGHT` in the hand before. Without
+  it, a policy sorts the cubes by their resistance to a push (12 of 12), or puts one after the other down for good, the
+  last one by deduction from the fixed set of masses (12 of 12). The rule closes these ways, it opens none. It does not
+  check what a policy reads from its wrist.
 * Left is the robot's left. The zones carry one, two and three bars, and the instruction refers to the bars.
 * The cubes never lie in their final order, left to right: then no weighing would be needed.
 * Chance: training has four orders, so one fixed answer is right in a quarter of it.
@@ -17,7 +22,7 @@ Decisions where the paper is silent:
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations
 
@@ -29,9 +34,10 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.zone import Zone
 from ..geometry import UP, Outline, Vec3, corners, gap
 from ..params import check_bounds, param
-from ..predicates import fallen, rests_on, still
+from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put, release, weigh
 from ..skills.motion import STEADY, push, retreat
@@ -41,6 +47,8 @@ ORDERS = tuple(permutations(range(CUBE_COUNT)))
 """Ranks of the cubes on the left, in the middle and on the right: 0 is the lightest. The first order is sorted."""
 MIN_MASS_DIFFERENCE = 0.025
 """Least difference in mass of two neighbours in rank [kg]: 0.25 N, ten times the error of a weighing under noise."""
+PROBE_HEIGHT = 0.01
+"""Height to which each cube must be lifted before one is released in a zone [m]; the oracle lifts them by 2 cm."""
 MIN_CLEARANCE = 0.010  # least clearance of the fingers from other cubes and zones [m]
 APPROACH_HEIGHT = 0.03  # height above a cube from which the hand comes down, and to which it moves up [m]
 CARRY_HEIGHT = 0.015  # height above other cubes at which a cube is carried [m]
@@ -85,6 +93,7 @@ class MassSort(Scenario):
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
+        remember(scene, *(f"lifted_{cube}" for cube in self.cubes))
         for rank in range(CUBE_COUNT):
             place(scene, replace(self.zone, label=rank + 1), f"zone_{rank}", self.zone_at(rank), free=False)
         for cube, spot, rank in zip(self.cubes, self.spots, self.ranks, strict=True):
@@ -102,10 +111,31 @@ class MassSort(Scenario):
 
     def failure(self, world: World) -> str | None:
         for cube, rank in self.belongs(world).items():
-            let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
-            if let_go and any(self.within(world, cube, other) for other in range(CUBE_COUNT) if other != rank):
+            zone = self.zone_of(world, cube)
+            if zone is not None and zone != rank:
                 return "a cube was put into a wrong zone"
+            if zone is not None and not self.probed(world):
+                return "a cube was put into a zone before each had been lifted"
         return "a cube fell off the table" if fallen(world, *self.cubes) else None
+
+    def events(self, world: World) -> None:
+        """Notice which cubes have been lifted."""
+        for cube in self.cubes:
+            if world.com(cube)[2] - self.edge / 2 - TABLE_TOP >= PROBE_HEIGHT and held(world, cube):
+                world.memory[f"lifted_{cube}"] = 1.0
+
+    def pending(self, world: World) -> bool:
+        """Never: nothing happens on its own."""
+        return False
+
+    def probed(self, world: World) -> bool:
+        """Whether each cube has been lifted in the hand."""
+        return all(world.memory[f"lifted_{cube}"] for cube in self.cubes)
+
+    def zone_of(self, world: World, cube: str) -> int | None:
+        """Rank of the zone in which a cube has been released, or None."""
+        released = world.touching(cube, "table") and not world.touching(ROBOT, cube)
+        return next((rank for rank in range(CUBE_COUNT) if released and self.within(world, cube, rank)), None)
 
     def belongs(self, world: World) -> dict[str, int]:
         """Rank of each cube, by its mass in the scene."""
@@ -121,17 +151,26 @@ class MassSort(Scenario):
 
     def oracle(self, world: World) -> Plan:
         """Weigh each cube and put it back, except the last; put that one and then the others into their zones."""
+        weights = yield from self.probe(world)
+        yield from self.sort_held(world, [sorted(weights).index(weight) for weight in weights])
+
+    def probe(self, world: World) -> Generator[Action, None, list[float]]:
+        """Lift each cube and put it back, except the last; returns their weights, from left to right [N]."""
         weights: list[float] = []
         *others, last = self.cubes
         for cube in others:
-            yield from self.take(world, cube, 0.03)  # just off the table
+            yield from self.take(world, cube, 0.04)  # ends 2 cm short
             weights.append(float((yield from weigh(world.arm))[2]))
             yield from push(world.arm, -0.1 * UP, lambda cube=cube: world.touching(cube, "table"))
             yield from release(world.arm)
             yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
         yield from self.take(world, last, self.edge + CARRY_HEIGHT)
         weights.append(float((yield from weigh(world.arm))[2]))
-        ranks = [sorted(weights).index(weight) for weight in weights]
+        return weights
+
+    def sort_held(self, world: World, ranks: Sequence[int]) -> Plan:
+        """Put the last cube, which is held, and then the others into the zones of the given ranks."""
+        *others, last = self.cubes
         yield from self.place_held(world, last, ranks[-1])
         yield from self.deliver(world, dict(zip(others, ranks, strict=False)))
 
@@ -155,7 +194,7 @@ class MassSort(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        """Orders chosen without weighing, or with one weighing; those that are wrong in this scenario."""
+        """Orders chosen without reading the scales, or with one reading; those that are wrong in this scenario."""
         blind = {"as_they_lie": (0, 1, 2), "the_other_way_round": (2, 1, 0), "one_further": (1, 2, 0)}
         first = self.ranks[0]
         rest = [rank for rank in range(CUBE_COUNT) if rank != first]
@@ -164,8 +203,13 @@ class MassSort(Scenario):
         return {name: Shortcut(plan) for name, plan in plans.items()}
 
     def _answer(self, ranks: Sequence[int]) -> Planner:
-        """Plan that delivers the cubes, from left to right, to the zones of the given ranks."""
-        return lambda world: self.deliver(world, dict(zip(self.cubes, ranks, strict=True)))
+        """Plan that lifts each cube and puts them, from left to right, into the zones of the given ranks."""
+
+        def plan(world: World) -> Plan:
+            yield from self.probe(world)
+            yield from self.sort_held(world, ranks)
+
+        return plan
 
     def answer(self) -> Answer:
         """Index of one of the six orders. One try: a cube in a wrong zone ends the episode."""

@@ -18,20 +18,28 @@ from controls import (
 )
 
 from scengen import load_task
+from scengen.assets.prop import TABLE_TOP
 from scengen.attack.priors import fit
+from scengen.episode import Episode
 from scengen.params import parameters
 from scengen.sim.world import IDLE
 from scengen.skills import jaw
-from scengen.tasks.mass_sort import MIN_MASS_DIFFERENCE, ORDERS, MassSort, Spot
+from scengen.tasks.mass_sort import MIN_MASS_DIFFERENCE, ORDERS, PROBE_HEIGHT, MassSort, Spot
 from scengen.validate.rebuilt import world_of
 
 TASK = load_task("mass_sort")
 SCENE = MassSort()
 
 
-def put_there(scenario, places):
-    """The world after half a second in which nobody acts, with every cube in the zone of a rank, or where it is."""
+def put_there(scenario, places, probed=True):
+    """The world after half a second in which nobody acts, with every cube in the zone of a rank, or where it is.
+
+    The memory holds that each cube has been lifted, or all but the last one.
+    """
     world = load(TASK, scenario)
+    with world.events():
+        for cube in scenario.cubes if probed else scenario.cubes[:-1]:
+            world.memory[f"lifted_{cube}"] = 1.0
     for cube, rank in zip(scenario.cubes, places, strict=True):
         if rank is not None:
             at = world.model.jnt_qposadr[world.model.body(cube).jntadr[0]]
@@ -57,6 +65,25 @@ def test_the_goal_is_the_order_of_the_masses_and_every_other_one_is_lost(order):
 def test_two_cubes_in_their_zones_are_not_the_goal_and_lose_nothing():
     world = put_there(SCENE, [*SCENE.ranks[:2], None])
     assert not SCENE.success(world) and SCENE.failure(world) is None
+
+
+def test_a_cube_in_its_zone_loses_the_episode_unless_each_has_been_lifted():
+    """Negative control: the same cubes in the same places, with the last one lifted as well."""
+    places = [SCENE.ranks[0], None, None]
+    told = "a cube was put into a zone before each had been lifted"
+    assert SCENE.failure(put_there(SCENE, places, probed=False)) == told
+    assert SCENE.failure(put_there(SCENE, places)) is None
+
+
+def test_lifted_is_a_centimetre_up_in_the_hand():
+    world = load(TASK, SCENE)
+    episode, first = Episode(SCENE, world), SCENE.cubes[0]
+    for action in SCENE.take(world, first, 0.04):
+        episode.step(world.filter(action))
+        risen = world.com(first)[2] - SCENE.edge / 2 - TABLE_TOP
+        if abs(risen - PROBE_HEIGHT) > 0.002:  # the height of a period ago counts
+            assert world.memory[f"lifted_{first}"] == (risen > PROBE_HEIGHT)
+    assert [world.memory[f"lifted_{cube}"] for cube in SCENE.cubes] == [1.0, 0.0, 0.0]
 
 
 def test_mirrored_zones_ask_for_the_order_from_right_to_left():
@@ -176,7 +203,7 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
 
 def test_a_scene_in_the_order_in_which_the_cubes_lie_would_be_solved_blindly():
     lying = unchecked(MassSort)(order=0)
-    assert play(TASK, lying, lambda world: lying.deliver(world, dict(zip(lying.cubes, (0, 1, 2), strict=True)))).solved
+    assert play(TASK, lying, lambda world: lying.answer().act(world, 0.0)).solved
     not_certified(TASK, unchecked(Sorted)(), "unsolved", "the goal holds")
 
 
