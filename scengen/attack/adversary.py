@@ -13,6 +13,7 @@ from .macros import Macro
 from .player import Attempt, Node, Played, Player
 from .priors import Prior, guesses
 from .retries import RETRY, retries
+from .servo import SERVO, servo
 from .signature import Signature
 from .variations import FOREIGN, WITNESS, foreign, perturbed
 
@@ -24,8 +25,17 @@ RANDOM = "random"
 """Tier of random plans."""
 SEARCH = "search"
 """Tier of the search that starts from states of the archive."""
-TIER_SHARES = {SHORTCUT: 0.10, PRIOR: 0.10, RETRY: 0.30, FOREIGN: 0.08, WITNESS: 0.14, RANDOM: 0.14, SEARCH: 0.14}
-"""Share of the rollouts for each tier, in the order in which they are played. Rollouts that a tier does not use go to
+TIER_SHARES = {
+    SHORTCUT: 0.10,
+    PRIOR: 0.10,
+    SERVO: 0.20,
+    RETRY: 0.30,
+    FOREIGN: 0.08,
+    WITNESS: 0.14,
+    RANDOM: 0.14,
+    SEARCH: 0.14,
+}
+"""Relative share of the rollouts of each tier, in the order in which they are played. Rollouts that a tier leaves go to
 the last one."""
 TIERS = tuple(TIER_SHARES)
 """All tiers, in the order in which they are played."""
@@ -192,7 +202,7 @@ class Attack:
         if tier == PRIOR:
             yield from guesses(self.priors)
             return
-        lists = {SHORTCUT: shortcuts, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
+        lists = {SHORTCUT: shortcuts, SERVO: servo, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
         whole = list(lists[tier](player))
         for k in range(self.of):  # its own part first, then those of the others
             yield from islice(whole, (self.number + k) % self.of, None, self.of)
@@ -249,5 +259,8 @@ def _first_move(attempt: Attempt) -> tuple[int | None, str, str]:
     if not attempt.macros:
         return attempt.stage, "", ""
     one = attempt.macros[0]
-    what = str(one.numbers) if one.kind in ("follow", "answer", "shake", "turn", "move") else one.target
+    if one.kind in ("pursue", "pin", "block", "cradle"):
+        what = f"{one.target} {one.numbers}"
+    else:
+        what = str(one.numbers) if one.kind in ("follow", "answer", "shake", "turn", "move") else one.target
     return attempt.stage, f"{one.kind} {one.arm}", what

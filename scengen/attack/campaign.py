@@ -25,7 +25,7 @@ from .evidence import Hit, TierRate, rates, unsound
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
-GRAMMAR = 1
+GRAMMAR = 2
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""

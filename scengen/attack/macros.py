@@ -13,6 +13,13 @@
 | catch   | body     | longest wait [s]                                                             |
 | wait    |          | seconds                                                                      |
 | go      |          | place of the hand [m], its orientation as a rotation vector, grip            |
+| pursue  | body     | lead [s]                                                                     |
+| pin     | body     | lead [s]                                                                     |
+| block   | body     | lead [s]                                                                     |
+| take    | body     | skew of the jaw from the body's narrow side [rad]                            |
+| cradle  | body     | direction of the hand [rad], its pitch [rad], depth [m]                      |
+| touch   | body     | with the body in the hand                                                    |
+| bring   | body     | goal of its centre [m], height over it [m], turn of the hand [rad], drop [m] |
 
 Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use the body in the hand.
 """
@@ -24,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.loop import Loop
+from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, heading, rotation
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan
@@ -31,6 +39,7 @@ from ..sim.world import ROBOT, Arm, World
 from ..skills import suction
 from ..skills.jaw import grasp, release
 from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hold, push, retreat, turn_to
+from . import plans
 from .solids import Solid, held
 
 FAST = Pace(0.30, 0.02, give_up=2.5)
@@ -226,6 +235,46 @@ def _go(field: MacroContext, macro: Macro) -> Plan:
     yield from go_to(field.arm, [x, y, z], rotation(np.array([a, b, c])), APPROACH, grip)
 
 
+# --- feedback plans -----------------------------------------------------------------------------
+
+
+def _pursue(field: MacroContext, macro: Macro) -> Plan:
+    return plans.pursue(field.arm, macro.target, *macro.numbers)
+
+
+def _pin(field: MacroContext, macro: Macro) -> Plan:
+    return plans.press_and_pick(field.arm, macro.target, *macro.numbers)
+
+
+def _block(field: MacroContext, macro: Macro) -> Plan:
+    return plans.block_and_pick(field.arm, macro.target, *macro.numbers)
+
+
+def _take(field: MacroContext, macro: Macro) -> Plan:
+    return plans.pick_where_it_is(field.arm, macro.target, *macro.numbers)
+
+
+def _cradle(field: MacroContext, macro: Macro) -> Plan:
+    return plans.cradle(field.arm, macro.target, *macro.numbers)
+
+
+def _touch(field: MacroContext, macro: Macro) -> Plan:
+    """Move the body in the hand straight to another one until they touch."""
+    load = held(field.arm)
+    if load is None:
+        raise GaveUp("no body in the hand")
+    way = field.solids[macro.target].centre(field.world) - field.world.com(load)
+    velocity = 0.1 * way / max(float(np.linalg.norm(way)), 1e-9)
+    yield from plans.touch_with(field.arm, load, field.solids[macro.target].body, velocity)
+
+
+def _bring(field: MacroContext, macro: Macro) -> Plan:
+    x, y, z, over, skew, drop = macro.numbers
+    if held(field.arm) != macro.target:
+        raise GaveUp(f"{macro.target} is not in the hand")
+    yield from plans.carry_to(field.arm, macro.target, [x, y, z], over, skew, drop)
+
+
 KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "pick": _pick,
     "push": _push,
@@ -239,6 +288,13 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "catch": _catch,
     "wait": _wait,
     "go": _go,
+    "pursue": _pursue,
+    "pin": _pin,
+    "block": _block,
+    "take": _take,
+    "cradle": _cradle,
+    "touch": _touch,
+    "bring": _bring,
 }
 """The plan of each kind of macro."""
 

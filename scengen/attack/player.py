@@ -11,6 +11,7 @@ from ..control.loop import Loop
 from ..control.teleop import unfiltered
 from ..episode import Actions, Episode, Outcome
 from ..errors import BadConfig, GaveUp
+from ..geometry import Vec3
 from ..scenario import Plan, Scenario
 from ..sim.world import World
 from ..validate.rollout import Stillness
@@ -146,6 +147,25 @@ class Player:
     def rewind(self, k: int | None = None) -> None:
         """Put the world at stage `k` of the witness, or at the start, so that a plan can be made for it."""
         self.world.restore(self.start.state if k is None else self.trace.stages[k].state)
+
+    def start_place(self, body: str) -> Vec3:
+        """Position of a body's centre of mass at the start [m]."""
+        self.rewind()
+        return self.world.com(body)
+
+    def goal_place(self, body: str) -> Vec3:
+        """Position of a body's centre of mass at the end of the witness [m]."""
+        self.rewind(len(self.trace.stages) - 1)
+        return self.world.com(body)
+
+    def place_after(self, seconds: float) -> dict[str, Vec3]:
+        """Positions of the free bodies' centres of mass after a time without action, from the start [m]."""
+        world = self.world
+        world.restore(self.start.state)
+        episode = Episode(self.scenario, world, self.horizon)
+        for _ in range(round(seconds / Loop.PERIOD)):
+            episode.step(world.filter(world.idle))
+        return {body: world.com(body) for body in world.free_bodies}
 
     def signature(self) -> Signature:
         """The signature of the episode so far."""

@@ -52,7 +52,7 @@ def _by(arm: Arm, attempts: Iterator[Attempt]) -> Iterator[Attempt]:
 def carried(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body is picked, then pushed against, placed on and pressed on every other body."""
     for one, other in _pairs(player, arm):
-        for pick in _picks(player, arm, one):
+        for pick in picks(player, arm, one):
             pushes = tuple(Macro("push", other.name, (angle, 0.75, 0.0, 0.12, 0.2)) for angle in _angles(player, other))
             yield Attempt(RETRY, (pick, *pushes[:2]))
             yield Attempt(RETRY, (pick, *pushes[2:]))
@@ -74,7 +74,7 @@ def bare(player: Player, arm: Arm) -> Iterator[Attempt]:
 def placed(player: Player, arm: Arm) -> Iterator[Attempt]:
     """Every graspable free body is put down at several places of a face, one after the other."""
     for one, other in _pairs(player, arm):
-        for pick in _picks(player, arm, one)[:1]:
+        for pick in picks(player, arm, one)[:1]:
             moves: list[Macro] = []
             for share in FACE_SHARES:
                 moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
@@ -146,7 +146,8 @@ def _targets(player: Player) -> list[Solid]:
     return sorted(found, key=lambda solid: (solid.name != solid.body, order[solid.name]))
 
 
-def _picks(player: Player, arm: Arm, solid: Solid) -> list[Macro]:
+def picks(player: Player, arm: Arm, solid: Solid) -> list[Macro]:
+    """A macro that picks a solid at the start, across its side with the most clearance; none if no jaw fits."""
     player.rewind()
     fits = [0] if arm.suction else sides(player.world, player.solids, solid)[:1]
     return [Macro("pick", solid.name, (0.6, 0.0, float(which), 0.2)) for which in fits]

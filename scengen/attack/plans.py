@@ -1,0 +1,247 @@
+"""Feedback plans around a puzzle: pursue, press down, stand in the way, cradle, loosen, carry through narrow ways.
+
+People who attack a task by hand begin here (`docs/cheats.md`), and so does the tier `servo` of the adversary. The plans
+know bodies and arms, but no task. They read poses and velocities as a policy with a good camera would, and no parameter
+of the scenario.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..assets.prop import TABLE_TOP
+from ..errors import GaveUp
+from ..geometry import UP, Mat3, Vec3, about_z, between
+from ..robots.jaw import TIP_BELOW
+from ..scenario import Plan
+from ..sim.world import Arm
+from ..skills.jaw import grasp, release
+from ..skills.motion import (
+    CLOSED,
+    COARSE,
+    FINE,
+    OPEN,
+    STEADY,
+    Pace,
+    closing_along,
+    facing,
+    go_to,
+    hold,
+    push,
+    retreat,
+    steer,
+)
+from .solids import solids
+
+HOVER_HEIGHT = 0.06
+"""Height above a body at which a hand follows it before it comes down [m]."""
+LOWEST_HAND = TABLE_TOP + TIP_BELOW + 0.003
+"""Lowest position of the grip site of a hand that points down [m]: the tips keep 3 mm from the table."""
+SLOW = 0.02
+"""Speed below which a body counts as stopped [m/s]."""
+STEP_BACK = Pace(0.15, 0.01, 2.0)
+"""Pace away from a body."""
+LIFT = 0.12
+"""Height by which a grasped body is lifted [m]."""
+
+
+def velocity_of(arm: Arm, body: str) -> Vec3:
+    """Linear velocity of a body's centre of mass [m/s], world axes."""
+    return arm.world.velocity(body)[3:]
+
+
+def pursue(
+    arm: Arm, body: str, lead: float = 0.0, skew: float = math.pi / 2, within: float = 0.012, seconds: float = 12.0
+) -> Plan:
+    """Follow a moving body by feedback, come down on it as it moves, close the jaw, lift it.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        lead: time by which the hand is ahead of the body on its present course [s].
+        skew: angle from the body's course to the closing direction of the jaw [rad].
+        within: distance at which the jaw closes [m].
+        seconds: time limit [s].
+    """
+    world = arm.world
+    end, height = world.time + seconds, HOVER_HEIGHT
+    while world.time < end:
+        velocity = velocity_of(arm, body)
+        goal = world.com(body) + lead * velocity
+        goal[2] = max(goal[2], LOWEST_HAND) + height
+        level = np.linalg.norm((goal - arm.hand)[:2])
+        if level < 2 * within:
+            height = max(0.0, height - 0.003)
+        if height == 0.0 and np.linalg.norm(goal - arm.hand) < within:
+            break
+        yield steer(arm, goal, velocity, between(arm.hand_rot, _across(arm, velocity, skew)), OPEN)
+    for _ in range(30):
+        velocity = velocity_of(arm, body) if arm.gap > 0.01 else np.zeros(3)
+        goal = world.com(body).copy()
+        goal[2] = max(goal[2], LOWEST_HAND)
+        yield steer(arm, goal, velocity, np.zeros(3), CLOSED)
+    yield from retreat(arm, LIFT)
+
+
+def press_and_pick(arm: Arm, body: str, lead: float = 0.15, seconds: float = 12.0) -> Plan:
+    """Press a moving body to what it lies on with closed fingers, wait until it has stopped, pick it up.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        lead: time by which the fingers are ahead of the body on its present course [s].
+        seconds: time limit of the pursuit [s].
+    """
+    world = arm.world
+    end, height, top = world.time + seconds, HOVER_HEIGHT, extent(arm, body, UP) + TIP_BELOW
+    while world.time < end and not world.touching(arm.label, body):
+        velocity = velocity_of(arm, body)
+        goal = world.com(body) + lead * velocity
+        goal[2] += top + height
+        if np.linalg.norm((goal - arm.hand)[:2]) < 0.02:
+            height -= 0.004
+        yield steer(arm, goal, velocity, between(arm.hand_rot, _across(arm, velocity, math.pi / 2)), CLOSED)
+    yield from hold(arm, 0.4, CLOSED)
+    yield from pick_where_it_is(arm, body)
+
+
+def block_and_pick(arm: Arm, body: str, lead: float = 0.3, seconds: float = 15.0) -> Plan:
+    """Stand in the way of a moving body with closed fingers, wait until it has stopped, pick it up.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        lead: time by which the fingers are ahead of the body on its present course [s].
+        seconds: time limit [s].
+    """
+    world = arm.world
+    end = world.time + seconds
+    while world.time < end:
+        velocity = velocity_of(arm, body)
+        if world.touching(arm.label, body) and np.linalg.norm(velocity) < SLOW:
+            break
+        goal = world.com(body) + lead * velocity
+        goal[2] = max(float(world.com(body)[2]), LOWEST_HAND)
+        yield steer(arm, goal, np.zeros(3), between(arm.hand_rot, _across(arm, velocity, 0.0)), CLOSED)
+    yield from go_to(arm, arm.hand + 0.05 * UP, pace=STEP_BACK)
+    yield from pick_where_it_is(arm, body)
+
+
+def cradle(arm: Arm, body: str, azimuth: float, pitch: float, depth: float = 0.0, raise_by: float = LIFT) -> Plan:
+    """Put closed fingers under a body from the side, with the hand looking upwards, and lift it without a grasp.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        azimuth: direction in which the hand looks, from above [rad].
+        pitch: angle by which the hand looks above the horizontal [rad].
+        depth: distance of the tips beyond the body's centre [m].
+        raise_by: height by which the body is raised [m].
+    """
+    world = arm.world
+    rot = facing(azimuth, -pitch)
+    out = rot[:, 2]
+    below = world.com(body) - extent(arm, body, UP) * UP
+    start = below - (0.08 + extent(arm, body, out)) * out
+    start[2] = max(start[2], TABLE_TOP + 0.03)
+    yield from go_to(arm, start + 0.12 * UP, rot, COARSE, CLOSED)
+    yield from go_to(arm, start, rot, STEADY, CLOSED)
+    yield from go_to(arm, below + depth * out + [0.0, 0.0, 0.012], rot, FINE, CLOSED)
+    yield from go_to(arm, arm.hand + raise_by * UP, rot, FINE, CLOSED)
+
+
+def pick_where_it_is(arm: Arm, body: str, skew: float = 0.0, lift: float = LIFT) -> Plan:
+    """Pick up a body from above at its present place, across its narrow level side.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        skew: turn of the hand from the narrow side [rad]; a quarter turn puts the hand's narrow side along the body.
+        lift: height by which the body is lifted [m].
+    """
+    world = arm.world
+    at = world.com(body)
+    at[2] = max(at[2], LOWEST_HAND)
+    rot = closing_along(arm, about_z(skew) @ narrow_direction(arm, body))
+    yield from go_to(arm, [*at[:2], max(at[2] + HOVER_HEIGHT, arm.hand[2])], rot, COARSE, OPEN)
+    yield from go_to(arm, at, rot, FINE, OPEN)
+    yield from grasp(arm)
+    yield from retreat(arm, lift)
+
+
+def carry_to(arm: Arm, body: str, goal: ArrayLike, over: float, skew: float | None = None, drop: float = 0.0) -> Plan:
+    """Carry a held body to a place and let it go: over an obstacle, or along the table with a turned hand.
+
+    Args:
+        arm: the arm.
+        body: name of the held body.
+        goal: final position of the body's centre of mass [m].
+        over: height above the goal at which it is carried [m].
+        skew: yaw of the hand while it carries, from its present one [rad]; None to keep it.
+        drop: height from which the body is let go [m].
+    """
+    world, target = arm.world, np.asarray(goal, float)
+    rot = arm.hand_rot if skew is None else about_z(skew) @ arm.hand_rot
+    lag = arm.hand - world.com(body)
+    yield from go_to(arm, [*arm.hand[:2], max(arm.hand[2], target[2] + over + lag[2])], rot, STEADY, CLOSED)
+    lag = arm.hand - world.com(body)
+    yield from go_to(arm, [*(target + lag)[:2], target[2] + over + lag[2]], rot, STEADY, CLOSED)
+    yield from go_to(arm, target + lag + drop * UP, rot, FINE, CLOSED)
+    yield from release(arm)
+    yield from retreat(arm, 0.08)
+
+
+def touch_with(arm: Arm, body: str, other: str, along: ArrayLike, seconds: float = 4.0) -> Plan:
+    """Move a held body until it touches another one, as a latch asks, and back again.
+
+    Args:
+        arm: the arm.
+        body: name of the held body.
+        other: name of the body that it has to touch.
+        along: velocity of the hand [m/s], shape (3,).
+        seconds: time limit [s].
+    """
+    world, way = arm.world, np.asarray(along, float)
+    try:
+        yield from push(arm, way, lambda: world.touching(body, other), CLOSED, seconds)
+    finally:
+        back = arm.hand - 0.02 * way / max(float(np.linalg.norm(way)), 1e-9)
+    yield from go_to(arm, back, pace=STEP_BACK, grip=CLOSED)
+
+
+def loosen(arm: Arm, body: str, shift: ArrayLike, periods: int = 3) -> Plan:
+    """Open the jaw for some periods around a held body, close it again, and shift the hand where the body slipped.
+
+    Args:
+        arm: the arm.
+        body: name of the held body.
+        shift: displacement of the hand between opening and closing [m], shape (3,).
+        periods: control periods for which the jaw opens.
+    """
+    move = np.asarray(shift, float)
+    for _ in range(periods):
+        yield steer(arm, arm.hand + move / periods, np.zeros(3), np.zeros(3), OPEN)
+    yield from grasp(arm)
+    if not arm.world.touching(arm.label, body):
+        raise GaveUp(f"{body} slipped out of the loosened jaw")
+
+
+def narrow_direction(arm: Arm, body: str) -> Vec3:
+    """The level direction along which a body is narrowest, as a unit vector."""
+    directions = [about_z(math.radians(angle)) @ np.array([1.0, 0.0, 0.0]) for angle in range(0, 180, 10)]
+    solid = solids(arm.world)[body]
+    return directions[int(np.argmin([solid.reach(arm.world, u) for u in directions]))]
+
+
+def extent(arm: Arm, body: str, direction: Vec3) -> float:
+    """Extent of a body from its middle in a direction, a unit vector [m]."""
+    return solids(arm.world)[body].reach(arm.world, direction)
+
+
+def _across(arm: Arm, velocity: Vec3, skew: float) -> Mat3:
+    """Orientation of a hand that points down and closes at an angle to a velocity; unchanged for a body at rest."""
+    speed = math.hypot(velocity[0], velocity[1])
+    if speed < SLOW:
+        return arm.hand_rot
+    return closing_along(arm, about_z(skew) @ (np.array([velocity[0], velocity[1], 0.0]) / speed))

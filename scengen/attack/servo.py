@@ -1,0 +1,124 @@
+"""Tier of feedback plans: pursue, press down, block, cradle, and carry to the place where the witness leaves a body.
+
+The plans are those of `plans`, which know no task. Each attempt is for one body that the robot handles in the witness,
+with a few leads, directions and routes. Jaws alone play this tier.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product, zip_longest
+
+import numpy as np
+
+from ..geometry import Vec3
+from ..sim.world import Arm
+from .macros import Macro
+from .player import Attempt, Player
+from .retries import picks
+
+SERVO = "servo"
+"""Tier of feedback plans."""
+
+PURSUIT_LEADS = (0.1, 0.0, 0.2, 0.35)
+"""Times by which a pursuing hand is ahead of a body [s]."""
+BLOCK_LEADS = (0.3, 0.15, 0.6)
+"""Times by which fingers that press or block are ahead of a body [s]."""
+PITCHES = (math.radians(20.0), math.radians(8.0))
+"""Angles by which a cradling hand looks above the horizontal [rad]."""
+SIDES = (0.0, math.radians(50.0), math.radians(-50.0))
+"""Directions from which a body is cradled, from that of the robot's base [rad]."""
+ROUTES = ((0.005, math.pi / 2), (0.12, 0.0), (0.005, 0.0), (0.25, 0.0), (0.12, math.pi / 2))
+"""Ways to carry a body: height above its goal [m], and turn of the hand [rad], a quarter of which puts its narrow side
+across the way."""
+DROPS = (0.0, 0.04)
+"""Heights from which a carried body is let go [m]."""
+IDLE_TIME = 2.0
+"""Time without action after which bodies that move by themselves are known [s]."""
+MIN_MOTION = 0.03
+"""Displacement in this time above which a body moves by itself [m]."""
+
+
+def servo(player: Player) -> Iterator[Attempt]:
+    """All attempts, for every arm with a jaw and every handled body in turn, the most promising ones first."""
+    jaws = [arm for arm in player.world.arms if not arm.suction]
+    bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
+    families = [made(player, arm, body) for arm, body in product(jaws, bodies) for made in (chased, carried, cradled)]
+    if len(bodies) > 1:
+        families = [*(all_carried(player, arm, bodies) for arm in jaws), *families]
+    for round_ in zip_longest(*families):
+        yield from (attempt for attempt in round_ if attempt)
+
+
+def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
+    """Pursue, press down and block a body that moves by itself; then carry it to its goal if it is not reached yet."""
+    if body not in moving(player):
+        return
+    rest = bring(player, arm, body, *ROUTES[1], 0.0)
+    plans = [("pursue", PURSUIT_LEADS), ("pin", BLOCK_LEADS), ("block", BLOCK_LEADS)]
+    for leads in zip_longest(*(leads for _, leads in plans)):
+        for (kind, _), lead in zip(plans, leads, strict=True):
+            if lead is not None:
+                yield Attempt(SERVO, (Macro(kind, body, (lead,), arm.number), rest))
+
+
+def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
+    """Pick a body, touch with it what it touched in the witness, and carry it to its goal by every route."""
+    pick = taking(player, arm, body)
+    touches = [Macro("touch", other, (), arm.number) for other in touched_by(player, body)]
+    for drop, (over, skew) in product(DROPS, ROUTES):
+        goal = bring(player, arm, body, over, skew, drop)
+        yield Attempt(SERVO, (pick, goal))
+        if touches:
+            yield Attempt(SERVO, (pick, *touches, goal))
+
+
+def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
+    """Every handled body in the order of the witness: take it, touch with it what it touched, carry it to its goal."""
+    for drop, (over, skew) in product(DROPS, ROUTES):
+        for touching in (True, False):
+            moves: list[Macro] = []
+            for body in bodies:
+                touches = [Macro("touch", other, (), arm.number) for other in touched_by(player, body)]
+                taken = [taking(player, arm, body), *(touches if touching else [])]
+                moves += [*taken, bring(player, arm, body, over, skew, drop)]
+            yield Attempt(SERVO, tuple(moves))
+
+
+def cradled(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
+    """Lift a body on closed fingers, from the side of the robot and beside it, and carry it to its goal."""
+    base = math.atan2(*(player.start_place(body) - arm.hand)[[1, 0]])
+    for pitch, side in product(PITCHES, SIDES):
+        way = player.goal_place(body) - player.start_place(body)
+        cradle = Macro("cradle", body, (base + side, pitch, 0.0), arm.number)
+        over = Macro("move", "", (float(way[0]), float(way[1]), 0.0, 0.15), arm.number)
+        yield Attempt(SERVO, (cradle, over, Macro("move", "", (0.0, 0.0, -0.14, 0.1), arm.number)))
+        yield Attempt(SERVO, (cradle,))
+
+
+def taking(player: Player, arm: Arm, body: str) -> Macro:
+    """A macro that picks a body across the side with the most clearance, or else across its narrowest side."""
+    found = picks(player, arm, player.solids[body])
+    return replace(found[0], arm=arm.number) if found else Macro("take", body, (0.0,), arm.number)
+
+
+def bring(player: Player, arm: Arm, body: str, over: float, skew: float, drop: float) -> Macro:
+    """A macro that carries a held body to the place where the witness leaves it."""
+    return Macro("bring", body, (*map(float, player.goal_place(body)), over, skew, drop), arm.number)
+
+
+def touched_by(player: Player, body: str) -> tuple[str, ...]:
+    """Bodies of the scene that a body touches for the first time in the witness, in order; the robot is none."""
+    solids = player.solids
+    pairs = [pair for _, pair in player.trace.events if body in pair]
+    others = (other for pair in pairs for other in pair if other != body and other in solids)
+    return tuple(dict.fromkeys(others))
+
+
+def moving(player: Player) -> frozenset[str]:
+    """Free bodies that move by themselves at the beginning of an episode."""
+    world = player.world
+    player.rewind()
+    before: dict[str, Vec3] = {body: world.com(body) for body in world.free_bodies}
+    after = player.place_after(IDLE_TIME)
+    return frozenset(body for body, place in after.items() if np.linalg.norm(place - before[body]) > MIN_MOTION)

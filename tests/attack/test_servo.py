@@ -1,0 +1,60 @@
+"""The tier of feedback plans finds what a look at the ball and a steady hand find; its macros are data and replay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scengen.attack.adversary import Attack
+from scengen.attack.player import Player
+from scengen.attack.servo import SERVO, moving, servo, touched_by
+from scengen.compose import load_task
+from scengen.sim.world import World
+from scengen.validate.rebuilt import rebuild
+from scengen.validate.rollout import run
+
+
+def player_of(name, change=lambda scenario: scenario):
+    """A player on the first training draw of a task, with the oracle's actions as its witness."""
+    task = load_task(name)
+    scenario = change(task.draw("id", 11, 0).scenario)
+    text = rebuild(scenario)
+    found = run(scenario, World.load(text, task.embodiment), scenario.oracle, task.horizon)
+    assert found.solved, found.reason
+    return Player(scenario, text, task.embodiment, task.horizon, found.actions)
+
+
+def slow(scenario):
+    """The ball rolls so slowly that a hand can follow it."""
+    return replace(scenario, speed=0.12)
+
+
+@pytest.fixture(scope="module")
+def rolling():
+    return player_of("linear_intercept", slow)
+
+
+def test_a_slow_ball_is_pursued_and_grasped(rolling):
+    result = Attack(rolling, seed=0).run(24, (SERVO,))
+    found = [hit for hit in result.hits if str(hit.plan).startswith("pursue ball")]
+    assert found, "a stiff pursuit of where the ball is grasps it"
+    assert result.rates[0].rollouts > 0 and {rate.tier for rate in result.rates} == {SERVO}
+
+
+def test_attempts_are_data_and_give_the_same_bits(rolling):
+    attempt = next(servo(rolling))
+    one, other = (rolling.play(attempt.macros, raw=False) for _ in range(2))
+    assert one.digest == other.digest and np.array_equal(one.actions, other.actions)
+
+
+def test_only_bodies_that_move_by_themselves_are_chased(rolling):
+    assert moving(rolling) == {"ball"}
+    still = player_of("tool_retrieve")
+    assert not moving(still) and not [a for a in servo(still) if a.macros[0].kind in ("pursue", "pin", "block")]
+
+
+def test_what_a_body_touches_in_the_witness_is_touched_first():
+    player = player_of("tool_retrieve")
+    kinds = [[macro.kind for macro in attempt.macros] for attempt in servo(player)]
+    assert "hook" in touched_by(player, "cube")
+    assert any(row[0] in ("take", "pick") and "touch" in row and row[-1] == "bring" for row in kinds)
