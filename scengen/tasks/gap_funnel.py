@@ -20,6 +20,8 @@ Decisions where the paper (App. B, T21) is silent:
   the gap, or be tried again.
 * The ball may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass
   over it while the jaw holds the ball on the table.
+* The robot may not touch the ball once its centre is beyond the middle of the wall. The paper has no such rule; it is
+  ours. The hand's narrow side, 63 mm, fits through the gap: a ball could be dragged through in the jaw and nudged on.
 * "Outside the robot's workspace" is beyond a bound that no posture of the arm exceeds (`panda.REACH`).
 * A kerb behind the zone stops a ball that is too fast. Without it the speed would have to be right to 8 %, and the
   speed of a ball that a finger pushes scatters by 10 %: it rolls ahead of a hand that moves unevenly.
@@ -113,6 +115,8 @@ class GapFunnel(Scenario):
             return "the ball fell off the table"
         if world.touched("ball", "wall"):
             return "the ball struck the wall"
+        if world.touching(ROBOT, "ball") and (world.com("ball") - self.gap_at) @ self.normal > 0.0:
+            return "the robot touched the ball behind the wall"
         return "the ball was lifted" if world.com("ball")[2] - self.start[2] > MAX_RISE else None
 
     # --- oracle ---------------------------------------------------------------------------
