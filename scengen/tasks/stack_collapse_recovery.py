@@ -15,8 +15,9 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
 
 * The goal is the tower that stood: the same cubes in the same order, anywhere, at rest and untouched for a second.
 * The blow is an impulse through the centre of mass of each cube that it throws down, within one control period. It
-  comes when the tower has stood untouched for a hidden time, so holding the tower only delays it. Afterwards a tower
-  counts only if its top cube has lain on the table.
+  comes when the tower has stood untouched for a hidden time, so holding the tower only delays it. So does a hand that
+  is low beside the tower (a strict rule that the paper lacks): open fingers stopped a top cube that was struck alone,
+  and a plan made before the blow sufficed. Afterwards a tower counts only if its top cube has lain on the table.
 * "In different directions": the top cube falls to the left and the middle one to the right; on an axis the other way
   round. The robot stands in front of the tower: it reaches both sides equally well, but not far behind or before it.
 * "Mass distribution": a cube over the middle of a larger one cannot tip, because its centre of mass is over the larger
@@ -24,8 +25,8 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
   top cube is wider than the middle one and has its weight on one side, which is dark: placed middle over middle it
   tips. If it comes to lie with that side up or down, middle over middle is stable; a shortcut refutes such scenarios.
 
-Only the horizon limits the time: two cubes take 18 s of 32 s. A cube may be put down half the edge of the one below
-from its middle, 20 mm and more; the oracle places it within 3 mm. Each finger has 12 mm of clearance beside a cube.
+Two cubes take 18 s of 32 s. A cube may be put down half the edge of the one below from its middle, 20 mm and more; the
+oracle places it within 3 mm. Each finger has 12 mm of clearance beside a cube.
 """
 
 import math
@@ -57,14 +58,14 @@ REST_SPEED = 0.01  # speed below which a cube counts as at rest [m/s]
 CARRY_HEIGHT = 0.03
 """Height above the tower at which a cube is carried, and above a released cube to which the hand rises [m]."""
 CARRY_PACE = Pace(0.30, 0.008)  # pace of moves above the cubes
+GUARD_CLEARANCE = 0.02  # least clearance over the tower of a hand beside it that does not delay the blow [m]
 MIN_EDGE_DIFFERENCE = 0.004  # least difference between the edges of two cubes [m]
 MIN_DISTANCE = 0.30
-"""Least distance from the robot's first axis at which a hand that points down takes a cube from the table [m]:
-measured."""
+"""Least distance from the robot's first axis at which a hand that points down takes a cube [m]: measured."""
 MAX_DISTANCE = 0.75  # largest such distance [m]: measured
 MEMORY = ("blows", "stood", "fell")
-"""Number of blows so far; time for which the tower has stood untouched [s]; whether its top cube has lain on the table
-since the last blow."""
+"""Number of blows so far; time for which the tower has stood untouched, with no low hand beside it [s]; whether its top
+cube has lain on the table since the last blow."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,8 +119,7 @@ class StackCollapseRecovery(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        struck = world.memory["blows"] == self.blows and world.memory["fell"] > 0
-        return struck and self.stands(world)
+        return world.memory["blows"] == self.blows and world.memory["fell"] > 0 and self.stands(world)
 
     def stands(self, world: World) -> bool:
         """Whether each cube rests on the one that was below it, and nothing else touches the cubes."""
@@ -135,12 +135,21 @@ class StackCollapseRecovery(Scenario):
         """Strike once the tower has stood for its time; notice when its top cube lies on the table."""
         memory = world.memory
         memory["fell"] = max(memory["fell"], float(world.touching("top", "table")))
-        memory["stood"] = memory["stood"] + Loop.PERIOD if self.stands(world) else 0.0
+        stands = self.stands(world) and not self.guarded(world)
+        memory["stood"] = memory["stood"] + Loop.PERIOD if stands else 0.0
         number = int(memory["blows"])
         if number < self.blows and memory["stood"] >= self.planned[number].when - 1e-9:
             memory["blows"], memory["stood"], memory["fell"] = number + 1, 0.0, 0.0
             for name, velocity in self.velocities(self.planned[number]).items():
                 world.force(name, self.cubes[name].mass / Loop.PERIOD * velocity)
+
+    def guarded(self, world: World) -> bool:
+        """Whether the hand is so low beside the top cube that it could stop it."""
+        hand, rot, top = world.arm.hand, world.arm.hand_rot, world.com("top")
+        tips = TIP_BELOW * rot[2, 2] - SPAN / 2 * abs(rot[2, 0])
+        palm = -PALM_ABOVE * rot[2, 2] - PALM_ALONG * abs(rot[2, 0])
+        low = hand[2] + min(tips, palm) < extent(world, "top", UP)[1] + GUARD_CLEARANCE
+        return bool(low and math.dist(hand[:2], top[:2]) < 0.25)  # the palm reaches 0.10 m to either side
 
     def pending(self, world: World) -> bool:
         """Whether a blow is still to come: the first one, or another one while the tower stands."""
@@ -186,7 +195,7 @@ class StackCollapseRecovery(Scenario):
         if not by_mass:
             at[:2] += (world.com(name) - self.centre(world, name))[:2]
         yield from put(world.arm, name, at, on=below, hover=CARRY_HEIGHT)
-        yield from retreat(world.arm, self.cubes[name].edge / 2 + CARRY_HEIGHT)
+        yield from retreat(world.arm, self.cubes[name].edge / 2 + 2 * CARRY_HEIGHT)  # ends up to 2 cm short
 
     def take(self, world: World, name: str) -> Plan:
         """Grasp a cube by two of its sides and lift it above the tower."""
@@ -224,10 +233,8 @@ class StackCollapseRecovery(Scenario):
         least, yaw = math.inf, math.atan2(grip.closing[1], grip.closing[0])
         for other in NAMES:
             top = extent(world, other, UP)[1]
-            for bottom, size in (
-                (-TIP_BELOW, (SPAN, 2 * FINGER_ACROSS)),
-                (PALM_ABOVE, (2 * PALM_ALONG, 2 * PALM_ACROSS)),
-            ):
+            fingers, palm = (SPAN, 2 * FINGER_ACROSS), (2 * PALM_ALONG, 2 * PALM_ACROSS)
+            for bottom, size in ((-TIP_BELOW, fingers), (PALM_ABOVE, palm)):
                 if other != name and top > grip.at[2] + bottom:
                     least = min(least, gap(corners(grip.at, yaw, size), self.outline(world, other)))
         return least
@@ -367,8 +374,7 @@ class StackCollapseRecovery(Scenario):
 
         The middle cube carries the top one for the first half of its way, because the top one moves the other way.
         """
-        rank = NAMES.index(name)
-        way, load = self.cubes[NAMES[rank - 1]].edge / math.sqrt(2), 0.0
+        way, load = self.cubes[NAMES[NAMES.index(name) - 1]].edge / math.sqrt(2), 0.0
         if name == "middle":
             load = self.top.mass / self.middle.mass * self.middle.edge / 2
         return math.sqrt(2 * self.cubes[name].friction * GRAVITY * (way + load))

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -22,8 +23,10 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.physics import GRAVITY
+from scengen.robots.jaw import TIP_BELOW
 from scengen.sim.world import IDLE
-from scengen.tasks.stack_collapse_recovery import NAMES, Blow, StackCollapseRecovery
+from scengen.skills.motion import FINE, OPEN, go_to, hold
+from scengen.tasks.stack_collapse_recovery import GUARD_CLEARANCE, NAMES, Blow, StackCollapseRecovery
 
 TASK = load_task("stack_collapse_recovery")
 NOMINAL = StackCollapseRecovery()
@@ -151,6 +154,18 @@ def test_who_holds_the_tower_only_puts_off_the_blow():
     world = load(TASK, later)
     assert not play_shortcut(TASK, later, "hold_the_tower", world).solved
     assert world.memory["blows"] == 1.0 and world.time > 4.0
+
+
+@pytest.mark.parametrize(("higher", "guards"), [(-0.008, True), (0.008, False)])
+def test_the_blow_waits_while_the_hand_is_low_beside_the_tower(higher, guards):
+    """Moves are exact to 3 mm and 0.05 rad, which is 3 mm at the fingers."""
+    later = replace(NOMINAL, blow_0=replace(NOMINAL.blow_0, when=3.0))
+    world = load(TASK, later)
+    episode, over = Episode(later, world), later.top.edge + GUARD_CLEARANCE + TIP_BELOW + higher
+    plans = go_to(world.arm, later.feet[2] + over * UP, pace=FINE, grip=OPEN), hold(world.arm, 4.0)
+    for action in chain(*plans):
+        episode.step(world.filter(action))
+    assert world.memory["blows"] == (0.0 if guards else 1.0)
 
 
 @pytest.mark.parametrize("name", ["smallest_at_the_bottom", "over_the_edge", "as_if_the_middle_stood"])
