@@ -30,6 +30,7 @@ from scengen.pool import Pool
 from scengen.pool.writing import write_pool
 from scengen.runs.generate import row_of
 from scengen.sim.world import IDLE
+from scengen.skills.jaw import release
 from scengen.tasks.mirror_pick_place import LIFT_HEIGHT, MIN_PICTURE_OFFSET, VIEWS, MirrorPickPlace
 from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
@@ -164,6 +165,19 @@ def test_who_steers_by_the_picture_gets_away_from_the_cube():
     before = math.dist(w.arm.hand[:2], NOMINAL.spot[:2])
     play_shortcut(TASK, NOMINAL, "steer_as_shown", w)
     assert math.dist(w.arm.hand[:2], NOMINAL.spot[:2]) > before + 0.1
+
+
+def test_a_miss_costs_nothing_but_time():
+    """As shown first, then at the opposite place, as soon as the fingers have closed on nothing."""
+
+    def feel(world):
+        for view in (VIEWS[PLAIN], VIEWS[HALF]):
+            yield from NOMINAL._pick(world, NOMINAL._shown_spot(view))
+            if world.touching("robot", "cube"):
+                return
+            yield from release(world.arm)
+
+    assert play(TASK, NOMINAL, feel).solved
 
 
 def test_what_is_learnt_by_heart_in_one_view_serves_every_other():

@@ -20,7 +20,9 @@ from controls import (
 from scengen import load_task
 from scengen.assets.ycb import Ycb
 from scengen.episode import Episode
-from scengen.tasks.pick_place_ycb import FIELD, JUMP_MARGIN, MIN_LIFT, Jump, PickPlaceYcb
+from scengen.skills.grip import take
+from scengen.skills.motion import CLOSED, steer
+from scengen.tasks.pick_place_ycb import CARRY_HEIGHT, FIELD, JUMP_MARGIN, MIN_LIFT, Jump, PickPlaceYcb
 
 TASK = load_task("pick_place_ycb")
 NOMINAL = PickPlaceYcb()
@@ -128,6 +130,22 @@ def test_a_plan_that_is_not_changed_again_leaves_the_thing_on_bare_table(name, j
 def test_a_memorised_motion_serves_no_other_course_of_the_square(split):
     trained, moved = (TASK.draw(name, 0, 1).scenario for name in ("id", split))
     assert not replayed(TASK, trained, moved).solved
+
+
+def pursue(scenario, world):
+    """Steer to where the square is now, whatever its colour, and put the thing down once it is over the square."""
+    arm = world.arm
+    yield from take(arm, "thing", lift=CARRY_HEIGHT)
+    while math.hypot(*(left := world.pos("patch") - world.com("thing"))[:2]) > 0.01:
+        velocity = 0.2 * min(1.0, math.hypot(*left[:2]) / 0.05) * left / math.hypot(*left[:2]) * [1.0, 1.0, 0.0]
+        yield steer(arm, arm.hand + 0.02 * velocity, velocity, np.zeros(3), CLOSED)
+    yield from scenario.set_down(world, world.pos("patch"))
+
+
+@pytest.mark.parametrize("split", ["id", "more_jumps", "late_jump"])
+def test_a_policy_that_pursues_the_square_needs_no_look_at_its_colour(split):
+    scenario = TASK.draw(split, 0, 0).scenario
+    assert play(TASK, scenario, lambda world: pursue(scenario, world)).solved
 
 
 def test_a_memorised_motion_serves_no_other_training_scene():
