@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
-    "Generate and check": ("tasks", "generate", "verify", "crosscheck", "drift", "attack"),
+    "Generate and check": ("tasks", "try", "generate", "verify", "crosscheck", "drift", "attack"),
     "View and export": ("show", "film", "view", "report", "export", "record", "publish"),
     "Evaluate and analyse": ("evaluate", "power", "audit", "compare", "subset", "shrink", "bench"),
     "Extend": ("new", "asset", "probe", "discover"),

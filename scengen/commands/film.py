@@ -8,7 +8,7 @@ from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
-from ..pictures.film import WITNESS, Take, movie, shortcut, strip
+from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ..pictures.render import encode
 from ..pool import Pool
 from ..runs.progress import ProgressBar
@@ -53,11 +53,18 @@ class FilmSettings:
         if self.raw and self.of == WITNESS:
             raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
         at_least(self, frames=1, fps=1, width=1, height=1)
-        if Path(self.to).suffix == ".png" and self.frames * self.width * self.height > MAX_STRIP_PIXELS:
-            size = f"{self.frames} frames of {self.width} x {self.height} pixels"
-            raise BadConfig(
-                f"{size} are more than {MAX_STRIP_PIXELS / 1e6:g} million pixels; ask for fewer or smaller ones"
-            )
+        check_format(Path(self.to), self.frames, self.fps, self.width, self.height)
+
+
+def check_format(target: Path, frames: int, fps: int, width: int, height: int) -> None:
+    """Raise `ScengenError` for a video with a rate that does not divide the control rate, and for too large a strip."""
+    if target.suffix == ".mp4":
+        periods_between(fps)
+    elif frames * width * height > MAX_STRIP_PIXELS:
+        size = f"{frames} frames of {width} x {height} pixels"
+        raise BadConfig(
+            f"{size} are more than {MAX_STRIP_PIXELS / 1e6:g} million pixels; ask for fewer or smaller ones"
+        )
 
 
 def command(arguments: Arguments) -> int:

@@ -154,8 +154,35 @@ KEYS = [
     "x" * LONG,
     "task/x",
 ]
-PATHS_IN = ["pool", "to", "json", "junit", "mesh"]
+PATHS_IN = ["pool", "to", "json", "junit", "mesh", "film"]
 """Settings that name files and folders."""
+
+NONSENSE = {
+    "tiers": ["[]", "[nope]", "[null]", "random", "[random,random]"],
+    "units": ["nope", "km", "1"],
+    "friction": ["nan", "inf", "-inf", "-1"],
+    "license": ['"a\nb"', "' '", "\x1b[2J", "a:b"],
+    "title": ['"a\nb"', "' '", "# x"],
+    "ycb": ["nowhere", "."],
+    "what": ["jitter", "jitter:", "jitter:-1", "jitter:1.5", "jitter:99999", "witness", "Oracle", "oracle,witness"],
+    "film": ["x", "x.gif", ".mp4", "/nowhere/x.mp4", "x.png/"],
+    "executor": ["[]", "{}", "null", "[local]", "''"],
+    "certify": ["[]", "{}", "null", "''"],
+    "hydra.searchpath": [
+        "[pkg://nope.nope]",
+        "[pkg://nope]",
+        "[file:///nowhere]",
+        "[file://]",
+        "[nope]",
+        "nope",
+        "[]",
+        "[[]]",
+        "[null]",
+        "[pkg://..]",
+        "[pkg://scengen]",
+    ],
+}
+"""Values that look plausible and have no meaning, by setting."""
 
 SETTINGS = {
     verb: re.findall(r"^(\w+):", (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
@@ -193,9 +220,9 @@ class Grammar:
         """What a command needs to begin its work."""
         names = SETTINGS[verb]
         found: list[tuple[str, str | None]] = []
-        if verb in WITH_TASK and not (verb == "attack" and self.random.random() < 0.5):
+        if verb in WITH_TASK and not (verb in ("attack", "try") and self.random.random() < 0.5):
             found.append(("task", "domino_single"))
-        if "pool" in names:
+        if "pool" in names and not (verb == "try" and found):
             made = verb == "generate"
             found.append(("pool", str(self.place / "new" / "pool") if made else str(self.pool)))
         if "to" in names:
@@ -205,6 +232,7 @@ class Grammar:
             "probe": ("axis", "wide_gaps"),
             "film": ("id", "0"),
             "view": ("id", "0"),
+            "try": ("index", "1") if found else ("id", "0"),
             "evaluate": ("policy", "idle"),
             "asset": ("name", "cup"),
             "new": ("package", "lab_tasks"),
@@ -218,12 +246,31 @@ class Grammar:
     def _spoil(self, verb: str, settings: list[tuple[str, str | None]]) -> None:
         pick, names = self.random, [n for n in SETTINGS[verb] if n != "defaults"] or ["task"]
         kind = pick.choice(
-            ("value", "value", "value", "path", "path", "key", "bare", "delete", "add", "id", "task", "drop")
+            (
+                "value",
+                "value",
+                "value",
+                "nonsense",
+                "path",
+                "path",
+                "key",
+                "bare",
+                "delete",
+                "add",
+                "id",
+                "task",
+                "drop",
+            )
         )
         key = pick.choice(names)
         if kind == "value":
             settings[:] = [(k, v) for k, v in settings if k != key]
             settings.append((key, self._value()))
+        elif kind == "nonsense":
+            own = [n for n in NONSENSE if n in names or ("defaults" in SETTINGS[verb] and n not in SETTINGS[verb])]
+            key = pick.choice(own or ["hydra.searchpath"])
+            settings[:] = [(k, v) for k, v in settings if k != key]
+            settings.append((key, pick.choice(NONSENSE[key])))
         elif kind == "path":
             paths = [n for n in names if n in PATHS_IN] or [key]
             key = pick.choice(paths)

@@ -55,6 +55,8 @@ def judge(line: list[str], place: Path) -> str:
         return f"status {status}: {told[:300]}"
     if status == 2 and len(errors) != 1:
         return f"{len(errors)} lines of error: {told[:500]}"
+    if re.search(r"\w+Warning: ", told):
+        return f"a warning of Python: {told[:300]}"
     if "Traceback" in told + out.getvalue() or "unforeseen" in told:
         return f"unforeseen: {told[:500]}"
     if status == 2 and not REMEDY.search(told):
@@ -114,6 +116,7 @@ WORK = (
     "scengen.commands.attack.attack",
     "scengen.commands.bench.bench",
     "scengen.commands.shrink.certify",
+    "scengen.commands.try._played",
     "scengen.commands.probe.make_axis_card",
     "scengen.commands.discover.discover",
     "scengen.export.recording._writer",

@@ -44,6 +44,7 @@ def test_the_judge_sees_what_is_wrong(monkeypatch):
             (ends("scengen: name another one\n", status=3), "status 3"),
             (ends("scengen: one\nand name another\n"), "2 lines"),
             (ends("scengen: no\n"), "no remedy"),
+            (ends("x.py:1: UserWarning: not there\n", status=0), "warning of Python"),
             (ends("scengen: unforeseen; name another one\n"), "unforeseen"),
             (ends("scengen: name another \x1b[2J one\n"), "control"),
             (ends("scengen: name another one " + "x" * 9000 + "\n"), "letters"),
