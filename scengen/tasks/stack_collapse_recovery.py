@@ -60,8 +60,7 @@ CARRY_HEIGHT = 0.03
 CARRY_PACE = Pace(0.30, 0.008)  # pace of moves above the cubes
 GUARD_CLEARANCE = 0.02  # least clearance over the tower of a hand beside it that does not delay the blow [m]
 MIN_EDGE_DIFFERENCE = 0.004  # least difference between the edges of two cubes [m]
-MIN_DISTANCE = 0.30
-"""Least distance from the robot's first axis at which a hand that points down takes a cube [m]: measured."""
+MIN_DISTANCE = 0.30  # least distance from the robot's first axis at which a hand takes a cube [m]: measured
 MAX_DISTANCE = 0.75  # largest such distance [m]: measured
 MEMORY = ("blows", "stood", "fell")
 """Number of blows so far; time for which the tower has stood untouched, with no low hand beside it [s]; whether its top
