@@ -24,6 +24,8 @@ ID = "id"
 """Name of the training split."""
 EMBODIMENT = "panda_jaw"
 """Default robot of a task: one arm with a jaw."""
+SELF = "_self_"
+"""Word for the file itself in the list `defaults` of a file."""
 ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
 """Topics of Hydra's --info that are supported: the files in order or as a tree, the folders, and everything."""
 
@@ -187,14 +189,37 @@ def is_folder(folder: str) -> bool:
     return bool(path) and Path(path).is_dir()
 
 
+MAX_BASES = 20
+"""Largest number of task files of which each continues the next one."""
+
+
 @cache
-def _head(name: str, search: tuple[str, ...] = ()) -> Mapping[str, Any]:
-    """Contents of a task file."""
+def _head(name: str, search: tuple[str, ...] = (), depth: int = 0) -> Mapping[str, Any]:
+    """Contents of a task file, on top of the files that its `defaults` name, as Hydra composes them."""
     files = _files(search)
     if name not in files:
         raise UnknownName("task", name, files)
+    if depth > MAX_BASES:
+        raise BadConfig(f"{files[name]} is its own base; name other files in its defaults")
     try:
-        plain = yaml.load(files[name].read_text(), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-        return dict(plain)
+        plain = dict(yaml.load(files[name].read_text(), getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
     except (yaml.YAMLError, TypeError, ValueError) as error:
         raise BadConfig(f"{files[name]} is not YAML: {' '.join(str(error).split())[:300]}; correct it") from None
+    bases = plain.pop("defaults", None) or []
+    if not isinstance(bases, list) or not all(isinstance(base, str) for base in bases):
+        raise BadConfig(f"{files[name]}: defaults = {cut(repr(bases))}; expected a list of tasks, and _self_")
+    if SELF not in bases:
+        bases.append(SELF)
+    found: dict[str, Any] = {}
+    for base in bases:
+        found = _over(found, plain if base == SELF else _head(base.removeprefix("/task/"), search, depth + 1))
+    return found
+
+
+def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """A group of settings on top of another one: groups within them are merged, other values are replaced."""
+    merged = dict(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        merged[key] = _over(under, value) if isinstance(value, Mapping) and isinstance(under, Mapping) else value
+    return merged
