@@ -34,6 +34,13 @@ REASON_LENGTH = 90
 """Length up to which the line of progress repeats a reason [characters], as in the rejection report."""
 
 
+REMEDIES = {
+    "was not seen to its end": "a shortcut with to_rest=True must end with everything at rest; if something never rests, or "
+    "a rule ends the plan, leave to_rest out; see CONTRIBUTING.md",
+}
+"""What the author of a task can do about a reason, by words of it. Certificates hold reasons without remedies."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One pool to make."""
@@ -68,6 +75,9 @@ class Run:
             out.print(attack_table(summary.attack))
         for line in summary_lines(summary):
             say(line)
+        for words, remedy in REMEDIES.items():
+            if any(words in reason for reason in summary.reasons):
+                say(f"remedy for {words!r}: {remedy}")
         if summary.certified < settings.n:
             warn(
                 f"scengen: only {summary.certified} of {settings.n} could be certified among {summary.indices} "

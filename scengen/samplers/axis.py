@@ -105,13 +105,19 @@ class Axis:
             raise BadConfig(
                 f"axis {self.name}: {parameter.name} goes to {spell(there)}, which touches or overlaps its "
                 f"training range {spell(here)}{modulo} [{parameter.unit}] ({how}); move it outside, "
-                f"narrow the range in `id`, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
+                f"narrow the range in `id`, or {self._dropped}"
             )
         finite = (Fixed, Choice, Integer)
         kind = "categorical" if isinstance(there, finite) or isinstance(here, finite) else "interval"
         kind += f", modulo {parameter.period:g}" if parameter.period else ""
         span = width(here.support)
         return Proof(parameter.name, kind, gap, gap / span if span > 0 else None)
+
+    @property
+    def _dropped(self) -> str:
+        """Remedy of last resort, for an axis of the task's file and for one that the command line adds."""
+        name = self.name.partition("@")[0]
+        return f"drop the axis: leave +task.axes.{name} out, or give ~task.axes.{name} if the task file has it"
 
     def _check_symmetries(
         self, training: Mapping[str, Dist], known: Mapping[str, Parameter], symmetries: Sequence[Symmetry]
@@ -127,7 +133,7 @@ class Axis:
                 raise BadConfig(
                     f"axis {self.name}: {', '.join(self.replace)} move, but the scenes are training scenes again under "
                     f"the symmetries of the family ({', '.join(s.name for s in symmetries)}); move a parameter that "
-                    f"they do not take back, or drop the axis (~task.axes.{self.name.partition('@')[0]})"
+                    f"they do not take back, or {self._dropped}"
                 )
 
     def _on_path(self, fraction: float, parameter: Parameter, dist: Dist, training: Support) -> Fixed | Choice:

@@ -345,6 +345,8 @@ def _family(name: str, path: Any) -> type[Scenario]:
         family = getattr(importlib.import_module(module), inner)
     except Exception as error:
         why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
+        if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
+            why += "; install the package, as with pip install --editable FOLDER"
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")

@@ -352,3 +352,26 @@ def told_reason(told):
     ((reason, _),) = told[-1][3].items()
     assert reason.startswith("solved: the oracle failed: ") and "#" in reason
     return reason
+
+
+def test_a_remedy_can_be_followed(tmp_path, capsys):
+    """An axis that the command line adds cannot be deleted from the file, and a package has to be installed."""
+    axis = "+task.axes.near={why: w, source: s, replace: {heading: [uniform, 0.0, 0.1]}}"
+    assert cli.run(["generate", "task=domino_single", "split=near", axis]) == 2
+    assert "leave +task.axes.near out, or give ~task.axes.near if the task file has it" in capsys.readouterr().err
+    assert cli.run(["new", "task=slide_home", "package=lab_tasks", f"to={tmp_path / 'lab'}"]) == 0
+    assert cli.run(["tasks", "task=slide_home", f"hydra.searchpath=[file://{tmp_path}/lab/lab_tasks/conf]"]) == 2
+    assert "No module named 'lab_tasks'; install the package, as with pip install --editable" in capsys.readouterr().err
+
+
+def test_a_shortcut_that_never_rests_gets_a_remedy(monkeypatch, capsys, tmp_path):
+    import scengen.commands.generate as command
+
+    def rejected(task, certify_settings, settings, progress):
+        pool = Pool.open("generated/reference")
+        reasons = {"shortcuts: 'spin' was not seen to its end (raw): the goal was not reached in # s": 3}
+        return generate.Summary(pool, 1, 4, pool.manifest.funnel, reasons, 1, None, 1.0)
+
+    monkeypatch.setattr(command, "generate", rejected)
+    assert cli.run(["generate", "task=domino_single", "n=1", f"pool={tmp_path / 'p'}"]) == 0
+    assert "leave to_rest out" in capsys.readouterr().out.replace("\n", " ")
