@@ -5,8 +5,14 @@ import gc
 import sys
 
 import pytest
+from hypothesis import settings
 
 import scengen  # noqa: F401
+
+settings.register_profile(
+    "scengen", deadline=None
+)  # a busy machine takes longer for an example than Hypothesis' 200 ms
+settings.load_profile("scengen")
 
 
 @pytest.fixture(scope="module", autouse=True)

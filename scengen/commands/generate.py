@@ -35,8 +35,7 @@ REASON_LENGTH = 90
 
 
 REMEDIES = {
-    "was not seen to its end": "a shortcut with to_rest=True must end with everything at rest; if something never rests, or "
-    "a rule ends the plan, leave to_rest out; see CONTRIBUTING.md",
+    "was not seen to its end": "leave to_rest out if something never rests, or a rule ends it; see CONTRIBUTING.md",
 }
 """What the author of a task can do about a reason, by words of it. Certificates hold reasons without remedies."""
 
