@@ -24,6 +24,9 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
   on by itself faster than 80 mm/s, it is lost. Without this rule, an arm driven through its full stretch jumped and
   shot the block before it at 0.6 m/s at the target, and one block moved the target anywhere. A block that was knocked
   on repeatedly, each time some millimetres beyond the hand's reach, brought it into the zone in a dozen knocks.
+* A block that the robot touches may not touch the target. The paper has no such rule, but says that a chain is needed.
+  The bound above holds for a block that is pushed square. A block that is pushed corner first reaches 0.41 edges
+  farther, and brought the target into the zone in a third of the training draws.
 * The target is in the zone if its middle is over it, on the table and at rest, for 0.3 s, 30 steps as in the paper's
   T12 and T13. Touching the target loses the episode: only blocks may touch it.
 * Anything else may be done with the blocks. A block that is held in the jaw reaches less far than one that is pushed.
@@ -136,7 +139,13 @@ class IndirectPush(Scenario):
             return "the robot touched the target"
         if not still(world, "target", MAX_COAST_SPEED) and not self._pushed(world):
             return "the target was struck"
+        if self.single_block(world):
+            return "a block that the robot touched touched the target"
         return "the target fell off the table" if fallen(world, "target") else None
+
+    def single_block(self, world: World) -> bool:
+        """Whether one block alone is between the robot and the target."""
+        return bool(world.touching_bodies(ROBOT) & world.touching_bodies("target") - {"table", "zone"})
 
     def _pushed(self, world: World) -> bool:
         """Whether a chain of touching blocks leads from the robot to the target."""

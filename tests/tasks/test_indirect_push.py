@@ -62,10 +62,26 @@ def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do(beyond,
     assert (ik.reach(top).residual < 0.001) == reached
 
 
-def test_one_block_pushed_to_full_stretch_comes_too_short():
+class OneBlock(IndirectPush):
+    """The task without its rule on a single block between robot and target."""
+
+    def single_block(self, world):
+        return False
+
+
+def test_one_block_pushed_square_to_full_stretch_comes_too_short():
     w = load(TASK, NOMINAL)
-    assert not play_shortcut(TASK, NOMINAL, "push_one_block", w).solved
+    assert not play_shortcut(TASK, OneBlock(), "push_one_block", w).solved
     assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2 - 0.005
+
+
+def test_a_block_that_the_robot_touches_may_not_touch_the_target(solved):
+    """Pushed corner first it reaches 0.41 edges farther than the bound, which is past the start of the zone."""
+    entered = NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2
+    assert NOMINAL.stretch + 1.5 * NOMINAL.edge < entered < NOMINAL.stretch + (2**0.5 + 0.5) * NOMINAL.edge
+    assert play_shortcut(TASK, NOMINAL, "push_one_block").reason == "a block that the robot touched touched the target"
+    first, second = NOMINAL.chosen
+    assert solved.touched(ROBOT, second) and solved.touched(first, "target") and not NOMINAL.single_block(solved)
 
 
 def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
