@@ -18,6 +18,8 @@ Decisions, where the paper (App. B, T16) is silent:
 * The barrier keeps the hand from the bins and from the lower half of the ramp. A ball that is released above it falls
   through, so a ball must touch the ramp before its bin counts; else the episode is lost, as it is for a ball in the
   wrong bin, on the table or on the floor.
+* Past the start of the barrier a ball that is 46 mm or more above a ball's way is lost. The paper has no such rule. A
+  ball that had touched the ramp once was carried over the barrier and dropped into its bin, on no side of the ridge.
 """
 
 import itertools
@@ -144,6 +146,8 @@ class RampSort(Scenario):
                 return "a ball came into its bin without the ramp"
             if world.touched(ball, "table") or world.com(ball)[2] < TABLE_TOP:
                 return "a ball is on the table or on the floor"
+            if self.high_over_ramp(world, i):
+                return "a ball was carried over the ramp or the bins"
         return None
 
     def arrived(self, world: World, i: int) -> int:
@@ -152,6 +156,15 @@ class RampSort(Scenario):
         if height > BIN_RIM or abs(along - self._bins_along) > BIN_LENGTH / 2 or abs(across) > self._half_width:
             return 0
         return 1 if across > self.ramp.ridge else -1
+
+    def high_over_ramp(self, world: World, i: int) -> bool:
+        """Whether a ball is past the start of the barrier, and its centre 2 r + 1 cm or more above the ramp there."""
+        along, across, height = (world.com(f"ball_{i}") - self.middle) @ self.axes
+        if along < BARRIER_START or abs(across) > self._half_width + self.ball.radius:
+            return False
+        rim = self.ramp.width / 2
+        top = self.ramp.surface(min(along, self.ramp.length / 2), min(rim, max(-rim, across)))[2]
+        return bool(height > top + 2 * self.ball.radius + 0.01)
 
     def _red_side(self, world: World) -> int:
         """Side on which the red bin stands in the world, which an ablation may have exchanged."""

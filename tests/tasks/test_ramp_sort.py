@@ -14,6 +14,7 @@ from controls import (
     play_shortcut,
     replayed,
     solution,
+    unguarded,
 )
 
 from scengen import load_task
@@ -21,7 +22,7 @@ from scengen.assets.crowned_ramp import CrownedRamp
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.sim.world import ROBOT
-from scengen.tasks.ramp_sort import BIN_FLOOR, RampSort
+from scengen.tasks.ramp_sort import BARRIER_START, BIN_FLOOR, RampSort
 
 TASK = load_task("ramp_sort")
 NOMINAL = RampSort(reds=1, blues=1)
@@ -56,7 +57,7 @@ def test_without_the_ramp_or_with_the_bins_exchanged_the_same_motion_fails():
     ("name", "reason"),
     [
         ("colours_exchanged", "a ball is in the bin of the other colour"),
-        ("through_the_barrier", "a ball came into its bin without the ramp"),
+        ("through_the_barrier", "a ball was carried over the ramp or the bins"),
     ],
 )
 def test_one_wrong_ball_ends_the_episode(name, reason):
@@ -66,7 +67,7 @@ def test_one_wrong_ball_ends_the_episode(name, reason):
 
 def test_the_barrier_stops_the_hand():
     w = load(TASK, NOMINAL)
-    play_shortcut(TASK, NOMINAL, "by_hand_into_the_bin", w)
+    play_shortcut(TASK, unguarded(RampSort)(reds=1, blues=1), "by_hand_into_the_bin", w)
     assert w.touched(ROBOT, "barrier") and not w.touched("ball_0", "barrier")
 
 
@@ -115,6 +116,15 @@ def test_failures_name_what_went_wrong():
     w.restore(state)
     put(w, 1, 0.0, 0.0, NOMINAL, height=-0.1)
     assert NOMINAL.failure(w) == "a ball is on the table or on the floor"
+
+
+@pytest.mark.parametrize(("height", "high"), [(0.02, False), (0.08, True)])
+def test_past_the_start_of_the_barrier_a_ball_stays_low(height, high):
+    w = load(TASK, NOMINAL)
+    for along, beyond in ((BARRIER_START + 0.01, high), (BARRIER_START - 0.01, False)):
+        surface = NOMINAL.ramp.surface(along, 0.06)[2]
+        put(w, 0, along, 0.06, NOMINAL, height=surface + height - BIN_FLOOR - NOMINAL.ball.radius)
+        assert NOMINAL.high_over_ramp(w, 0) == beyond
 
 
 # --- scenes that must not be certified ---------------------------------------------------
