@@ -7,7 +7,7 @@ from rich.table import Table
 from ..errors import at_least
 from ..evaluate.speed import bench, certificates
 from ..work.targets import try_file
-from . import OK, Arguments, out, write_json
+from . import OK, Arguments, out, remark, write_json
 from .settings import read
 
 
@@ -25,13 +25,16 @@ def command(arguments: Arguments) -> int:
     at_least(settings, repeats=1)
     try_file(settings.json)
     tables: list[Table]
+    noise = ""
     if settings.certify:
         table, result = certificates()
         tables = [table]
     else:
-        tables, result = bench(settings.repeats)
+        tables, result, noise = bench(settings.repeats)
     for table in tables:
         out.print(table)
+    if noise:
+        remark(f"the machine was not quiet: {noise}; repeat the command when nothing else runs")
     if settings.json:
         write_json(settings.json, result)
     return OK

@@ -1,11 +1,17 @@
-"""Measurement of the costs that scengen promises, as ratios within one run: `scengen bench`."""
+"""Measurement of the costs that scengen promises, as ratios within one run: `scengen bench`.
 
+Both sides of a ratio work by turns in short slices, of which only the processor time counts. What else the machine does
+slows both alike then.
+"""
+
+import os
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -19,7 +25,7 @@ from ..certificate import CHECKS
 from ..control import native
 from ..control.loop import ACTION, Loop
 from ..envs.gym import PoolEnv
-from ..episode import Actions
+from ..episode import Actions, Episode
 from ..pictures.render import NoPictures
 from ..pool import Pool, PoolRow
 from ..robots import panda
@@ -29,11 +35,21 @@ from ..samplers.task import Task
 from ..sim.world import JAW, World
 from ..validate.certify import Trial
 from ..validate.rebuilt import rebuild, world_of
-from ..validate.rollout import Rollout, run
+from ..validate.rollout import run
 from ..validate.settings import QUICK
 
 PERIODS = 200
 """Number of control periods of the comparison with robosuite: two seconds."""
+SLICE = 10
+"""Number of control periods in a slice: 2 to 20 ms of work, below the time that an operating system gives a process."""
+MAX_SPREAD = 0.1
+"""Largest spread of a measure, as a share of its median, of a quiet machine. Twice what an idle one shows."""
+MAX_LOAD = 0.5
+"""Largest load average at the start of a run on a quiet machine [processes]."""
+MAX_WAIT = 0.05
+"""Largest share of its time for which the run waits for a core on a quiet machine."""
+SCHEDULED = Path("/proc/self/schedstat")
+"""File in which Linux says for how long a process has run, and has waited for a core [ns]."""
 NEGLIGIBLE_COST = 0.05
 """Processor time below which a check is left out of the cost of a certificate [s]."""
 CAMERA_PERIODS = 20
@@ -53,6 +69,24 @@ class Promise:
     def holds(self, value: float) -> bool:
         """Whether a measured value satisfies the limit."""
         return value <= self.limit if self.side == "at most" else value >= self.limit
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Values of a measure in the repetitions of a run."""
+
+    values: tuple[float, ...]
+    """One value for each repetition."""
+
+    @property
+    def median(self) -> float:
+        """Median of the values."""
+        return statistics.median(self.values)
+
+    @property
+    def spread(self) -> float:
+        """Largest minus smallest value."""
+        return max(self.values) - min(self.values)
 
 
 PROMISES = {
@@ -77,29 +111,67 @@ PROMISES = {
 """Promised limits, by measure."""
 
 
-def bench(repeats: int) -> tuple[list[Table], dict[str, Any]]:
+def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     """Measure everything `repeats` times and take the medians of the ratios.
+
+    Returns:
+        Tables, the result, and why the machine was not quiet; an empty text if it was.
 
     Raises:
         ImportError: robosuite's Python code does not run on this machine.
     """
-    result = {
+    load, begin = os.getloadavg()[0], _scheduled()
+    found = {
         "rollout_to_raw": rollout_to_raw(repeats),
         **two_arms(repeats),
         "robosuite_to_ours": robosuite_to_ours(repeats),
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
         **gym_costs(repeats),
     }
-    table = Table("measure", "value", "limit", "what", title="bench", title_justify="left")
-    for name, value in result.items():
+    ran, waited = (now - before for now, before in zip(_scheduled(), begin, strict=True))
+    table = Table("measure", "median", "spread", "limit", "what", title="bench", title_justify="left")
+    for name, measure in found.items():
         promise = PROMISES[name]
-        kept = "holds" if promise.holds(value) else "MISSED"
-        table.add_row(name, f"{value:.2f}", f"{promise.side} {promise.limit:g}: {kept}", promise.what)
+        kept = "holds" if promise.holds(measure.median) else "MISSED"
+        limit = f"{promise.side} {promise.limit:g}: {kept}"
+        table.add_row(name, f"{measure.median:.2f}", f"{measure.spread:.2f}", limit, promise.what)
     periods = costs(repeats)
     beside = Table("control period of 10 ms", "cost (ms)", "times MuJoCo", title="environments", title_justify="left")
     for name, value in periods.items():
         beside.add_row(name, f"{value:.2f}", f"{value / next(iter(periods.values())):.1f}")
-    return [table, beside], {**result, "control_period_ms": periods}
+    ratios = {name: measure for name, measure in found.items() if not name.endswith("_ms")}
+    noise = disturbance(load, waited / max(ran + waited, 1.0), ratios)
+    result = {name: measure.median for name, measure in found.items()}
+    spreads = {name: measure.spread for name, measure in found.items()}
+    return [table, beside], {**result, "control_period_ms": periods, "spread": spreads, "disturbed_by": noise}, noise
+
+
+def _scheduled() -> tuple[float, float]:
+    """Time for which this process has run, and for which it has waited for a core [ns]; 0 where Linux does not say."""
+    try:
+        ran, waited = SCHEDULED.read_text().split()[:2]
+        return float(ran), float(waited)
+    except (OSError, ValueError):
+        return 0.0, 0.0
+
+
+def disturbance(load: float, waiting: float, ratios: Mapping[str, Measure]) -> str:
+    """Why the machine was not quiet; empty if it was.
+
+    Args:
+        load: load average at the start [processes].
+        waiting: share of the run's time for which it waited for a core.
+        ratios: the measured ratios.
+    """
+    told = []
+    if load > MAX_LOAD:
+        told.append(f"its load average was {load:.1f} at the start")
+    if waiting > MAX_WAIT:
+        told.append(f"the run waited for a core in {waiting:.0%} of the time")
+    wide = [name for name, ratio in ratios.items() if ratio.spread > MAX_SPREAD * ratio.median]
+    if wide:
+        told.append(f"{', '.join(wide)} spread by more than {MAX_SPREAD:.0%}")
+    return "; ".join(told)
 
 
 def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
@@ -129,53 +201,87 @@ def _certificate(task: Task) -> dict[str, float]:
     return {name: seconds for name, seconds in cost.items() if seconds >= NEGLIGIBLE_COST}
 
 
-def rollout_to_raw(repeats: int) -> float:
+Side = Callable[[], Iterator[None]]
+"""Starts one side of a comparison, which yields after each slice of its work."""
+
+
+def alternated(sides: Sequence[Side], repeats: int) -> list[tuple[float, ...]]:
+    """Processor time of each side in each repetition [s]. The sides work by turns, a slice each.
+
+    A first repetition, which compiles code and fills caches, does not count.
+    """
+    found = []
+    for _ in range(repeats + 1):
+        spent, running = [0.0] * len(sides), [side() for side in sides]
+        going = list(range(len(sides)))
+        while going:
+            for number in list(going):
+                start = time.thread_time()
+                if next(running[number], _END) is _END:
+                    going.remove(number)
+                spent[number] += time.thread_time() - start
+        found.append(tuple(spent))
+    return found[1:]
+
+
+_END = object()
+"""Sentinel that no side yields."""
+
+
+def _ratio(pairs: Iterable[tuple[float, ...]]) -> Measure:
+    return Measure(tuple(above / below for above, below in pairs))
+
+
+def rollout_to_raw(repeats: int) -> Measure:
     """Ratio of the time of an oracle rollout to that of the bare mj_step calls through the same states."""
     task = compose.load_task("domino_single")
     scenario = task.draw("id", 0, 0).scenario
-    world = world_of(scenario)
+    world, bare = world_of(scenario), world_of(scenario)
+    recorded = run(scenario, world, scenario.oracle, task.horizon).actions
 
-    def rollout() -> Rollout:
-        return run(scenario, world, scenario.oracle, task.horizon)
+    def rollout() -> Iterator[None]:
+        world.reset()
+        plan, episode = scenario.oracle(world), Episode(scenario, world, task.horizon)
+        for number in range(len(recorded)):
+            action = next(plan, world.idle) if episode.outcome is None else world.idle
+            episode.step(world.filter(action))
+            if number % SLICE == SLICE - 1:
+                yield
 
-    raw = _bare(world, rollout().actions)
-    return statistics.median(_seconds(rollout) / _seconds(raw) for _ in range(repeats))
+    return _ratio(alternated([rollout, _bare(bare, recorded)], repeats))
 
 
-def two_arms(repeats: int) -> dict[str, float]:
+def two_arms(repeats: int) -> dict[str, Measure]:
     """Ratios of the time of a control period of two arms to the bare mj_step calls, and to a period of one arm."""
     text = rebuild(compose.load_task("domino_single").draw("id", 0, 0).scenario)
-    one, two = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2))
+    one, two, bare = (World.load(text, "+".join([JAW] * arms)) for arms in (1, 2, 2))
     single = _waving()
     double = np.hstack([single, single])
 
-    def play(world: World, actions: Actions) -> Callable[[], None]:
-        def steps() -> None:
+    def play(world: World, actions: Actions) -> Side:
+        def steps() -> Iterator[None]:
             world.reset()
-            for action in actions:
-                world.apply(action)
+            yield from _sliced(world.apply, actions)
 
         return steps
 
-    alone, both, raw = play(one, single), play(two, double), _bare(two, double)
-    alone()  # the first calls warm up
-    both()
-    found = [(_seconds(both), _seconds(alone), _seconds(raw)) for _ in range(repeats)]
+    found = alternated([play(two, double), play(one, single), _bare(bare, double)], repeats)
     return {
-        "two_arms_to_raw": statistics.median(pair / bare for pair, _, bare in found),
-        "two_arms_to_one": statistics.median(pair / lone for pair, lone, _ in found),
+        "two_arms_to_raw": _ratio((pair, raw) for pair, _, raw in found),
+        "two_arms_to_one": _ratio((pair, lone) for pair, lone, _ in found),
     }
 
 
-def gym_costs(repeats: int) -> dict[str, float]:
+def gym_costs(repeats: int) -> dict[str, Measure]:
     """Costs of the Gymnasium environment without cameras: its step over bare mj_step calls, and its reset [ms]."""
     with _pool() as pool:
-        env, actions = PoolEnv("domino_single", pool.folder), next(pool.rows()).witness
+        env, row = PoolEnv("domino_single", pool.folder), next(pool.rows())
     env.reset()
-    raw = _bare(env.world, actions)
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
-    ratios = [_stepping(env, actions) * len(actions) / _seconds(raw) for _ in range(repeats)]
-    return {"env_step_to_raw": statistics.median(ratios), "env_reset_ms": statistics.median(resets)}
+    ratios = alternated(
+        [_steps_of(env, row.witness), _bare(World.load(row.scene_xml, row.embodiment), row.witness)], repeats
+    )
+    return {"env_step_to_raw": _ratio(ratios), "env_reset_ms": Measure(tuple(resets))}
 
 
 def costs(repeats: int) -> dict[str, float]:
@@ -188,13 +294,12 @@ def costs(repeats: int) -> dict[str, float]:
         actions = row.witness
         bare = PoolEnv("domino_single", pool.folder)
         seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
-    bare.reset()
-    raw, brief = _bare(bare.world, actions), actions[:CAMERA_PERIODS]
-    found = {
-        "MuJoCo: five bare mj_step": statistics.median(_seconds(raw) / len(actions) for _ in range(repeats)),
-        "scengen in Gymnasium: proprioception": statistics.median(_stepping(bare, actions) for _ in range(repeats)),
-        "robosuite: proprioception": _stepping(_robosuite(row, False), actions),
-    }
+    brief = actions[:CAMERA_PERIODS]
+    world = World.load(row.scene_xml, row.embodiment)
+    sides = [_bare(world, actions), _steps_of(bare, actions), _steps_of(_robosuite(row, False), actions)]
+    names = ("MuJoCo: five bare mj_step", "scengen in Gymnasium: proprioception", "robosuite: proprioception")
+    spent = zip(*alternated(sides, repeats), strict=True)
+    found = {name: statistics.median(times) / len(actions) for name, times in zip(names, spent, strict=True)}
     try:
         found["scengen in Gymnasium: and one camera"] = _stepping(seeing, brief)
         found["robosuite: and one camera"] = _stepping(_robosuite(row, True), brief)
@@ -239,41 +344,53 @@ def _stepping(env: Any, actions: Actions) -> float:
     return _seconds(steps) / len(actions)
 
 
-def _bare(world: World, actions: Actions) -> Callable[[], None]:
+def _sliced(step: Callable[[Any], object], actions: Actions) -> Iterator[None]:
+    """Take a step for each action, and yield after each slice of them."""
+    for number, action in enumerate(actions):
+        step(action)
+        if number % SLICE == SLICE - 1:
+            yield
+
+
+def _steps_of(env: Any, actions: Actions) -> Side:
+    """The steps of an environment. Its reset, which comes before, is not counted."""
+
+    def steps() -> Iterator[None]:
+        env.reset()
+        return _sliced(env.step, actions)
+
+    return steps
+
+
+def _bare(world: World, actions: Actions) -> Side:
     """The bare mj_step calls through the states that recorded actions lead to, from the start."""
-    controls = np.zeros((len(actions) * world.loop.substeps, world.model.nu))
+    substeps = world.loop.substeps
+    controls = np.zeros((len(actions) * substeps, world.model.nu))
     world.reset()
     world.loop.replay(actions, controls)
 
-    def raw() -> None:
+    def raw() -> Iterator[None]:
         world.reset()
-        _step_with(world.model._address, world.data._address, world.data.ctrl, controls)
+        for start in range(0, len(controls), SLICE * substeps):
+            part = controls[start : start + SLICE * substeps]
+            _step_with(world.model._address, world.data._address, world.data.ctrl, part)
+            yield
 
-    raw()
     return raw
 
 
-def robosuite_to_ours(repeats: int) -> float:
+def robosuite_to_ours(repeats: int) -> Measure:
     """Ratio of the time of robosuite's env.step to our control period, with the same model and actions."""
     env = _lift()
     model = env.sim.model._model
     loop = Loop(model, mujoco.MjData(model), home=panda.HOME)
     actions = _waving()
 
-    def theirs() -> None:
-        for action in actions:
-            env.step(action)
-
-    def ours() -> None:
-        for action in actions:
-            loop.step(action)
-
-    ratios = []
-    for _ in range(repeats + 1):  # the first one warms up
-        env.reset()
+    def ours() -> Iterator[None]:
         loop.reset()
-        ratios.append(_seconds(theirs) / _seconds(ours))
-    return statistics.median(ratios[1:])
+        return _sliced(loop.step, actions)
+
+    return _ratio(alternated([_steps_of(env, actions), ours], repeats))
 
 
 def _lift() -> Any:
@@ -294,8 +411,8 @@ def _lift() -> Any:
     )
 
 
-def scenario_to_first_step(repeats: int) -> float:
-    """Median time from a draw's values to the end of the first physics step [ms]."""
+def scenario_to_first_step(repeats: int) -> Measure:
+    """Time from a draw's values to the end of the first physics step [ms]."""
     task = compose.load_task("domino_single")
     scenarios = [task.draw("id", 0, index).scenario for index in range(4 * repeats + 2)]
     times = []
@@ -304,7 +421,7 @@ def scenario_to_first_step(repeats: int) -> float:
         world = world_of(scenario)
         mujoco.mj_step(world.model, world.data)
         times.append(1000 * (time.perf_counter() - start))
-    return statistics.median(times[2:])
+    return Measure(tuple(times[2:]))
 
 
 def _waving() -> Actions:
