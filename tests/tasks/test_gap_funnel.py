@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import pytest
 from controls import (
     ablated,
@@ -20,7 +21,7 @@ from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.gap_wall import GapWall, Kerb
 from scengen.attack.priors import fit
-from scengen.sim.world import IDLE
+from scengen.sim.world import IDLE, ROBOT
 from scengen.tasks.gap_funnel import GapFunnel
 
 TASK = load_task("gap_funnel")
@@ -71,6 +72,18 @@ def test_a_ball_that_is_too_fast_is_stopped_by_the_kerb_and_lies_in_the_zone():
 )
 def test_shortcuts_end_as_they_should(name, reason):
     assert play_shortcut(TASK, PLAIN, name).reason == reason
+
+
+@pytest.mark.parametrize(("beyond", "lost"), [(-0.001, False), (0.001, True)])
+def test_behind_the_middle_of_the_wall_the_robot_may_not_touch_the_ball(beyond, lost):
+    world = load(TASK, PLAIN)
+    world.data.joint("ball_free").qpos[:3] = PLAIN.gap_at + beyond * PLAIN.normal + [0.0, 0.0, PLAIN.ball.radius]
+    mujoco.mj_kinematics(world.model, world.data)
+    mujoco.mj_comPos(world.model, world.data)
+    assert PLAIN.failure(world) is None
+    robot, ball = (world._label(name) for name in (ROBOT, "ball"))
+    world.loop.touching[robot, ball] = True
+    assert PLAIN.failure(world) == ("the robot touched the ball behind the wall" if lost else None)
 
 
 def test_what_passes_the_gap_aslant_misses_the_zone_even_if_it_may_graze_the_wall():
