@@ -17,12 +17,13 @@ Decisions where the paper (App. B, T15) is silent:
 
 * The paper says both that friction decides when a block slides and that the lower ones slide first. In training both
   hold, as the lower blocks have less friction. Friction is visible: the darker a block, the rougher.
-* No place of the bin serves two lanes. A bin at the hand's speed reaches the next lane in time, but if it leaves only
-  when a block there is seen to slide, it misses by 2 mm. An agent that waits for the right first block may then wait
-  midway between the other two, if their lanes are neighbours, and follow the one that moves: half a lane is near
-  enough. Four of the six sequences allow that, and none without having predicted the first block.
+* No place of the bin serves two lanes. If the bin leaves only when a block in the next lane is seen to slide, it misses
+  by 26 mm in training. After the right first block it may wait midway between the other two, if their lanes are
+  neighbours, and follow the one that moves. Four of the six sequences allow that.
+* Once the ramp tilts, the bin may not be turned by more than 5 deg. The paper has no such rule. The bin is 85 mm before
+  the hand: a wrist that turned by 25 deg swung it by 45 mm in 0.2 s, from midway to every block that began to slide.
 * The start of the tilt varies by more than the bin's time margin: a policy that moves at fixed times misses blocks.
-* Chance: training has all six sequences; a policy that always answers with the same one is right in a sixth of it.
+* Chance: training has all six sequences; one fixed answer is right in a sixth of it.
 * The bin may only catch. Neither the robot nor the bin may touch a block on the ramp: the hand could pick blocks off,
   and the bin could push them into one lane. Nor may the robot touch the ramp. A block on the table is lost.
 """
@@ -51,11 +52,10 @@ from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
 BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
 """Lanes, counted from the left, of the lowest, the middle and the highest block."""
-FRICTION_TOLERANCE = 0.10
-"""Share by which the friction of a block may differ from its known value: the jitter of certificates."""
-FALL_TIME = 0.16
-"""Time from when a block's middle is over the lip until it is in the bin [s]; it tips first. Measured: 0.13 to 0.17."""
+FRICTION_TOLERANCE = 0.10  # share by which a block's friction may differ from its known value: jitter of certificates
+FALL_TIME = 0.16  # time from a block's middle over the lip to in the bin [s]; it tips first. Measured: 0.13 to 0.17
 VISIBLE_SLIDE = 0.002  # distance after which a block is seen to slide [m]
+MAX_BIN_TURN = math.radians(5.0)  # angle of the bin to the lip; the oracle, jittered too, turns it by 2.3 deg at most
 DRAW_PACE = Pace(0.30, 0.004)  # pace of the bin
 
 
@@ -74,8 +74,7 @@ class Load:
     def colour(self) -> Rgba:
         """Colour that shows the friction, in proportion: pale at 0, dark at 1."""
         pale, dark = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
-        r, g, b = (pale + self.friction * (dark - pale)).tolist()
-        return r, g, b, 1.0
+        return *(pale + self.friction * (dark - pale)).tolist(), 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,9 +149,15 @@ class SlideCatch(Scenario):
                 return "the bin touched a block on the ramp"
         if world.touching(ROBOT, "incline/slab"):
             return "the robot touched the ramp"
+        if self.turned(world):
+            return "the bin was turned while the ramp tilted"
         if world.tilt("bin") > math.radians(20.0):
             return "the bin tipped over"
         return "something fell off the table" if fallen(world, "bin", *self.blocks) else None
+
+    def turned(self, world: World) -> bool:
+        """Whether the ramp has begun to tilt, and the bin is not square to the lip."""
+        return world.time > self.start and abs(yaw_of(world.rot("bin"))) > MAX_BIN_TURN
 
     def caught(self, world: World, block: str, depth: float = 0.0) -> bool:
         """Whether the middle of a block is inside the bin, at least `depth` below its rim [m]."""
@@ -284,12 +289,12 @@ class SlideCatch(Scenario):
         yield require(comes > fetched, "the first block comes before the bin", comes=comes, fetched=fetched)
         margin = min(self.time_margin(one, other) for one, other in pairwise(self.sequence))
         yield require(margin > 0.0, "two blocks come so soon after each other that the bin serves one", spare=margin)
-        outside = max(load.away for load in self.loads) + self.edge / 2
-        yield require(outside < self.incline.length, "a block stands out over the ramp", out=outside)
-        wide = BLOCK_COUNT * self.lane - self.lane + self.edge
-        yield require(wide < self.incline.width, "a lane is beside the ramp", wide=wide, ramp=self.incline.width)
-        beyond = self.bin_x + self.bin.outer[0] / 2
-        yield require(beyond < self.x - 0.01, "the bin stands under the ramp", reaches=beyond, lip=self.x)
+        out = max(load.away for load in self.loads) + self.edge / 2
+        yield require(out < self.incline.length, "a block stands out over the ramp", out=out)
+        wide, ramp = BLOCK_COUNT * self.lane - self.lane + self.edge, self.incline.width
+        yield require(wide < ramp, "a lane is beside the ramp", wide=wide, ramp=ramp)
+        end = self.bin_x + self.bin.outer[0] / 2
+        yield require(end < self.x - 0.01, "the bin stands under the ramp", reaches=end, lip=self.x)
         half = self.incline.width / 2
         yield on_table("the ramp", self.lip + np.array([[self.incline.length, side * half, 0] for side in (-1, 1)]))
         hands = [self.bin_at(self.spot(lane)[1]) + self.bin.handle for lane in range(BLOCK_COUNT)]

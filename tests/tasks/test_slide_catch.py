@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from controls import (
@@ -138,6 +139,17 @@ def test_one_of_six_sequences_is_right():
 )
 def test_blocks_are_left_alone_until_they_fall(name, says):
     assert says in play_shortcut(TASK, SLIDING, name).reason
+
+
+@pytest.mark.parametrize(("angle", "lost"), [(4.5, False), (-5.5, True)])
+def test_once_the_ramp_tilts_the_bin_must_be_square_to_the_lip(angle, lost):
+    world = load(TASK, NOMINAL)
+    turn = math.radians(angle) / 2
+    world.data.joint("bin_free").qpos[3:] = [math.cos(turn), 0.0, 0.0, math.sin(turn)]
+    for after, now in ((-0.1, False), (0.1, lost)):
+        world.data.time = NOMINAL.start + after
+        mujoco.mj_kinematics(world.model, world.data)
+        assert NOMINAL.turned(world) == now
 
 
 # --- scenes that must not be certified ----------------------------------------------------
