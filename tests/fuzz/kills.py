@@ -1,7 +1,8 @@
-"""Kills generation runs in every way and compares their pools in the end: `python tests/fuzz/kills.py 50 [seed]`.
+"""Kills generation runs in every way and compares their pools in the end: `python tests/fuzz/kills.py 50 [seed] [ray]`.
 
 A run is begun, killed after a random time, and continued until it ends. Its pool must have the bytes of one that was
-made without a break, and no process may stay. A kill that comes too late, after the end, is not counted.
+made without a break, and no process may stay. A kill that comes too late, after the end, is not counted. With `ray`,
+the runs that are killed work on a cluster of this machine (`executor.address=local`), and are finished without it.
 """
 
 import os
@@ -13,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,11 +22,15 @@ ROOT = Path(__file__).parents[2]
 WAYS = ("SIGKILL", "SIGTERM", "SIGINT", "worker", "disk")
 """Kill the group; tell the run to stop; press Ctrl-C; kill one worker; let no file grow beyond a size."""
 QUICKLY = ("certify.robust.runs=1", "certify.robust.bound=0.04")
+ON_RAY = ("executor=ray", "executor.address=local")
+"""Settings of a run on a cluster of this machine."""
+RAY_LEAVES = 30.0
+"""Time in which the processes of Ray end after those that they work for [s]."""
 N = 3
 """Scenarios of a pool."""
 
 
-def start(pool: Path, workers: int, limit: int | None = None) -> subprocess.Popen[str]:
+def start(pool: Path, workers: int, limit: int | None = None, more: Sequence[str] = ()) -> subprocess.Popen[str]:
     """Begin or continue a run, in a process group of its own."""
 
     def prepare() -> None:
@@ -34,7 +40,7 @@ def start(pool: Path, workers: int, limit: int | None = None) -> subprocess.Pope
 
     argv = [sys.executable, "-m", "scengen", "generate", "task=domino_single", *QUICKLY, f"n={N}"]
     return subprocess.Popen(
-        [*argv, f"workers={workers}", f"pool={pool}"],
+        [*argv, *more, f"workers={workers}", f"pool={pool}"],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -54,10 +60,10 @@ def group(leader: int) -> list[int]:
     return found
 
 
-def hit(pool: Path, way: str, after: float, workers: int) -> str | None:
+def hit(pool: Path, way: str, after: float, workers: int, more: Sequence[str] = ()) -> str | None:
     """Begin or continue a run and kill it. What went wrong, or nothing; None if it had ended before."""
     before = set(pool.parent.rglob("*.part"))
-    process = start(pool, workers, limit=int(20_000 + 10_000 * after) if way == "disk" else None)
+    process = start(pool, workers, int(20_000 + 10_000 * after) if way == "disk" else None, more)
     if way != "disk":
         with suppress(subprocess.TimeoutExpired):
             process.wait(after)
@@ -75,10 +81,12 @@ def hit(pool: Path, way: str, after: float, workers: int) -> str | None:
                 for worker in workers_alive[-1:]:
                     os.kill(worker, signal.SIGKILL)
     _, told = process.communicate()
-    time.sleep(0.3)
+    end = time.monotonic() + (RAY_LEAVES if more else 0.3)
+    while time.monotonic() < end and (not more or group(process.pid)):
+        time.sleep(0.1)
     if left := group(process.pid):
         return f"processes stay: {left}"
-    lines = [line for line in told.splitlines() if line.startswith("scengen")]
+    lines = [line for line in told.splitlines() if line.startswith("scengen") and "a Ray cluster" not in line]
     if "Traceback" in told or len(lines) > 1 or "damaged" in told:
         return f"said {told[-600:]!r}"
     if way != "SIGKILL" and set(pool.parent.rglob("*.part")) - before:
@@ -95,7 +103,7 @@ def finish(pool: Path) -> bytes:
     return (pool / "manifest.json").read_bytes()
 
 
-def run(kills: int, seed: int, each: int = 3) -> list[str]:
+def run(kills: int, seed: int, each: int = 3, more: Sequence[str] = ()) -> list[str]:
     """Kill runs, at most `each` times every pool, until so many kills have hit; what went wrong."""
     pick, wrong = random.Random(seed), []
     hits: Counter[str] = Counter()
@@ -103,15 +111,19 @@ def run(kills: int, seed: int, each: int = 3) -> list[str]:
         begun = time.monotonic()
         whole = finish(Path(folder, "whole"))
         seconds, pools = time.monotonic() - begun, 0
+        if more:
+            seconds += 8.0  # until a cluster has started
+        ways = [way for way in WAYS if not (more and way == "disk")]  # Ray's own files would not grow, either
         while hits.total() < kills:
             pools += 1
             pool = Path(folder, f"pool{pools}")
             for _ in range(min(each, kills - hits.total())):
-                way, after = min(WAYS, key=lambda name: (hits[name], name)), pick.uniform(0.1, seconds)
-                fault = hit(pool, way, after, workers=pick.choice((1, 2)))
+                way, after = min(ways, key=lambda name: (hits[name], name)), pick.uniform(0.1, seconds)
+                fault = hit(pool, way, after, workers=pick.choice((1, 2)), more=more)
                 hits[way] += fault is not None
                 if fault:
                     wrong.append(f"{way} after {after:.1f} s: {fault}")
+                    print(wrong[-1], flush=True)
             try:
                 if finish(pool) != whole:
                     wrong.append(f"pool {pools}: other bytes")
@@ -123,7 +135,8 @@ def run(kills: int, seed: int, each: int = 3) -> list[str]:
 
 
 def main() -> int:
-    wrong = run(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)
+    more = ON_RAY if "ray" in sys.argv else ()
+    wrong = run(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0, more=more)
     print("\n".join(wrong))
     return bool(wrong)
 
