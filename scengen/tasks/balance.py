@@ -60,12 +60,10 @@ class Balance(Scenario):
 
     rod_x: float = param(-0.16, "m", -0.4, 0.4)
     rod_y: float = param(0.0, "m", -0.4, 0.4)
-    rod_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """Yaw of the rod; at 0 it lies along y."""
+    rod_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # yaw of the rod; at 0 it lies along y
     ridge_x: float = param(0.06, "m", -0.4, 0.4)
     ridge_y: float = param(0.0, "m", -0.4, 0.4)
-    ridge_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """Yaw of the ridge; at 0 it runs along x."""
+    ridge_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # yaw of the ridge; at 0 it runs along x
     rod: Rod = Rod(com=0.05)
     ridge: Ridge = Ridge()
 

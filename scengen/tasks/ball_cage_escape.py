@@ -74,8 +74,7 @@ class BallCageEscape(Scenario):
     ball_y: float = param(0.0, "m", -0.04, 0.04)
     stool_x: float = param(0.022, "m", -0.1, 0.1)
     """Middle of the stool; 22 mm leave 0.5 mm of plate beyond the hole, and a gap of 10 mm before the trap."""
-    rolling: float = param(0.04, "1", 0.0, 0.2)
-    """Rolling resistance of the felt-covered ball, as a share of the load."""
+    rolling: float = param(0.04, "1", 0.0, 0.2)  # rolling resistance of the felt-covered ball, as a share of the load
     cage: HoledCage = HoledCage()
     ball: Ball = Ball(radius=0.015, density=1400.0, friction=0.5, rgba=(0.85, 0.20, 0.15, 1.0))
     stool: Stool = Stool()

@@ -68,15 +68,11 @@ class BounceIntercept(LaunchedBall):
     """Side to which the ball is launched; `y`, `aim` and `turn` are mirrored with it."""
     x: float = param(-0.12, "m", -0.36, 0.36)
     y: float = param(-0.15, "m", -0.36, 0.36)
-    aim: float = param(35.0, "deg", -90.0, 90.0)
-    """Direction of the launch; 0 is away from the robot, 90 to its left."""
+    aim: float = param(35.0, "deg", -90.0, 90.0)  # direction of the launch; 0 is away from the robot, 90 to its left
     speed: float = param(0.32, "m/s", 0.08, 0.8)
-    launch: float = param(0.8, "s", 0.3, 2.0)
-    """Time of the launch."""
-    turn: float = param(0.0, "deg", -30.0, 30.0)
-    """Angle by which the enclosure is turned to the left."""
-    friction: float = param(0.0, "1", 0.0, 0.6)
-    """Friction of the mat; if it is not 0, the ball rolls."""
+    launch: float = param(0.8, "s", 0.3, 2.0)  # time of the launch
+    turn: float = param(0.0, "deg", -30.0, 30.0)  # angle by which the enclosure is turned to the left
+    friction: float = param(0.0, "1", 0.0, 0.6)  # friction of the mat; if it is not 0, the ball rolls
     ball: Ball = Ball(radius=0.020, density=1200.0, friction=0.6, rgba=(0.90, 0.35, 0.10, 1.0))
     enclosure: Enclosure = Enclosure()
 

@@ -84,8 +84,7 @@ class BowlTable(Scenario):
     goal_x: float = param(0.03, "m", -0.3, 0.3)
     goal_y: float = param(0.15, "m", -0.35, 0.35)
     bowl: Bowl = Bowl()
-    plinth: float = param(0.020, "m", 0.005, 0.20)
-    """Height of the rack's floor."""
+    plinth: float = param(0.020, "m", 0.005, 0.20)  # height of the rack's floor
     patch: Patch = Patch(size=0.12)
 
     # --- scene ----------------------------------------------------------------------------

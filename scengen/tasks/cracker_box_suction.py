@@ -65,14 +65,11 @@ class CrackerBoxSuction(BoxAndSlot):
 
     box_x: float = param(-0.13, "m", -0.4, 0.4)
     box_y: float = param(0.13, "m", -0.4, 0.4)
-    box_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """Yaw of the box: at 0 its broad faces look along y."""
+    box_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # yaw of the box: at 0 its broad faces look along y
     slot_x: float = param(0.08, "m", -0.4, 0.4)
     slot_y: float = param(-0.06, "m", -0.4, 0.4)
-    slot_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """Yaw of the slot: at 0 its long side is along y."""
-    clearance: float = param(0.004, "m", 0.0005, 0.02)
-    """Gap between the box in the middle of the slot and each wall."""
+    slot_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # yaw of the slot: at 0 its long side is along y
+    clearance: float = param(0.004, "m", 0.0005, 0.02)  # gap between the box in the middle of the slot and each wall
     box: CrackerBox = CrackerBox(friction=0.21)
 
     # --- goal -----------------------------------------------------------------------------

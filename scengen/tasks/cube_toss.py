@@ -79,20 +79,14 @@ class CubeToss(Scenario):
 
     HOLD = 0.3
 
-    distance: float = param(1.035, "m", 0.9, 1.3)
-    """Distance of the middle of the tray from the robot's first axis."""
-    bearing: float = param(50.0, "deg", -110.0, 110.0)
-    """Bearing of the tray; 0 is ahead of the robot, 90 to its left."""
-    stand: float = param(0.0, "m", 0.0, 0.6)
-    """Height of the post under the tray."""
-    turn: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Angle by which the tray is turned from facing the robot."""
-    opening: float = param(0.095, "m", 0.06, 0.20)
-    """Length of the tray's inner sides."""
+    distance: float = param(1.035, "m", 0.9, 1.3)  # distance of the middle of the tray from the robot's first axis
+    bearing: float = param(50.0, "deg", -110.0, 110.0)  # bearing of the tray; 0 is ahead of the robot, 90 to its left
+    stand: float = param(0.0, "m", 0.0, 0.6)  # height of the post under the tray
+    turn: float = param(0.0, "deg", -45.0, 45.0, period=90.0)  # angle by which the tray is turned from facing the robot
+    opening: float = param(0.095, "m", 0.06, 0.20)  # length of the tray's inner sides
     rate: float = param(0.0, "deg/s", -10.0, 10.0)
     """Rate at which the tray rides on a rail around the robot, away from straight ahead; 0: it stands still."""
-    launch: float = param(2.0, "s", 0.5, 4.0)
-    """Time at which the tray starts to ride."""
+    launch: float = param(2.0, "s", 0.5, 4.0)  # time at which the tray starts to ride
     x: float = param(-0.10, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)

@@ -79,8 +79,7 @@ class CupExtract(Scenario):
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    handle: float = param(180.0, "deg", 0.0, 360.0, period=360.0)
-    """Direction of the handle; 180 is towards the robot."""
+    handle: float = param(180.0, "deg", 0.0, 360.0, period=360.0)  # direction of the handle; 180 is towards the robot
     goal_x: float = param(-0.10, "m", -0.4, 0.4)
     goal_y: float = param(-0.25, "m", -0.4, 0.4)
     cup: Cup = MUG

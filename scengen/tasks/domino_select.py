@@ -65,8 +65,7 @@ class DominoSelect(Scenario):
 
     count: int = param(4, "tiles", 3, 8)
     gap_ratio: float = param(1.25, "tile widths", 0.2, 2.5)
-    lane: float = param(0.09, "m", 0.05, 0.15)
-    """Distance between neighbouring chains."""
+    lane: float = param(0.09, "m", 0.05, 0.15)  # distance between neighbouring chains
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)

@@ -44,16 +44,13 @@ SLAB_DISPLACEMENT = 0.05
 class DominoSingle(Scenario):
     """A straight chain of tiles with a red slab at its end; the first tile, the starter, may differ from the others."""
 
-    count: int = param(5, "tiles", 2, 15)
-    """Number of tiles; the slab does not count."""
-    gap_ratio: float = param(0.9, "tile widths", 0.2, 2.5)
-    """Free space between neighbouring faces."""
+    count: int = param(5, "tiles", 2, 15)  # number of tiles; the slab does not count
+    gap_ratio: float = param(0.9, "tile widths", 0.2, 2.5)  # free space between neighbouring faces
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     """Direction of the chain; 0 is away from the robot, 90 to its left."""
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    slab_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
-    """Angle of the slab to the chain."""
+    slab_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # angle of the slab to the chain
     starter: Domino = Domino(rgba=(0.95, 0.70, 0.25, 1.0))
     tile: Domino = Domino()
     slab: Domino = Domino(height=0.12, width=0.06, thickness=0.015, mass=0.06, rgba=(0.78, 0.10, 0.10, 1.0))

@@ -72,12 +72,9 @@ class EdgeSlide(Scenario):
 
     side: int = param(1, "1 left, -1 right", -1, 1)
     """Side of the nearest edge. 0 is refuted."""
-    x: float = param(-0.10, "m", -0.4, 0.4)
-    """Position of the plate's middle along the edge."""
-    away: float = param(0.18, "m", 0.03, 0.4)
-    """Distance of the plate's middle from the edge."""
-    yaw: float = param(0.0, "deg", -60.0, 60.0)
-    """Angle of the plate to the edge; 0 is square to it."""
+    x: float = param(-0.10, "m", -0.4, 0.4)  # position of the plate's middle along the edge
+    away: float = param(0.18, "m", 0.03, 0.4)  # distance of the plate's middle from the edge
+    yaw: float = param(0.0, "deg", -60.0, 60.0)  # angle of the plate to the edge; 0 is square to it
     plate: Board = Board()
 
     # --- scene ----------------------------------------------------------------------------

@@ -58,12 +58,9 @@ class GalileoRampDrop(Scenario):
 
     x: float = param(0.06, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
-    """Direction in which the ball rolls."""
-    tray_back: float = param(0.12, "m", 0.05, 0.3)
-    """Distance of the tray's middle behind the middle of the ramp."""
-    tray_gap: float = param(0.045, "m", 0.035, 0.1)
-    """Free space between tray and ramp."""
+    heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)  # direction in which the ball rolls
+    tray_back: float = param(0.12, "m", 0.05, 0.3)  # distance of the tray's middle behind the middle of the ramp
+    tray_gap: float = param(0.045, "m", 0.035, 0.1)  # free space between tray and ramp
     ramp: Ramp = Ramp()
     ball: Ball = Ball()
 

@@ -67,18 +67,12 @@ class GapFunnel(Scenario):
     HOLD = 0.3
 
     wall_x: float = param(0.15, "m", 0.0, 0.3)
-    gap_y: float = param(0.0, "m", -0.35, 0.35)
-    """Place of the middle of the gap."""
-    yaw: float = param(0.0, "deg", -45.0, 45.0)
-    """Direction in which the gap leads; 0 is straight away from the robot."""
-    before: float = param(0.24, "m", 0.05, 0.4)
-    """Distance of the ball from the middle of the wall."""
-    offset: float = param(0.12, "m", -0.4, 0.4)
-    """Offset of the ball from the gap's axis, to the left."""
-    run: float = param(0.195, "m", 0.05, 0.3)
-    """Distance from the middle of the gap to that of the zone."""
-    rolling: float = param(0.008, "1", 0.003, 0.1)
-    """Rolling resistance, as a share of the load."""
+    gap_y: float = param(0.0, "m", -0.35, 0.35)  # place of the middle of the gap
+    yaw: float = param(0.0, "deg", -45.0, 45.0)  # direction in which the gap leads; 0 is straight away from the robot
+    before: float = param(0.24, "m", 0.05, 0.4)  # distance of the ball from the middle of the wall
+    offset: float = param(0.12, "m", -0.4, 0.4)  # offset of the ball from the gap's axis, to the left
+    run: float = param(0.195, "m", 0.05, 0.3)  # distance from the middle of the gap to that of the zone
+    rolling: float = param(0.008, "1", 0.003, 0.1)  # rolling resistance, as a share of the load
     wall: GapWall = GapWall()
     ball: Ball = Ball(radius=0.025, density=600.0, friction=0.3, rgba=(0.90, 0.45, 0.10, 1.0))
     zone: Patch = Patch(size=0.08)

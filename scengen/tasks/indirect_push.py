@@ -100,16 +100,11 @@ class IndirectPush(Scenario):
 
     bearing: float = param(20.0, "deg", -45.0, 45.0)
     """Bearing of target and zone from the robot's first axis; 0 is straight ahead."""
-    distance: float = param(0.924, "m", 0.5, 1.1)
-    """Distance of the target's middle from that axis."""
-    way: float = param(0.050, "m", 0.01, 0.15)
-    """Distance of the zone's middle from the target's."""
-    target_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Yaw of the target relative to the bearing."""
-    edge: float = param(0.055, "m", 0.03, 0.07)
-    """Edge of the blocks and the target."""
-    mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
-    """Mass of a block."""
+    distance: float = param(0.924, "m", 0.5, 1.1)  # distance of the target's middle from that axis
+    way: float = param(0.050, "m", 0.01, 0.15)  # distance of the zone's middle from the target's
+    target_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)  # yaw of the target relative to the bearing
+    edge: float = param(0.055, "m", 0.03, 0.07)  # edge of the blocks and the target
+    mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)  # mass of a block
     target_mass: float = param(0.10, "kg", 0.02, 1.0, hidden=True)
     friction: float = param(0.65, "1", 0.1, 1.2, hidden=True)
     block_0: Spot = Spot(y=-0.25)

@@ -81,14 +81,12 @@ MEMORY = ("typed", "mistake", "key_0", "held_0", "key_1", "held_1")
 class KeyboardTyping(Scenario):
     """A keyboard between two arms, and a word whose letters are shared out."""
 
-    word: int = param(0, "words", 0, len(WORDS) - 1)
-    """Number of the word in `WORDS`."""
+    word: int = param(0, "words", 0, len(WORDS) - 1)  # number of the word in `WORDS`
     mine: int = param(0b01010, "1", 1, 254)
     """Places of the word that are the agent's, one bit each; the lowest bit is the first letter."""
     hold: float = param(0.2, "s", 0.05, 1.0, hidden=True)
     """Time that a key must be touched until it counts; the move is called `motion.hold`."""
-    pace: float = param(0.22, "m/s", 0.05, 0.30)
-    """Speed of the partner's hand."""
+    pace: float = param(0.22, "m/s", 0.05, 0.30)  # speed of the partner's hand
     x: float = param(-0.10, "m", -0.2, 0.1)
     y: float = param(0.0, "m", -0.1, 0.1)
     yaw: float = param(0.0, "deg", -30.0, 30.0)

@@ -59,10 +59,8 @@ class LinearIntercept(LaunchedBall):
     heading: float = param(255.0, "deg", -180.0, 360.0, period=360.0)
     """Direction in which it rolls; 0 is away from the robot, 90 to its left."""
     speed: float = param(0.15, "m/s", 0.08, 0.4)
-    launch: float = param(0.8, "s", 0.3, 2.0)
-    """Time of the launch."""
-    rolling: float = param(0.0, "1", 0.0, 0.02)
-    """Rolling resistance, as a share of the load."""
+    launch: float = param(0.8, "s", 0.3, 2.0)  # time of the launch
+    rolling: float = param(0.0, "1", 0.0, 0.02)  # rolling resistance, as a share of the load
     ball: Ball = Ball(radius=0.020, density=1200.0, friction=0.6, rgba=(0.90, 0.35, 0.10, 1.0))
 
     # --- scene ----------------------------------------------------------------------------

@@ -70,8 +70,7 @@ class MirrorPickPlace(Scenario):
     HOLD = 0.3
     NO_ABLATIONS = "the cube is lifted with the hand alone, and what is turned is the picture, which no scene holds"
 
-    view: int = param(1, "view", 0, len(VIEWS) - 1)
-    """Index of the pictures' orientation in `VIEWS`."""
+    view: int = param(1, "view", 0, len(VIEWS) - 1)  # index of the pictures' orientation in `VIEWS`
     x: float = param(0.05, "m", -0.4, 0.4)
     y: float = param(0.12, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)

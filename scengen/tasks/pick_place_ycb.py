@@ -59,8 +59,7 @@ JUMP_MARGIN = 0.03  # distance, in excess of `near`, of the object from the squa
 class Jump:
     """Distance and direction of a jump of the square."""
 
-    way: float = param(0.24, "m", 0.05, 0.60, hidden=True)
-    """Distance of the jump."""
+    way: float = param(0.24, "m", 0.05, 0.60, hidden=True)  # distance of the jump
     share: float = param(0.5, "1", 0.0, 0.999, hidden=True)
     """Direction of the jump: the directions in whole degrees that end on the field are counted from x to the left, and
     this share of them is skipped."""

@@ -72,10 +72,8 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
     shelf_y: float = param(0.05, "m", -0.3, 0.3)
     shelf_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
     plate: Dish = Dish()
-    gap: float = param(0.036, "m", 0.02, 0.09)
-    """Width of the slot."""
-    proud: float = param(0.04, "m", 0.0, 0.1)
-    """Height by which the plate stands out of the slot."""
+    gap: float = param(0.036, "m", 0.02, 0.09)  # width of the slot
+    proud: float = param(0.04, "m", 0.0, 0.1)  # height by which the plate stands out of the slot
 
     def failure(self, world: World) -> str | None:
         if world.touching("plate", "shelf") and not self.over_slot(world):

@@ -75,12 +75,10 @@ class RampSort(Scenario):
     blues: int = param(2, "balls", 1, 3)
     arrangement: int = param(0, "index", 0, math.comb(MAX_BALLS, MAX_BALLS // 2) - 1)
     """Index, among all choices of places in the row, of the choice for the red balls."""
-    red_side: int = param(-1, "1 left, -1 right", -1, 1)
-    """Side of the ridge on which the red bin is; 0 is refuted."""
+    red_side: int = param(-1, "1 left, -1 right", -1, 1)  # side of the ridge on which the red bin is; 0 is refuted
     x: float = param(0.02, "m", -0.3, 0.3)
     y: float = param(0.02, "m", -0.3, 0.3)
-    ramp_yaw: float = param(0.0, "deg", -60.0, 60.0)
-    """Direction of the ramp; at 0 balls roll to the robot's left."""
+    ramp_yaw: float = param(0.0, "deg", -60.0, 60.0)  # direction of the ramp; at 0 balls roll to the robot's left
     box_x: float = param(0.02, "m", -0.3, 0.3)
     box_y: float = param(-0.285, "m", -0.35, 0.35)
     ramp: CrownedRamp = CrownedRamp()

@@ -82,12 +82,10 @@ class RecoverPegInsert(Scenario):
     peg_x: float = param(-0.075, "m", -0.4, 0.4)
     peg_y: float = param(-0.075, "m", -0.4, 0.4)
     peg_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    side: int = param(1, "1", -1, 1)
-    """1 if the board is on the left, -1 on the right."""
+    side: int = param(1, "1", -1, 1)  # 1 if the board is on the left, -1 on the right
     mouth_x: float = param(-0.04, "m", -0.4, 0.4)
     mouth_y: float = param(0.16, "m", -0.4, 0.4)
-    board_yaw: float = param(0.0, "deg", -60.0, 60.0)
-    """Angle by which the slot leads away from the robot at the start."""
+    board_yaw: float = param(0.0, "deg", -60.0, 60.0)  # angle by which the slot leads away from the robot at the start
     turn: float = param(10.0, "deg", -30.0, 30.0, hidden=True)
     """Turn of the board about the vertical, once the peg is in line."""
     distance: float = param(0.045, "m", 0.005, 0.075, hidden=True)

@@ -78,14 +78,11 @@ class SeesawBalance(Scenario):
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)
-    """Direction of +s."""
-    offset: float = param(0.14, "m", -0.35, 0.35)
-    """Offset of the target from the axle, along the deck."""
+    heading: float = param(90.0, "deg", -180.0, 180.0, period=360.0)  # direction of +s
+    offset: float = param(0.14, "m", -0.35, 0.35)  # offset of the target from the axle, along the deck
     weight_x: float = param(-0.17, "m", -0.4, 0.4)
     weight_y: float = param(0.0, "m", -0.4, 0.4)
-    weight_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Angle of the counterweight to the heading."""
+    weight_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)  # angle of the counterweight to the heading
     seesaw: Seesaw = Seesaw()
     target: Block = Block(rgba=(0.78, 0.10, 0.10, 1.0))
     weight: Block = Block()

@@ -78,10 +78,8 @@ class ShapeStack(Scenario):
     HOLD = 1.0
     NO_ABLATIONS = "every shape is part of what is asked for: none can be taken away"
 
-    count: int = param(4, "", 3, 5)
-    """Number of shapes: the cone, and pieces from the first one on."""
-    cone_at: int = param(1, "", 0, 4)
-    """Index of the piece whose place the cone takes."""
+    count: int = param(4, "", 3, 5)  # number of shapes: the cone, and pieces from the first one on
+    cone_at: int = param(1, "", 0, 4)  # index of the piece whose place the cone takes
     cone: Shape = Shape(kind=FRUSTUM, width=0.042, height=0.041)
     a: Piece = Piece(y=0.19)
     b: Piece = Piece()

@@ -67,21 +67,18 @@ class ShelteredGrasp(Scenario):
     side: int = param(1, "1 left, -1 right", -1, 1)
     """Side of the table's middle on which the rack stands. 0 is refuted."""
     rack_x: float = param(-0.06, "m", -0.3, 0.3)
-    rack_y: float = param(0.205, "m", 0.1, 0.3)
-    """Distance of the rack to that side."""
+    rack_y: float = param(0.205, "m", 0.1, 0.3)  # distance of the rack to that side
     rack_yaw: float = param(0.0, "deg", -60.0, 60.0)
     """Yaw of the rack. At 0 the open side faces the middle; if negative, it faces towards the robot's base, so that the
     hand comes from there."""
     storey: int = param(0, "storey", 0, STOREYS - 1)
     along: float = param(0.03, "m", -0.15, 0.15)
     """Position of the cube along the open side, from its middle; positive away from the robot."""
-    depth: float = param(0.085, "m", 0.03, 0.12)
-    """Distance of the cube's middle behind the open side."""
+    depth: float = param(0.085, "m", 0.03, 0.12)  # distance of the cube's middle behind the open side
     cube_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
     """Yaw of the cube relative to the table, whatever the yaw of the rack."""
     tray_x: float = param(0.11, "m", -0.4, 0.4)
-    tray_y: float = param(-0.08, "m", -0.4, 0.4)
-    """Position of the tray, positive to the side of the rack."""
+    tray_y: float = param(-0.08, "m", -0.4, 0.4)  # position of the tray, positive to the side of the rack
     rack: TierRack = TierRack()
     cube: Cube = Cube(edge=0.048)
 

@@ -64,8 +64,7 @@ class Load:
     """A block on the ramp."""
 
     friction: float = param(0.6, "1", 0.15, 1.0, hidden=True)
-    away: float = param(0.04, "m", 0.02, 0.12)
-    """Distance of its middle from the lip."""
+    away: float = param(0.04, "m", 0.02, 0.12)  # distance of its middle from the lip
 
     def __post_init__(self) -> None:
         check_bounds(self)
@@ -84,23 +83,17 @@ class SlideCatch(Scenario):
     HOLD = 0.5
     MOVING = ("block_0", "block_1", "block_2")
 
-    order: int = param(0, "", 0, len(ORDERS) - 1)
-    """Index in `ORDERS` of the lanes in which the blocks lie."""
+    order: int = param(0, "", 0, len(ORDERS) - 1)  # index in `ORDERS` of the lanes in which the blocks lie
     low: Load = Load(friction=0.277, away=0.022)
     middle: Load = Load(friction=0.53, away=0.032)
     high: Load = Load(friction=0.87, away=0.040)
-    edge: float = param(0.026, "m", 0.02, 0.04)
-    """Edge of the blocks."""
+    edge: float = param(0.026, "m", 0.02, 0.04)  # edge of the blocks
     rate: float = param(4.3, "deg/s", 2.0, 12.0)
     """Rate at which the ramp tilts (9.6 s for the mean demonstration: paper, App. B.1)."""
-    start: float = param(1.8, "s", 0.3, 6.0)
-    """Time at which the ramp starts to tilt."""
-    lane: float = param(0.160, "m", 0.08, 0.20)
-    """Distance between neighbouring lanes."""
-    x: float = param(0.12, "m", 0.0, 0.2)
-    """Place of the lip."""
-    y: float = param(0.0, "m", -0.2, 0.2)
-    """Place of the middle lane."""
+    start: float = param(1.8, "s", 0.3, 6.0)  # time at which the ramp starts to tilt
+    lane: float = param(0.160, "m", 0.08, 0.20)  # distance between neighbouring lanes
+    x: float = param(0.12, "m", 0.0, 0.2)  # place of the lip
+    y: float = param(0.0, "m", -0.2, 0.2)  # place of the middle lane
     bin_x: float = param(-0.02, "m", -0.2, 0.1)
     bin_y: float = param(-0.06, "m", -0.3, 0.3)
     incline: Incline = Incline()

@@ -87,8 +87,7 @@ class Slip:
 
     share: float = param(0.4, "1", 0.05, 0.95, hidden=True)
     """Share of the remaining way, from the start to the rim of the square, after which the slip comes."""
-    seconds: float = param(0.30, "s", 0.05, 4.0, hidden=True)
-    """Duration for which the gripper is forced open."""
+    seconds: float = param(0.30, "s", 0.05, 4.0, hidden=True)  # duration for which the gripper is forced open
 
 
 @dataclass(frozen=True, kw_only=True)

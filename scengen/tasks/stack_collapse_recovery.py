@@ -73,16 +73,13 @@ class Blow:
 
     when: float = param(0.7, "s", 0.1, 10.0, hidden=True)
     """Time for which the tower has stood untouched when the blow comes."""
-    both: int = param(1, "", 0, 1, hidden=True)
-    """1 if the middle cube is struck, too."""
+    both: int = param(1, "", 0, 1, hidden=True)  # 1 if the middle cube is struck, too
     heading: float = param(90.0, "deg", -360.0, 360.0, period=360.0, hidden=True)
     """Direction in which the top cube is thrown."""
     heading_middle: float = param(270.0, "deg", -360.0, 360.0, period=360.0, hidden=True)
     """Direction in which the middle cube is thrown."""
-    speed: float = param(0.88, "m/s", 0.1, 2.5, hidden=True)
-    """Speed that the impulse gives to the top cube."""
-    speed_middle: float = param(0.92, "m/s", 0.1, 2.5, hidden=True)
-    """Speed that the impulse gives to the middle cube."""
+    speed: float = param(0.88, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the top cube
+    speed_middle: float = param(0.92, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the middle cube
 
     def __post_init__(self) -> None:
         check_bounds(self)
