@@ -40,7 +40,8 @@ PIECE_COLOURS: tuple[Rgba, ...] = (
 class MeshProp(Prop):
     """A body of convex pieces for collisions, and the original mesh for pictures. It stands on z = 0.
 
-    The axes of all points are parallel to those of the mesh file. The origin is below the centre of mass.
+    The axes of all points are those of the mesh file after it was turned upright. The origin is below the centre of
+    mass.
     """
 
     corners: tuple[Points, ...]

@@ -1,6 +1,7 @@
 """list assets, write one as a mesh, or import a mesh as a new asset"""
 
 import json
+import math
 from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,7 @@ class AssetSettings:
     to: str | None
     mesh: str | None
     units: str | None
+    up: str | None
     mass: float | None
     density: float | None
     friction: float
@@ -136,8 +138,22 @@ def _report(figures: dict[str, Any]) -> int:
         f"{figures['mass']:.3g} kg; released on the table it moves by {1000 * rest['creep']:.3f} mm in 2 s, "
         f"at {1000 * rest['speed']:.2f} mm/s at most"
     )
+    say(_about_sides(figures))
     if not is_accurate:
         say(f"MISSED: the error of {1000 * asked:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:
         say("MISSED: it does not come to rest; give it a flat foot, or set a smaller error")
     return OK if is_accurate and rest["rests"] else FAILED
+
+
+def _about_sides(figures: dict[str, Any]) -> str:
+    """Which axis of the file points up and why, and the side on which the asset stands after the drop."""
+    given, rest = figures["settings"]["up"], figures["rest"]
+    is_gltf = figures["input"]["file"].lower().endswith(".glb")
+    why = "as given" if given else "as glTF defines" if is_gltf else "the default; give up=AXIS if it is another one"
+    lean = math.degrees(rest["lean"])
+    oblique = f", tilted by {lean:.0f} deg" if lean > 1.0 else ""
+    return (
+        f"its {figures['up']} axis points up ({why}); on the table it "
+        f"{'fell over and lies' if rest['fell'] else 'stands'} on its {rest['side_below']} side{oblique}"
+    )

@@ -2,11 +2,12 @@
 
 import mujoco
 import numpy as np
-from manifold3d import Manifold, OpType
+from manifold3d import Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 
 from ..assets.prop import Prop
 from ..errors import BadConfig
+from ..geometry import Mat3
 
 FORMATS = (".glb", ".obj", ".off", ".ply", ".stl")
 """Endings of the names of mesh files."""
@@ -14,6 +15,15 @@ SEGMENTS = 48
 """Number of corners that replace a full circle; all lie on the circle."""
 OVERLAP = 1e-5
 """Distance by which parts are enlarged on all sides [m], so that parts that only touch become one."""
+
+
+GRID = 1e-6
+"""Grid of the vertices in mesh files [m]. It is coarser than the rounding of 32-bit numbers and of printed digits, so
+that programs which merge equal vertices find the same triangles in every format."""
+CLEANING_ROUNDS = 8
+"""Largest number of attempts to put a mesh on the grid; the bowl needs 2, all other assets 1."""
+GLTF_AXES: Mat3 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Rotation from the axes of scenes to those of glTF, whose y axis points up."""
 
 
 def united(prop: Prop) -> Manifold:
@@ -41,10 +51,10 @@ def united(prop: Prop) -> Manifold:
 
 
 def encode(prop: Prop, ending: str) -> bytes:
-    """The union as a mesh file [m].
+    """The union as a mesh file [m]: closed, with the z axis upwards, in glTF with the y axis as it defines.
 
     Raises:
-        BadConfig: no such format, nothing solid, or trimesh is missing.
+        BadConfig: no such format, no collision geometry, no closed mesh, or trimesh is missing.
     """
     if ending not in FORMATS:
         raise BadConfig(f"no mesh format named {ending!r}; known: {', '.join(FORMATS)}")
@@ -52,10 +62,31 @@ def encode(prop: Prop, ending: str) -> bytes:
         import trimesh
     except ImportError:
         raise BadConfig("no trimesh for mesh files; run pip install 'scengen[mesh]'") from None
-    found = united(prop).to_mesh64()
-    points, faces = np.asarray(found.vert_properties)[:, :3], np.asarray(found.tri_verts, np.int64)
+    points, faces = _on_grid(united(prop))
+    points = points @ GLTF_AXES.T if ending == ".glb" else points
     written = trimesh.Trimesh(points, faces, process=False).export(file_type=ending[1:])
     return written.encode() if isinstance(written, str) else bytes(written)
+
+
+def _on_grid(found: Manifold) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices on a grid, and triangles of which two meet at every edge.
+
+    Parts that touch at an edge come apart in the next round, where edges up to a larger tolerance vanish.
+    """
+    for attempt in range(CLEANING_ROUNDS):
+        mesh = found.simplify(GRID * 2**attempt).to_mesh64()
+        cells = np.round(np.asarray(mesh.vert_properties)[:, :3] / GRID)
+        cells, names = np.unique(cells, axis=0, return_inverse=True)
+        faces = names.reshape(-1)[np.asarray(mesh.tri_verts, np.int64)]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        _, same, sides = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+        faces = faces[sides[same.reshape(-1)] == 1]  # two sides of a sheet without thickness cancel
+        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        points = np.ascontiguousarray(cells * GRID)
+        if (np.unique(edges, axis=0, return_counts=True)[1] == 2).all():
+            return points, faces
+        found = Manifold(Mesh64(points, np.ascontiguousarray(faces.astype(np.uint64))))
+    raise BadConfig(f"no closed mesh on a grid of {1e6 * GRID:g} um; name another asset, or change its parameters")
 
 
 def _geom(model: mujoco.MjModel, g: int) -> Manifold:

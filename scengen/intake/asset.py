@@ -3,24 +3,31 @@
 import hashlib
 import importlib.metadata
 import json
+import os
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import mujoco
 import numpy as np
 
-from ..assets.mesh_prop import MeshProp
+from ..assets.mesh_prop import MeshProp, Points
 from ..assets.prop import TABLE_TOP, Prop, place, table
 from ..assets.turned import FOOT_RADIUS
 from ..errors import BadConfig, UnknownName, cut
 from ..geometry import Mat3
 from ..sim.scene_text import emit
-from .feet import feet
+from ..work.parallel import Limits, each
+from .feet import MAX_LEAN, feet
 from .pieces import Pieces, Surface, cut_up, one_hull
-from .solid import UNITS, MeshSolid, as_mesh, content, read
+from .polygons import Indices
+from .solid import UNITS, UPRIGHT, MeshSolid, as_mesh, content, read
 
+CUTTING_LIMITS = Limits(600.0, 8000)
+"""Limits on making an asset. A scan with 16 000 triangles takes some 10 s and 300 MB."""
+REVISION = "2"
+"""Revision of this package: assets of an earlier one may differ although all versions are the same."""
 DEFAULT_DENSITY = 1000.0
 """Density if neither mass nor density is given [kg/m^3]: that of water."""
 MAX_VISUAL_FACES = 2000
@@ -45,6 +52,8 @@ class IntakeRequest:
     """Path of the mesh file."""
     units: str | None = None
     """Unit of the numbers in the file, one of `UNITS`. Default: metres."""
+    up: str | None = None
+    """Axis of the file that points up, one of `UPRIGHT`. Default: y for glTF, which defines it, else z."""
     mass: float | None = None
     """Mass [kg]."""
     density: float | None = None
@@ -62,6 +71,8 @@ class IntakeRequest:
         """Raise `BadConfig` or `UnknownName` for an invalid value."""
         if self.units is not None and self.units not in UNITS:
             raise UnknownName("unit", self.units, UNITS)
+        if self.up is not None and self.up not in UPRIGHT:
+            raise UnknownName("axis", self.up, UPRIGHT)
         if self.mass is not None and self.density is not None:
             raise BadConfig(f"mass = {self.mass:g} and density = {self.density:g}; give one of them")
         ranges = {
@@ -90,6 +101,8 @@ class DropResult:
     """Angle between its orientations at the drop and at the end [rad]."""
     contacts: int
     """Number of contacts at the end."""
+    down: tuple[float, float, float]
+    """Direction that points down at the end, in the asset's axes."""
 
     @property
     def rests(self) -> bool:
@@ -111,7 +124,8 @@ def drop(prop: Prop) -> DropResult:
     mujoco.mj_forward(model, data)
     creep = float(np.linalg.norm(data.body("asset").xipos - before))
     turn = 2 * float(np.arccos(np.clip(abs(data.qpos[3]), 0.0, 1.0)))
-    return DropResult(creep, speed, turn, int(data.ncon))
+    x, y, z = -data.body("asset").xmat.reshape(3, 3)[2]
+    return DropResult(creep, speed, turn, int(data.ncon), (float(x), float(y), float(z)))
 
 
 @dataclass(frozen=True)
@@ -125,17 +139,27 @@ class MeshAsset:
     """Convex pieces that replace the solid."""
     hull: Pieces
     """Convex hull of the solid, for comparison."""
+    visual: tuple[Points, Indices]
+    """Vertices and triangles of the mesh that pictures show."""
     prop: MeshProp
-    """Asset in the orientation of the file."""
+    """Asset as its file stands, with the up axis upwards."""
 
     def turned(self, rot: Mat3) -> MeshProp:
-        """The asset rotated by `rot` from the orientation of its file, with feet below."""
-        return _prop(self.request, self.solid, self.pieces, rot)
+        """The asset rotated by `rot` from the way its file stands, with feet below."""
+        return _prop(self.request, self.solid, self.pieces, self.visual, rot)
 
     @cached_property
     def rest(self) -> DropResult:
         """Result of dropping the asset on the table."""
         return drop(self.prop)
+
+    @property
+    def side_below(self) -> tuple[str, float]:
+        """Side of the file that is below after the drop, such as `-z`, and its angle to the table [rad]."""
+        down = UPRIGHT[self.solid.up].T @ np.array(self.rest.down)
+        axis = int(np.argmax(np.abs(down)))
+        lean = float(np.arccos(min(1.0, abs(down[axis]))))
+        return f"{'-' if down[axis] < 0.0 else '+'}{'xyz'[axis]}", lean
 
     @cached_property
     def xml(self) -> str:
@@ -145,6 +169,7 @@ class MeshAsset:
     def figures(self) -> dict[str, Any]:
         """Figures of the asset, as plain data."""
         extents = self.solid.mesh.extents
+        side, lean = self.side_below
         return {
             "key": key(self.request, self.solid.sha256),
             "input": {"file": self.solid.file, "sha256": self.solid.sha256},
@@ -165,7 +190,14 @@ class MeshAsset:
             "feet": len(self.prop.feet),
             "error": asdict(self.pieces.error),
             "error_of_one_hull": asdict(self.hull.error),
-            "rest": {**asdict(self.rest), "rests": self.rest.rests},
+            "up": self.solid.up,
+            "rest": {
+                **asdict(self.rest),
+                "rests": self.rest.rests,
+                "fell": self.rest.turn > MAX_LEAN,
+                "side_below": side,
+                "lean": lean,
+            },
             "sha256": {"asset.xml": hashlib.sha256(self.xml.encode()).hexdigest()},
         }
 
@@ -173,19 +205,49 @@ class MeshAsset:
 def make_asset(request: IntakeRequest) -> MeshAsset:
     """Read a mesh and make an asset of it: one convex hull if that is near enough, else convex pieces.
 
+    The work is done in a process of its own, as native code may crash on a mesh, or not end.
+
     Raises:
-        BadConfig, UnknownName: the settings or the file are invalid.
+        BadConfig, UnknownName: the settings or the file are invalid, or the process crashed or reached a limit.
     """
     request.check()
-    found = read(request.mesh, request.units, request.seed)
+    (asset,) = each(_make_asset, [request], 1, CUTTING_LIMITS, _lost, fork=False)  # the native code has threads
+    return asset
+
+
+def _lost(request: IntakeRequest, reason: str) -> NoReturn:
+    raise BadConfig(
+        f"{cut(request.mesh)} cannot be cut into convex pieces: the process {reason}; repair it, or simplify it"
+    )
+
+
+def _make_asset(request: IntakeRequest) -> MeshAsset:
+    """Make an asset, in a process of its own."""
+    with open(os.devnull, "wb") as null:  # native code that crashes prints lines of its own
+        os.dup2(null.fileno(), 1)
+        os.dup2(null.fileno(), 2)
+    found = read(request.mesh, request.units, request.seed, request.up)
     surface = Surface(found.manifold, request.seed)
     hull = one_hull(found, surface, request.seed)
     near = hull.error.worst <= request.error
     pieces = hull if near else cut_up(found, surface, request.error, request.pieces, request.seed)
-    return MeshAsset(request, found, pieces, hull, _prop(request, found, pieces))
+    visual = _visual(found)
+    asset = MeshAsset(request, found, pieces, hull, visual, _prop(request, found, pieces, visual))
+    asset.figures()  # the drop and the MJCF are kept in the asset
+    return asset
 
 
-def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | None = None) -> MeshProp:
+def _visual(found: MeshSolid) -> tuple[Points, Indices]:
+    tolerance, simplified = 1e-4, found.manifold
+    while simplified.num_tri() > MAX_VISUAL_FACES:
+        simplified, tolerance = found.manifold.simplify(tolerance), 1.5 * tolerance
+    mesh = as_mesh(simplified)
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def _prop(
+    request: IntakeRequest, found: MeshSolid, pieces: Pieces, visual: tuple[Points, Indices], rot: Mat3 | None = None
+) -> MeshProp:
     mesh = found.mesh
     mesh.density = request.mass / mesh.volume if request.mass else (request.density or DEFAULT_DENSITY)
     turn = np.eye(3) if rot is None else rot
@@ -194,15 +256,12 @@ def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | 
     stands = feet(corners, com)
     lowest = np.concatenate([corners[:, 2], stands[:, 2] - FOOT_RADIUS]).min()
     origin = np.array([com[0], com[1], lowest])
-    tolerance, simplified = 1e-4, found.manifold
-    while simplified.num_tri() > MAX_VISUAL_FACES:
-        simplified, tolerance = found.manifold.simplify(tolerance), 1.5 * tolerance
-    visual = as_mesh(simplified)
+    vertices, faces = visual
     return MeshProp(
         corners=tuple(points - origin for points in parts),
         feet=stands - origin,
-        vertices=np.asarray(visual.vertices) @ turn.T - origin,
-        faces=np.asarray(visual.faces),
+        vertices=vertices @ turn.T - origin,
+        faces=faces,
         mass=float(mesh.mass),
         com=com - origin,
         inertia=turn @ np.asarray(mesh.moment_inertia) @ turn.T,
@@ -212,7 +271,8 @@ def _prop(request: IntakeRequest, found: MeshSolid, pieces: Pieces, rot: Mat3 | 
 
 def versions() -> dict[str, str]:
     """Versions of the packages on which pieces and figures depend."""
-    return {name: importlib.metadata.version(name) for name in ("scengen", "coacd", "manifold3d", "mujoco", "trimesh")}
+    packages = ("scengen", "coacd", "manifold3d", "mujoco", "trimesh")
+    return {**{name: importlib.metadata.version(name) for name in packages}, "intake": REVISION}
 
 
 def _settings(request: IntakeRequest) -> dict[str, Any]:

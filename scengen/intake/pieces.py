@@ -19,7 +19,7 @@ SIMPLIFICATION = 0.1
 of its roughness."""
 SAMPLE_POINTS = 60_000
 """Number of points at which distances are measured."""
-NEIGHBOURS = 8
+NEIGHBOURS = 16
 """Number of nearest points whose triangles are candidates for the nearest triangle."""
 BATCH = 4096
 """Number of points that are compared with all planes at once; all points would need a gigabyte."""

@@ -1,5 +1,6 @@
 """Every asset as a mesh: closed, as large as it is in the simulation, and listed with its parameters."""
 
+import io
 import math
 
 import numpy as np
@@ -28,6 +29,15 @@ def test_every_asset_is_a_closed_mesh_that_can_be_taken_in_again(tmp_path, name)
     assert solid.read(str(file)).manifold.volume() == pytest.approx(united(prop).volume(), rel=1e-4)
 
 
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("name", [name for name in kits() if name not in MARKS])
+def test_every_asset_is_watertight_in_every_format_for_other_programs(name, ending):
+    """trimesh merges vertices at the same place, as other programs do, and then counts the triangles at each edge."""
+    mesh = trimesh.load(io.BytesIO(encode(kit(name), ending)), file_type=ending[1:], force="mesh")
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(united(kit(name)).volume(), rel=1e-4)
+
+
 @pytest.mark.parametrize("name", APART)
 def test_what_hangs_in_a_stand_touches_it_nowhere(name):
     assert len(united(kit(name)).decompose()) == APART[name]
@@ -51,7 +61,18 @@ def test_volumes_are_those_of_a_textbook():
 def test_it_is_the_same_mesh_in_every_format(ending):
     content = trimesh.util.wrap_as_stream(encode(Cube(edge=0.05), ending))
     mesh = trimesh.load(content, file_type=ending[1:], force="mesh")
-    assert np.allclose(mesh.bounds, [[-0.025, -0.025, 0], [0.025, 0.025, 0.05]], atol=2e-5)
+    expected = (
+        [[-0.025, 0, -0.025], [0.025, 0.05, 0.025]] if ending == ".glb" else [[-0.025, -0.025, 0], [0.025, 0.025, 0.05]]
+    )
+    assert np.allclose(mesh.bounds, expected, atol=2e-5), "y points up in glTF, z elsewhere"
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_is_written_stands_upright_when_it_is_taken_in_again(tmp_path, ending):
+    """A hook that has another size along each axis."""
+    (tmp_path / f"hook{ending}").write_bytes(encode(THook(), ending))
+    low, high = np.split(np.array(united(THook()).bounding_box()), 2)
+    assert solid.read(str(tmp_path / f"hook{ending}")).mesh.extents == pytest.approx(high - low, abs=3e-6)
 
 
 def test_all_assets_are_listed_with_their_parameters(capsys):

@@ -1,6 +1,11 @@
 """Meshes taken in: what is wrong with them is said in one line, and what is made of them is what it is said to be."""
 
 import json
+import os
+import re
+import signal
+import struct
+import time
 from dataclasses import replace
 
 import mujoco
@@ -13,10 +18,13 @@ from manifold3d import Manifold
 from scengen import cli
 from scengen.assets.turned import FOOT_PROTRUSION, FOOT_RADIUS
 from scengen.errors import BadConfig
+from scengen.intake import asset
 from scengen.intake.asset import IntakeRequest, drop, make_asset
+from scengen.intake.crossing import longest_crossing
 from scengen.intake.pieces import Pieces, Surface
-from scengen.intake.solid import as_mesh, read
+from scengen.intake.solid import UPRIGHT, as_mesh, read
 from scengen.sim import scene_text
+from scengen.work.parallel import Limits
 
 BOX = trimesh.creation.box((0.05, 0.06, 0.07))
 
@@ -77,7 +85,16 @@ def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, capsys, case, e
         ("empty.obj", b"", "holds no triangles"),
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "holds no triangles"),
         ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertices that are not numbers"),
-        ("far.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", "cannot be read as a .obj file"),
+        ("far.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", "has corners that are none of its 2 vertices"),
+        ("before.obj", b"v 0 0 0\nv 1 0 0\nf -1 -2 -3\n", "has corners that are none of its 2 vertices"),
+        ("zero.obj", b"v 0 0 0\nf 0 1 1\n", "cannot be read as a .obj file (line 2: 'f 0 1 1')"),
+        ("words.obj", b"v 0 0 0\nv 1,5 0 0\n", "cannot be read as a .obj file (line 2: 'v 1,5 0 0')"),
+        ("short.obj", b"v 0 0\n", "cannot be read as a .obj file (line 1: 'v 0 0')"),
+        ("short.off", b"OFF\n3 1 0\n0 0 0\n", "cannot be read as a .off file (it ends too early)"),
+        ("words.off", b"OFF\n1 1 0\n0 0 zero\n", "cannot be read as a .off file (line 3: '0 0 zero')"),
+        ("few.off", b"OFF\n1 1 0\n0 0 0\n4 0 0 0\n", "cannot be read as a .off file (line 4: '4 0 0 0')"),
+        ("noise.off", b"noise", "cannot be read as a .off file (line 1: 'noise')"),
+        ("type.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n", "(line 4: 'property quad x')"),
         ("noise.glb", b"glTFglTFglTF", "cannot be read as a .glb file"),
         ("noise.ply", b"ply", "cannot be read as a .ply file"),
     ],
@@ -93,6 +110,8 @@ def test_what_is_no_mesh_is_said_in_one_line(tmp_path, capsys, name, content, sa
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
+        (["up=w"], "no axis named 'w'; known: -x, -y, -z, x, y, z"),
+        (["up=+z"], "no axis named '+z' (did you mean"),
         (["units=mmm"], "no unit named 'mmm' (did you mean 'mm'?)"),
         (["mass=1", "density=500"], "give one of them"),
         (["mass=0"], "mass = 0.0; it must lie in [0.001, 100] kg"),
@@ -233,6 +252,294 @@ def test_an_asset_stands_alone(taken):
     assert model.ngeom == len(found.pieces.hulls) + len(found.prop.feet) + 1
 
 
+# --- polygons, cavities, crossings, axes ------------------------------------------------------
+
+
+ELL = [(0, 0), (0.06, 0), (0.06, 0.02), (0.02, 0.02), (0.02, 0.06), (0, 0.06)]
+"""Outline of an L, counter-clockwise [m]."""
+PLUS = [(x / 100, y / 100) for x, y in ((-1, -3), (1, -3), (1, -1), (3, -1), (3, 1), (1, 1))]
+PLUS += [(-x, -y) for x, y in PLUS]
+"""Outline of a plus, counter-clockwise [m]."""
+BOX_CORNERS = [(x, y, z) for z in (0, 0.03) for x, y in ((-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02))]
+BOX_SIDES = [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+
+
+def prism(outline, height=0.03, first=0):
+    """Vertices and polygons of a prism whose caps are written from the corner `first`."""
+    n = len(outline)
+    corners = [(x, y, z) for z in (0, height) for x, y in outline]
+    ring = [(i + first) % n for i in range(n)]
+    sides = [(i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n)]
+    return corners, [tuple(reversed(ring)), tuple(n + i for i in ring), *sides]
+
+
+def written(ending, corners, polygons):
+    """A mesh file with polygons."""
+    points = ["{} {} {}".format(*corner) for corner in corners]
+    if ending == "obj":
+        return "\n".join([f"v {p}" for p in points] + ["f " + " ".join(str(i + 1) for i in f) for f in polygons])
+    rows = [f"{len(f)} " + " ".join(map(str, f)) for f in polygons]
+    if ending == "off":
+        return "\n".join(["OFF", f"{len(points)} {len(rows)} 0", *points, *rows])
+    axes = [f"property float {axis}" for axis in "xyz"]
+    faces = [f"element face {len(rows)}", "property list uchar int vertex_indices", "end_header"]
+    return "\n".join(["ply", "format ascii 1.0", f"element vertex {len(points)}", *axes, *faces, *points, *rows])
+
+
+def binary_ply(corners, polygons, order="<"):
+    """A binary PLY file with more properties than are read, before and after those that are."""
+    name = "binary_little_endian" if order == "<" else "binary_big_endian"
+    head = (
+        f"ply\nformat {name} 1.0\ncomment of no interest\nelement vertex {len(corners)}\nproperty uchar red\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(polygons)}\nproperty list uchar int vertex_index\nproperty float area\nend_header\n"
+    )
+    body = [struct.pack(f"{order}Bddd", 255, *corner) for corner in corners]
+    body += [struct.pack(f"{order}B{len(f)}if", len(f), *f, 0.0) for f in polygons]
+    return head.encode() + b"".join(body)
+
+
+def solid_of(tmp_path, name, content, **settings):
+    file = tmp_path / name
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read(str(file), **settings)
+
+
+def refusal(tmp_path, name, content):
+    with pytest.raises(BadConfig) as error:
+        solid_of(tmp_path, name, content)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("ending", ["obj", "off", "ply"])
+@pytest.mark.parametrize("outline", [ELL, PLUS], ids=["ell", "plus"])
+def test_a_polygon_that_is_not_convex_is_the_same_from_each_of_its_corners(tmp_path, ending, outline):
+    """20 cm2 times 30 mm; fans from other corners than one cover the notches too."""
+    made = [
+        solid_of(tmp_path, f"prism.{ending}", written(ending, *prism(outline, first=k))) for k in range(len(outline))
+    ]
+    assert {each.manifold.volume() for each in made} == {made[0].manifold.volume()}
+    assert made[0].manifold.volume() == pytest.approx(60e-6)
+    assert made[0].manifold.surface_area() == pytest.approx(2 * 20e-4 + 0.24 * 0.03)
+    triangles = [each.mesh.triangles for each in made]
+    assert all(np.array_equal(each, triangles[0]) for each in triangles)
+
+
+def test_an_l_of_polygons_is_two_pieces(tmp_path):
+    (tmp_path / "ell.obj").write_text(written("obj", *prism(ELL, first=1)))
+    found = make_asset(IntakeRequest(str(tmp_path / "ell.obj")))
+    assert len(found.pieces.hulls) == 2 and found.pieces.error.worst < 2e-4
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("outline", [ELL, ELL[:1] + ELL[1:2] + ELL[5:]], ids=["mixed", "triangles"])
+def test_polygons_of_a_binary_ply_file_are_read(tmp_path, order, outline):
+    corners, polygons = prism(outline)
+    found = solid_of(tmp_path, "prism.ply", binary_ply(corners, polygons, order))
+    assert found.manifold.volume() == pytest.approx(60e-6 if len(outline) == 6 else 54e-6)
+    assert "it ends too early" in refusal(tmp_path, "cut.ply", binary_ply(corners, polygons, order)[:-3])
+
+
+def test_a_polygon_may_have_a_hole_that_a_bridge_joins_to_its_outline(tmp_path):
+    """A square frame, 60 mm outside and 20 mm inside, in one polygon: the outline, a bridge, the hole, the bridge."""
+    outer = [(0, 0), (0.06, 0), (0.06, 0.06), (0, 0.06)]
+    inner = [(0.02, 0.02), (0.02, 0.04), (0.04, 0.04), (0.04, 0.02)]
+    corners = [(x, y, z) for z in (0, 0.03) for x, y in (*outer, *inner)]
+    cap = (0, 1, 2, 3, 0, 4, 5, 6, 7, 4)
+    sides = [(i, (i + 1) % 4, 8 + (i + 1) % 4, 8 + i) for i in range(4)]
+    sides += [(4 + i, 4 + (i + 1) % 4, 12 + (i + 1) % 4, 12 + i) for i in range(4)]
+    polygons = [cap[::-1], tuple(8 + i for i in cap), *sides]
+    found = solid_of(tmp_path, "frame.obj", written("obj", corners, polygons))
+    assert found.manifold.volume() == pytest.approx(0.03 * (0.06**2 - 0.02**2))
+
+
+def test_quadrilaterals_that_are_not_convex_are_cut_inside(tmp_path):
+    """An arrow head: 80 x 80 mm, with a notch of 20 mm. One of its two diagonals lies outside."""
+    arrow = [(0, 0), (0.04, 0.02), (0.08, 0), (0.04, 0.08)]
+    volumes = [
+        solid_of(tmp_path, "arrow.obj", written("obj", *prism(arrow, first=k))).manifold.volume() for k in range(4)
+    ]
+    assert volumes == pytest.approx([0.03 * 0.08 * (0.08 - 0.02) / 2] * 4)
+
+
+def test_corners_on_a_straight_side_and_corners_twice_change_nothing(tmp_path):
+    outline = [*ELL[:1], (0.03, 0), (0.03, 0), *ELL[1:]]
+    assert solid_of(tmp_path, "ell.obj", written("obj", *prism(outline))).manifold.volume() == pytest.approx(60e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("tabs.obj", written("obj", BOX_CORNERS, BOX_SIDES).replace(" ", "\t")),
+        ("spaces.obj", written("obj", BOX_CORNERS, BOX_SIDES).replace(" ", "   ").replace("\n", "  \r\n  ")),
+        ("comments.obj", "# top\n" + written("obj", BOX_CORNERS, BOX_SIDES).replace("\n", " # a side\n")),
+        ("continued.obj", written("obj", BOX_CORNERS, BOX_SIDES).replace(" 3 ", " \\\n3 ")),
+        ("backwards.obj", written("obj", BOX_CORNERS, [[i - 9 for i in side] for side in BOX_SIDES])),
+        ("comments.off", written("off", BOX_CORNERS, BOX_SIDES).replace("\n", " # a row\n\n# more\n")),
+        ("one_line.off", written("off", BOX_CORNERS, BOX_SIDES).replace("OFF\n", "OFF ")),
+        ("coloured.off", re.sub(r"(?m)^(4 .*)$", r"\1 255 0 0", written("off", BOX_CORNERS, BOX_SIDES))),
+    ],
+)
+def test_what_the_formats_allow_is_read(tmp_path, name, content):
+    assert solid_of(tmp_path, name, content).manifold.volume() == pytest.approx(72e-6)
+
+
+def test_corners_of_a_face_may_name_texture_and_normal(tmp_path):
+    text = re.sub(r"(?m)^f (\d+) (\d+) (\d+) (\d+)", r"f \1/1/1 \2//2 \3/7 \4", written("obj", BOX_CORNERS, BOX_SIDES))
+    assert "f 4/1/1 3//2 2/7 1" in text
+    assert solid_of(tmp_path, "box.obj", text).manifold.volume() == pytest.approx(72e-6)
+
+
+def test_what_crosses_itself_is_called_so(tmp_path):
+    """A prism over a bow tie, whose signed volumes cancel, as polygons and as triangles; a box with a deep pit."""
+    bow = [(-0.03, -0.02), (0.03, 0.02), (0.03, -0.02), (-0.03, 0.02)]
+    corners, polygons = prism(bow)
+    assert "crosses itself: the outline of a polygon does" in refusal(
+        tmp_path, "bow.obj", written("obj", corners, polygons)
+    )
+    fans = [(f[0], f[i], f[i + 1]) for f in polygons for i in (1, 2)]
+    assert "crosses itself along 30 mm" in refusal(tmp_path, "bow.obj", written("obj", corners, fans))
+    pit = [BOX_SIDES[0], *BOX_SIDES[2:], *[(4 + i, 4 + (i + 1) % 4, 8) for i in range(4)]]
+    deep, shallow = ([*BOX_CORNERS, (0, 0, z)] for z in (-0.02, 0.01))
+    assert "crosses itself along 79" in refusal(tmp_path, "pit.obj", written("obj", deep, pit))
+    assert solid_of(tmp_path, "pit.obj", written("obj", shallow, pit)).manifold.volume() == pytest.approx(56e-6)
+
+
+def test_two_balls_cross_along_a_circle():
+    """Radii 50 mm, centres 60 mm apart: a circle of radius 40 mm."""
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    both = trimesh.util.concatenate([ball, ball.copy().apply_translation((0.06, 0, 0))])
+    assert longest_crossing(both.vertices, both.faces) == pytest.approx(2 * np.pi * 0.04, rel=0.05)
+    assert longest_crossing(ball.vertices, ball.faces) == 0.0
+
+
+def test_small_folds_of_a_scan_are_no_crossing(tmp_path):
+    """A ball with edges of 2 mm: one vertex is pulled over its neighbour, which pokes through the triangles."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    beside = ball.vertex_neighbors[100][0]
+    ball.vertices[100] = 1.01 * (1.5 * ball.vertices[beside] - 0.5 * ball.vertices[100])
+    ball.vertices[beside] *= 1.02
+    assert 0.001 < longest_crossing(ball.vertices, ball.faces) < 0.003
+    ball.export(tmp_path / "ball.stl")
+    assert read(str(tmp_path / "ball.stl")).manifold.num_tri() == len(ball.faces)
+
+
+def inside_out(mesh):
+    mesh = mesh.copy()
+    mesh.faces = mesh.faces[:, ::-1]
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        ([(0.06, 0, 1), (0.05, 0, -1)], "has a closed cavity of 125 cm3; fill it, or open it to the outside"),
+        (
+            [(0.06, 0, 1), (0.02, -0.015, -1), (0.02, 0.015, -1)],
+            "has 2 closed cavities (of 8, 8 cm3); fill them, or open them to the outside",
+        ),
+        ([(0.06, 0, 1), (0.05, 0.1, -1)], "holds 2 parts (of 216, 125 cm3), 1 of them inside out; give one part"),
+        ([(0.06, 0, -1), (0.05, 0, 1)], "is inside out"),
+        ([(0.06, 0, 1), (0.05, 0.1, 1)], "holds 2 parts (of 216, 125 cm3); give one file for each, or join them"),
+    ],
+)
+def test_a_cavity_is_told_from_a_second_part(tmp_path, parts, says):
+    """Cubes of an edge, at a place along x, as solids (1) or as cavities (-1)."""
+    cubes = []
+    for edge, x, sign in parts:
+        cube = trimesh.creation.box((edge, edge, edge)).apply_translation((x, 0, 0))
+        cubes.append(cube if sign > 0 else inside_out(cube))
+    trimesh.util.concatenate(cubes).export(tmp_path / "cubes.stl")
+    with pytest.raises(BadConfig) as error:
+        read(str(tmp_path / "cubes.stl"))
+    assert says in str(error.value)
+
+
+def test_inertia_does_not_depend_on_where_a_mesh_lies(tmp_path):
+    """m (b^2 + c^2) / 12 for 60 x 40 x 30 mm, 2 km from the origin."""
+    far = [(x + 1000, y + 2000, z + 5) for x, y, z in BOX_CORNERS]
+    (tmp_path / "far.obj").write_text(written("obj", far, BOX_SIDES))
+    found = make_asset(IntakeRequest(str(tmp_path / "far.obj"), mass=0.1))
+    expected = 0.1 / 12 * np.array([0.04**2 + 0.03**2, 0.06**2 + 0.03**2, 0.06**2 + 0.04**2])
+    assert np.diag(found.prop.inertia) == pytest.approx(expected, rel=1e-9)
+    assert found.prop.com == pytest.approx([0, 0, 0.015 + FOOT_PROTRUSION], abs=1e-9)
+
+
+@pytest.mark.parametrize("place", [0.0, 0.1, 0.7])
+@pytest.mark.parametrize("size", [(0.005, 0.005, 0.005), (1.0, 0.1, 0.1), (0.05, 0.06, 0.0015)])
+def test_sizes_at_a_limit_are_accepted_when_they_are_rounded_to_32_bits(tmp_path, size, place):
+    trimesh.creation.box(size).apply_translation((place, 0, place)).export(tmp_path / "box.stl")
+    assert read(str(tmp_path / "box.stl")).mesh.extents == pytest.approx(size, abs=2e-7)
+
+
+@pytest.mark.parametrize("size", [(0.00499, 0.00499, 0.00499), (1.001, 0.1, 0.1), (0.05, 0.06, 0.00149)])
+def test_sizes_beyond_a_limit_are_refused(tmp_path, size):
+    trimesh.creation.box(size).export(tmp_path / "box.stl")
+    with pytest.raises(BadConfig, match="it must be 0.005 to 1 m long|is thinner than 1.5 mm"):
+        read(str(tmp_path / "box.stl"))
+
+
+@pytest.mark.parametrize("up", UPRIGHT)
+def test_any_axis_can_point_up(tmp_path, up):
+    """A pyramid on a base of 50 x 60 mm, 40 mm high: its centre of mass is at a quarter of its height."""
+    rot = UPRIGHT[up]
+    assert np.linalg.det(rot) == pytest.approx(1.0) and rot @ rot.T == pytest.approx(np.eye(3))
+    base = [(x, y, 0.0) for x in (-0.025, 0.025) for y in (-0.03, 0.03)]
+    pyramid = as_mesh(Manifold.hull_points(np.array([*base, (0.0, 0.0, 0.04)])))
+    turned = np.asarray(pyramid.vertices) @ rot  # as a program with this axis would write it
+    assert turned[np.argmax(pyramid.vertices[:, 2])]["xyz".index(up[-1])] == pytest.approx(0.04 * (-1) ** ("-" in up))
+    trimesh.Trimesh(turned, pyramid.faces).export(tmp_path / "pyramid.stl")
+    found = make_asset(IntakeRequest(str(tmp_path / "pyramid.stl"), up=up))
+    assert found.prop.com[2] == pytest.approx(0.01 + FOOT_PROTRUSION, abs=1e-6)
+    figures = found.figures()
+    opposite = "+" if up.startswith("-") else "-"
+    assert (figures["up"], figures["rest"]["side_below"], figures["rest"]["fell"]) == (up, opposite + up[-1], False)
+
+
+def test_gltf_is_turned_upright_as_it_defines_its_axes(tmp_path):
+    """A slab of 120 x 80 mm, 20 mm high along y."""
+    trimesh.creation.box((0.12, 0.02, 0.08)).export(tmp_path / "slab.glb")
+    assert read(str(tmp_path / "slab.glb")).mesh.extents == pytest.approx([0.12, 0.08, 0.02])
+    assert read(str(tmp_path / "slab.glb"), up="z").mesh.extents == pytest.approx([0.12, 0.02, 0.08])
+    trimesh.creation.box((0.12, 0.02, 0.08)).export(tmp_path / "slab.obj")
+    assert read(str(tmp_path / "slab.obj")).mesh.extents == pytest.approx([0.12, 0.02, 0.08])
+
+
+# --- a process of its own ---------------------------------------------------------------------
+
+
+def crash(request):
+    """A cut that ends with a segmentation fault."""
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def allocate(request):
+    """A cut that takes all memory."""
+    return np.ones(10**12)
+
+
+def endless(request):
+    """A cut that does not end."""
+    time.sleep(60)
+
+
+@pytest.mark.parametrize(
+    ("cut_up", "says"),
+    [
+        (crash, "the process died: it was ended by SIGSEGV; repair it, or simplify it"),
+        (allocate, "the process needs more than 1000 MB"),
+        (endless, "the process took longer than 2 s"),
+    ],
+)
+def test_a_cut_that_crashes_or_does_not_end_is_one_line(tmp_path, capfd, monkeypatch, cut_up, says):
+    BOX.export(tmp_path / "box.stl")
+    monkeypatch.setattr(asset, "_make_asset", cut_up)
+    monkeypatch.setattr(asset, "CUTTING_LIMITS", Limits(2.0, 1000))
+    assert cli.run(["asset", f"mesh={tmp_path / 'box.stl'}", f"to={tmp_path / 'asset'}"]) == cli.BAD_INPUT
+    told = capfd.readouterr().err
+    assert says in told and told.count("\n") == 1 and not (tmp_path / "asset").exists()
+
+
 class TestCommand:
     @pytest.fixture
     def run(self, tmp_path, capsys):
@@ -269,6 +576,16 @@ class TestCommand:
         ell().export(tmp_path / "mesh.stl")
         status, said = run("pieces=1", "error=0.001")
         assert status == 1 and "1 convex piece: " in said and "MISSED: the error of 1 mm" in said
+
+    def test_it_says_which_side_is_below(self, run, tmp_path):
+        said = run()[1]
+        assert "its z axis points up (the default; give up=AXIS if it is another one)" in said
+        assert "; on the table it stands on its -z side\n" in said
+        assert "its -x axis points up (as given); on the table it stands on its +x side" in run("up=-x")[1]
+        leaning = trimesh.creation.box((0.02, 0.02, 0.12))
+        leaning.apply_transform(trimesh.transformations.rotation_matrix(0.3, (1, 0, 0)))
+        leaning.export(tmp_path / "mesh.stl")
+        assert "on the table it fell over and lies on its" in run()[1]
 
 
 def test_an_unknown_unit_is_no_matter_of_the_command_line_alone():
