@@ -5,6 +5,7 @@ An environment plays the certified scenarios of a pool, with the scene text, the
 certificate. Reset samples nothing: the seed selects one of the stored scenarios, and `info` holds its id.
 """
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,7 @@ from ..episode import Episode, Outcome
 from ..errors import BadConfig, UnknownName, cut
 from ..orientation import Orientation
 from ..params import Value
+from ..pictures.opengl import check_size
 from ..pictures.render import Camera
 from ..pool import PoolRow
 from ..pool.library import Library
@@ -106,6 +108,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     second, which is simulated within the last step.
     `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that tells scenarios apart. After
     `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
+
+    Threads may share an environment. Their calls run one after the other.
     """
 
     _spec: EnvSpec | None = None
@@ -157,6 +161,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         _check_render_mode(render_mode)
         check_filter(action_filter)
         _check_action_repeat(action_repeat)
+        check_size(width=width, height=height)
         self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.task: Task = compose.load_task(task, search)
@@ -176,13 +181,15 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = spaces.Box(-1.0, 1.0, (action_size(self.task.embodiment),), np.float32)
         self.observation_space = self.observed.space  # type: ignore[assignment]
         self._next = 0
+        self._lock = threading.RLock()
         self._world: World | None = None
         self._renderer: Camera | None = None
         self._row: PoolRow = self._rows[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles open the pools again and continue from the same state with a simulation of their own."""
-        return _revived, (type(self), self._arguments, self._progress())
+        with self._lock:
+            return _revived, (type(self), self._arguments, self._progress())
 
     @property
     def streams(self) -> Mapping[str, Stream]:
@@ -245,18 +252,19 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             UnknownName: there is no such scenario or option.
             BadConfig: several ids have this prefix.
         """
-        super().reset(seed=seed)
         unknown = set(options or {}) - set(RESET_OPTIONS)
         if unknown:
             raise UnknownName("reset option", unknown.pop(), RESET_OPTIONS)
-        if seed is not None:
-            self._next = seed % len(self._rows)
-        named = (options or {}).get("scenario")
-        number = self._next if named is None else self._rows.find(str(named))
-        self._next = (number + 1) % len(self._rows)
-        self._load(self._rows[number])
-        info = self._info("", False)
-        return self._observe(), {**info, **self._labels()} if (options or {}).get("labels") else info
+        with self._lock:
+            super().reset(seed=seed)
+            if seed is not None:
+                self._next = seed % len(self._rows)
+            named = (options or {}).get("scenario")
+            number = self._next if named is None else self._rows.find(str(named))
+            self._next = (number + 1) % len(self._rows)
+            self._load(self._rows[number])
+            info = self._info("", False)
+            return self._observe(), {**info, **self._labels()} if (options or {}).get("labels") else info
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance one control period (10 ms), or `action_repeat` of them.
@@ -269,27 +277,30 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
         if self._world is None:
             raise BadConfig("no scenario is running; call reset first")
-        outcome = None
-        for _ in range(self.action_repeat):
-            outcome = outcome or self._advance(given)
-        reason = self._episode.reason
-        terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
-        if outcome == "success" and self.settle:
-            outcome, reason = self._settled()
-        success = outcome == "success"
-        return self._observe(), float(success), terminated, truncated, self._info(reason, success)
+        with self._lock:
+            outcome = None
+            for _ in range(self.action_repeat):
+                outcome = outcome or self._advance(given)
+            reason = self._episode.reason
+            terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
+            if outcome == "success" and self.settle:
+                outcome, reason = self._settled()
+            success = outcome == "success"
+            return self._observe(), float(success), terminated, truncated, self._info(reason, success)
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture of `camera`, shape (height, width, 3), or None without a render mode."""
         if self.render_mode is None:
             return None
-        return self._picture(cameras_of(self.task.embodiment).get(self.camera, self.camera))
+        with self._lock:
+            return self._picture(cameras_of(self.task.embodiment).get(self.camera, self.camera))
 
     def close(self) -> None:
         """Free the renderer."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        with self._lock:
+            if self._renderer is not None:
+                self._renderer.close()
+                self._renderer = None
 
     @property
     def spec(self) -> EnvSpec | None:  # type: ignore[override]

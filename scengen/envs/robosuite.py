@@ -8,6 +8,7 @@ the scene, the suction cup, the events of the scene, and the verdict, which is t
 """
 
 import re
+import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, ClassVar, NoReturn
@@ -22,6 +23,7 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter
 from ..episode import Episode
 from ..errors import BadConfig, PoolError, UnknownName
+from ..pictures.opengl import check_size, current, release
 from ..pool import PoolRow
 from ..pool.library import Library
 from ..robots import panda
@@ -115,11 +117,14 @@ class RobosuiteEnv(ManipulationEnv):
 
         Raises:
             ScengenError: there is no such scenario, or it is of another task, or was made with other versions of
-                MuJoCo or robosuite; pictures that are turned by a quarter are not square.
+                MuJoCo or robosuite; pictures cannot have this size, or are turned by a quarter and are not square.
         """
         _check_filter_rate(action_filter, control_freq)
         if reward_shaping:
             raise BadConfig("reward_shaping = True; the only reward is that of the goal: give reward_shaping=False")
+        for name in ("camera_widths", "camera_heights"):
+            for edge in np.atleast_1d(np.array(arguments.get(name, ()), object)):
+                check_size(**{name: edge})
         self.action_filter, self.reward_scale, self.use_object_obs = action_filter, reward_scale, use_object_obs
         self.task = compose.load_task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
@@ -145,11 +150,12 @@ class RobosuiteEnv(ManipulationEnv):
     def reset(self) -> Observations:
         """Reset as robosuite does, and run the scene's events of the first control period."""
         observations = super().reset()
-        self.episode.begin()
+        self._begin_episode()
         return observations
 
     def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
         """Step as robosuite does, after the action filter, if there is one."""
+        self._begin_episode()  # robosuite allows a step without a reset
         return super().step(self.world.filter(action) if self.action_filter else action)
 
     @property
@@ -226,6 +232,7 @@ class RobosuiteEnv(ManipulationEnv):
         ours, theirs = self.sim.model.opt.timestep, self.model_timestep
         if ours != theirs:
             raise BadConfig(f"robosuite.macros.SIMULATION_TIMESTEP = {theirs:g}; the scene's is {ours:g} s")
+        self.sim.render = _rendering_in_any_thread(self.sim)
 
     def _setup_references(self) -> None:
         super()._setup_references()
@@ -254,12 +261,15 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _reset_internal(self) -> None:
         super()._reset_internal()
+        if self.sim._render_context_offscreen is not None:
+            release(self.sim._render_context_offscreen.gl_ctx)  # current since it was made; another thread may render
         # robosuite's controllers have read the arms before these took their initial posture: make them read again.
         for controller in (part for robot in self.robots for part in robot.part_controllers.values()):
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon), 0
+        self._begun = False
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Command the arms; robosuite calls it between mj_step1 and mj_step2 of every physics step."""
@@ -303,6 +313,12 @@ class RobosuiteEnv(ManipulationEnv):
         return row
 
     # --- the certificate's clock ----------------------------------------------------------
+
+    def _begin_episode(self) -> None:
+        """Run the scene's events of the first control period, unless they have been run."""
+        if not self._begun:
+            self._begun = True
+            self.episode.begin()
 
     def _end_period(self) -> None:
         """Judge the past control period, and run the scene's events of the next one."""
@@ -357,6 +373,19 @@ def env_class(task: str, search: tuple[str, ...] = ()) -> type[RobosuiteEnv]:
         return known
     about = f"Scenarios of the task {task}; see {RobosuiteEnv.__name__}."
     return type(name, (RobosuiteEnv,), {"NAME": task, "SEARCH": search, "__doc__": about, "__module__": __name__})
+
+
+def _rendering_in_any_thread(sim: Any) -> Callable[..., Any]:
+    """`sim.render` with its own context. robosuite draws with the context that happens to be current in a thread."""
+    render, lock = sim.render, threading.Lock()
+
+    def in_this_thread(*arguments: Any, **named: Any) -> Any:
+        if (context := sim._render_context_offscreen) is None:
+            return render(*arguments, **named)  # robosuite refuses it
+        with lock, current(context.gl_ctx):
+            return render(*arguments, **named)
+
+    return in_this_thread
 
 
 def _check_filter_rate(action_filter: str | None, control_freq: int) -> None:

@@ -6,6 +6,7 @@ import itertools
 import math
 import os
 import sys
+import threading
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from ..geometry import Vec3
 from ..robots.panda import arms
 from ..sim.world import World
 from ..work.parallel import free_address_space
+from . import opengl
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
@@ -44,7 +46,7 @@ class NoPictures(ScengenError):
 
 
 class Camera:
-    """A renderer for one world."""
+    """A renderer for one world. Any thread may take pictures."""
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make Camera(world) anew")
@@ -52,14 +54,20 @@ class Camera:
     def __init__(self, world: World, width: int = 320, height: int = 240, where: Where | None = None):
         """Start with the fitted view of the scene, from `where` or from the direction that hides least of it.
 
+        Args:
+            width: width of the pictures [pixels], at most `opengl.LARGEST_EDGE`.
+            height: height of the pictures [pixels], likewise.
+
         Raises:
+            BadConfig: pictures cannot have this size.
             NoPictures: OpenGL is missing.
         """
-        self.world = world
+        opengl.check_size(width=width, height=height)
+        self.world, self._lock = world, threading.Lock()
         check_pictures()
         world.model.vis.quality.shadowsize = SHADOW_MAP_SIZE
         try:
-            self._renderer = mujoco.Renderer(world.model, height, width)
+            self._renderer = opengl.Renderer(world.model, height, width)
         except Exception as error:  # its type depends on platform and back end: ImportError, AttributeError, GLError
             raise NoPictures(
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
@@ -85,9 +93,11 @@ class Camera:
         cameras = [self.world.model.camera(i).name for i in range(self.world.model.ncam)]
         if name is not None and name not in cameras:
             raise UnknownName("camera", name, cameras)
-        mujoco.mj_camlight(self.world.model, self.world.data)  # after the control loop they are one physics step late
-        self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
-        return self._renderer.render()
+        model, data = self.world.model, self.world.data
+        with self._lock:
+            mujoco.mj_camlight(model, data)  # after the control loop they are one physics step late
+            self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
+            return self._renderer.render()
 
     @property
     def where(self) -> Where:
@@ -95,7 +105,8 @@ class Camera:
         return self._view.azimuth, self._view.elevation
 
     def close(self) -> None:
-        self._renderer.close()
+        with self._lock:
+            self._renderer.close()
 
 
 VIEWS = ((140.0, -28.0), (220.0, -28.0), (180.0, -35.0), (100.0, -28.0), (260.0, -28.0), (140.0, -55.0), (220.0, -55.0))

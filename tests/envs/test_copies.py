@@ -10,6 +10,8 @@ import pytest
 from helpers import REFERENCE
 
 import scengen.envs.gym  # noqa: F401  (registers the tasks)
+from scengen.envs.lerobot import LeRobotNames
+from scengen.envs.robosuite import env_class
 from scengen.pool import Pool
 from scengen.sim.world import World
 
@@ -59,6 +61,32 @@ def test_shallow_copies_of_a_world_have_their_own_simulation():
     other = copy.copy(world)
     other.step(PUSH)
     assert world.time == 0.0 and other.time == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+def test_a_copy_under_lerobots_names_reads_its_own_environment(env, copied):
+    named = LeRobotNames(env)
+    twin = copied(named)
+    seen, *_ = twin.step(PUSH)
+    assert env.unwrapped.world.time == pytest.approx(0.2) and twin.unwrapped.world.time == pytest.approx(0.21)
+    assert twin._max_episode_steps == named._max_episode_steps and twin._pool_env is twin.unwrapped
+    assert np.array_equal(seen["agent_pos"], named.step(PUSH)[0]["agent_pos"])
+
+
+def test_copies_of_vectors_of_environments_step_alone():
+    envs = gymnasium.make_vec("scengen/domino_single-v0", num_envs=2, vectorization_mode="sync", pool=str(REFERENCE))
+    envs.reset(seed=[0, 1])
+    twins = copy.deepcopy(envs)
+    twins.step(np.tile(PUSH, (2, 1)))
+    assert [env.unwrapped.world.time for env in envs.envs] == [0.0, 0.0]
+    assert [env.unwrapped.world.time for env in twins.envs] == pytest.approx([0.01, 0.01])
+
+
+def test_robosuites_environment_refuses_copies_in_one_line():
+    env = env_class("domino_single")(pool=REFERENCE, use_camera_obs=False, has_offscreen_renderer=False)
+    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="make another environment"):
+            copied(env)
 
 
 def test_what_holds_addresses_alone_refuses_in_one_line():

@@ -1,8 +1,10 @@
 """robosuite plays the very scene of the certificate, with its own controller, and comes to the same verdict."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from unittest import mock
 
 import mujoco
@@ -288,6 +290,16 @@ def test_a_failure_undoes_a_success(env, stub):
     assert reward == 0.0 and info["reason"] == "after the goal was reached: the slab is broken"
 
 
+def test_the_first_period_has_its_events_without_a_reset(row, monkeypatch):
+    """robosuite allows a step right after `make`."""
+    begun = []
+    monkeypatch.setattr(Episode, "begin", lambda self: begun.append(self.world.time))
+    fresh = made(row)
+    assert begun == []
+    fresh.step(IDLE)
+    assert begun == pytest.approx([0.0, 0.01])
+
+
 def test_events_and_verdict_keep_their_clock_under_any_control_frequency(row, monkeypatch):
     looks = []
     judge = Episode.judge
@@ -402,6 +414,29 @@ def test_scenarios_of_other_tasks_or_versions_are_refused(row):
     old = certificate_of(row, versions={**versions(), "mujoco": "2.0"})
     with pytest.raises(PoolError, match="with mujoco 2.0"):
         env_class("domino_single")(scenario=old)
+
+
+@pytest.mark.parametrize("edge", [1.5, "64", 0, -1, 4097, [64, 0]])
+@pytest.mark.parametrize("name", ["camera_widths", "camera_heights"])
+def test_pictures_of_impossible_size_are_refused_in_one_line(row, name, edge):
+    with pytest.raises(BadConfig, match=f"{name} = .*; it must be a whole number of pixels from 1 to 4096"):
+        env_class("domino_single")(scenario=row, camera_names=["agentview", "frontview"], **{name: edge})
+
+
+@pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
+def test_every_environment_draws_its_own_scene_in_any_thread():
+    """robosuite draws with the context that is current in a thread: none, or that of another environment."""
+    looks = {"hard_reset": False, "camera_names": "agentview", "camera_widths": 64, "camera_heights": 64}
+    envs = [env_class(row.task)(scenario=row, **looks) for row in islice(Pool.open(REFERENCE).rows(), 2)]
+    alone = [env.reset()["agentview_image"] for env in envs]
+    assert not np.array_equal(*alone)
+    with ThreadPoolExecutor(1) as thread:
+        for reset in (lambda env: env.reset(), lambda env: thread.submit(env.reset).result()) * 2:
+            assert all(
+                np.array_equal(reset(env)["agentview_image"], seen) for env, seen in zip(envs, alone, strict=True)
+            )
+    for env in envs:
+        env.close()
 
 
 @pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")

@@ -1,0 +1,123 @@
+"""Contexts of OpenGL that any thread can use in turn, and that are freed before OpenGL ends with the process.
+
+A context is current in one thread at most. It is made current for each picture and released afterwards, so that the
+next picture may be taken in another thread, and so that no context receives the commands of another one.
+"""
+
+import atexit
+import sys
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import MjModel
+
+from ..errors import BadConfig, cut
+
+LARGEST_EDGE = 4096
+"""Largest width and height of a picture [pixels], which OpenGL supports on all machines."""
+
+_open_renderers: "weakref.WeakSet[Renderer]" = weakref.WeakSet()
+"""Renderers that are to be closed at the end of the process."""
+
+
+def check_size(**edges: int) -> None:
+    """Raise `BadConfig` unless pictures can have this width and height. `edges` has the names of the arguments."""
+    for name, value in edges.items():
+        whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+        if not whole or not 1 <= value <= LARGEST_EDGE:
+            accepted = f"it must be a whole number of pixels from 1 to {LARGEST_EDGE}"
+            raise BadConfig(f"{name} = {cut(repr(value))}; {accepted}")
+
+
+@contextmanager
+def current(context: Any) -> Iterator[None]:
+    """Make a context of MuJoCo or robosuite current in this thread during a `with` statement."""
+    context.make_current()
+    try:
+        yield
+    finally:
+        release(context)
+
+
+def release(context: Any) -> None:
+    """Let no context be current in this thread. `context` determines the back end: EGL, OSMesa or GLFW."""
+    for kind in type(context).__mro__:
+        backend: Any = sys.modules[kind.__module__]
+        if hasattr(backend, "EGL_DISPLAY"):
+            egl = backend.EGL
+            egl.eglMakeCurrent(backend.EGL_DISPLAY, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
+        elif hasattr(backend, "osmesa"):
+            backend.osmesa.OSMesaMakeCurrent(None, None, backend.GL.GL_FLOAT, 0, 0)
+        elif hasattr(backend, "glfw"):
+            backend.glfw.make_context_current(None)
+
+
+class Renderer(mujoco.Renderer):
+    """MuJoCo's renderer for any thread. Two threads must not use it at the same time."""
+
+    _gl_context: Any = None  # `close` reads both, even if `__init__` has failed before it has set them
+    _mjr_context: Any = None
+
+    def __init__(self, model: MjModel, height: int, width: int):
+        """Make a context, with buffers that are large enough for the picture.
+
+        Raises:
+            Exception: OpenGL is missing. The type depends on platform and back end.
+        """
+        buffers = model.vis.global_
+        buffers.offwidth, buffers.offheight = max(buffers.offwidth, width), max(buffers.offheight, height)
+        super().__init__(model, height, width)
+        self._release()
+        _close_at_exit()
+        _open_renderers.add(self)
+
+    def render(self, *, out: Any = None) -> Any:
+        try:
+            return super().render(out=out)
+        finally:
+            self._release()
+
+    def close(self) -> None:
+        """Free the textures while their own context is current, because contexts number alike; then the context."""
+        _open_renderers.discard(self)
+        context, self._gl_context = self._gl_context, None
+        drawn, self._mjr_context = self._mjr_context, None
+        try:
+            if context:
+                context.make_current()
+            if drawn:
+                drawn.free()
+            if context:
+                context.free()
+        except Exception:
+            if context and _ending:
+                context._context = None  # robosuite's handler has ended OpenGL already, so that nothing is left to free
+                return
+            raise
+
+    def _release(self) -> None:
+        if self._gl_context:
+            release(self._gl_context)
+
+
+_ending = False
+"""Whether the process is ending."""
+
+
+@cache
+def _close_at_exit() -> None:
+    """Register `_close_all`, after the first context: handlers run in reverse order, and its own one ends OpenGL."""
+    atexit.register(_close_all)
+
+
+def _close_all() -> None:
+    """Close the renderers that are still open. After the end of OpenGL they could not be freed without an error."""
+    global _ending
+    _ending = True
+    for renderer in list(_open_renderers):
+        renderer.close()
