@@ -20,7 +20,7 @@ from .claims import (
     wrongly_drawn,
 )
 from .rebuilt import difference, rebuild
-from .recheck import fails_again, simulate, why_not_certified
+from .recheck import Simulated, fails_again, simulate, why_not_certified
 
 Verdict = Literal["sound", "refuted", "declined"]
 """`declined` says nothing about the claim: the check died, was too large or too slow, or belongs to another version."""
@@ -102,11 +102,11 @@ class Examiner:
             return Examination(row.id, verdict, tuple(reasons), True, expired=self.expired)
         if certified:
             done = simulate(row, scenario, text, claims.settings, self.level, self.adversary)
-            reasons, drifted = list(done.reasons), done.drifted
         else:
-            reasons, drifted = list(fails_again(row, scenario, claims.settings, self.level, self.adversary)), False
-        verdict = "refuted" if reasons else "sound"
-        return Examination(row.id, verdict, tuple(reasons), True, True, self.expired, drifted)
+            found = fails_again(row, scenario, claims.settings, self.level, self.adversary)
+            done = Simulated(tuple(found), False)
+        verdict = "refuted" if done.reasons else "declined" if done.doubts else "sound"
+        return Examination(row.id, verdict, done.reasons + done.doubts, True, True, self.expired, done.drifted)
 
 
 def lost_examination(job: Job, reason: str) -> Examination:

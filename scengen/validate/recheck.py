@@ -1,11 +1,11 @@
 """Simulations of verification: the witness again, the checks that need no oracle, or the whole certificate."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..certificate import Check, as_json
+from ..certificate import CHECKS, Check, as_json
 from ..errors import NoOracle
 from ..fingerprint import fingerprint
 from ..pool import PoolRow
@@ -20,6 +20,8 @@ LEVELS = ("replay", "recheck", "full")
 """Levels of verification: simulate the witness alone; every check that needs no oracle; every check."""
 BEFORE_WITNESS = ("feasible", "compiles", "overlap", "rest", "unsolved", "idle")
 """Checks that need neither oracle nor witness, in order: each needs those before it."""
+OF_ORACLE = ("solved", "robust")
+"""Checks whose numbers belong to the oracle, and not to the witness."""
 WITH_WITNESS = ("numerics", "ablations")
 """Checks that need the witness. If the witness fails under other numerics, the certificate and its verification let the
 oracle try: only then verification needs an oracle."""
@@ -33,6 +35,8 @@ class Simulated:
     """Faults; empty if there are none."""
     drifted: bool
     """Whether the witness reaches the goal, but ends in other bits than on the machine of the certificate."""
+    doubts: tuple[str, ...] = ()
+    """Claims that cannot be decided here; empty if there are none."""
 
 
 def simulate(
@@ -64,9 +68,11 @@ def simulate(
     reasons = list(_replay_faults(row, rollout, same_rounding))
     if not reasons and level == "recheck":
         reasons = list(_repetition_faults(trial, rollout, stored, same_rounding))
+    doubts: list[str] = []
     if not reasons and level == "full":
-        reasons = list(_certification_faults(row, scenario, settings, stored, same_rounding, adversary))
-    return Simulated(tuple(reasons), drifted and not reasons)
+        again = _CertifiedAgain(row, Trial(scenario, row.horizon, settings, row.embodiment, adversary), rollout)
+        reasons, doubts = list(again.faults(stored, same_rounding)), again.doubts
+    return Simulated(tuple(reasons), drifted and not reasons, tuple(doubts))
 
 
 def fails_again(
@@ -132,22 +138,43 @@ def _repetition_faults(trial: Trial, rollout: Rollout, stored: dict[str, Check],
             return
 
 
-def _certification_faults(
-    row: PoolRow,
-    scenario: Scenario,
-    settings: CertifySettings,
-    stored: dict[str, Check],
-    same_rounding: bool,
-    adversary: Adversary | None,
-) -> Iterator[str]:
-    again = certify(scenario, row.horizon, settings, row.embodiment, adversary=adversary)
-    if again.certificate.verdict != "certified":
-        yield f"certified again it is {again.certificate.verdict}: {again.certificate.reason}"
-        return
-    same_oracle = np.array_equal(again.witness, row.witness)
-    for check in again.certificate.checks:
-        depends = check.name in ("solved", "robust", "numerics", "ablations", "witness", "attack")
-        yield from _differences(check, stored[check.name], same_rounding and (same_oracle or not depends))
+@dataclass
+class _CertifiedAgain:
+    """Every check of a row made again. The checks up to `robust` run the oracle; those after it use the stored witness,
+    which need not be the one that the oracle finds."""
+
+    row: PoolRow
+    trial: Trial
+    replayed: Rollout
+    """Rollout of the stored witness."""
+    doubts: list[str] = field(default_factory=list)
+    """Numbers of the oracle that differ where the oracle plays other actions than the witness. The oracle may have been
+    changed since, because certificates do not expire with it; or the numbers are false."""
+
+    def faults(self, stored: dict[str, Check], same_rounding: bool) -> Iterator[str]:
+        for name, verdict in CHECKS.items():
+            found = self.trial.check(name)
+            if not found.passed and not found.waived:
+                yield f"certified again it is {verdict}: {name}: {found.reason}"
+                return
+            differences = _differences(found, stored[name], same_rounding)
+            if name in OF_ORACLE and not self._same_oracle:
+                self.doubts += (f"{told}; {_OTHER_ORACLE}" for told in differences)
+            else:
+                yield from differences
+            if name == OF_ORACLE[-1]:
+                self.trial.solution = self.replayed
+
+    @property
+    def _same_oracle(self) -> bool:
+        assert self.trial.solution is not None
+        return np.array_equal(self.trial.solution.actions, self.row.witness)
+
+
+_OTHER_ORACLE = (
+    "the oracle here plays other actions than the witness: either it has been changed since, or the numbers are false; "
+    "certify the pool again"
+)
 
 
 def _differences(found: Check, stored: Check, exact: bool) -> Iterator[str]:

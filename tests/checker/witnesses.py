@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from forgery import ELSEWHERE, Case, Draft
 from labels import OTHERS, Change
+from scipy.special import betaincinv
 
 
 def _witness(change: Callable[[np.ndarray], np.ndarray], played: bool = True) -> Change:
@@ -75,6 +76,37 @@ def _of_the_second(draft: Draft) -> None:
     draft.row["witness"] = draft.rows[1]["witness"].copy()
 
 
+def _other_robustness(draft: Draft) -> None:
+    """The oracle is said to have failed one of its jittered runs, which all succeed. The settings allow for it."""
+    draft.config["certify"]["robust"]["bound"] = 0.2
+    for row in draft.rows:
+        robust = next(check for check in row["certificate"]["checks"] if check["name"] == "robust")
+        robust["settings"]["bound"] = 0.2
+    told = {"solved": 3, "bound": float(betaincinv(3, 2, 0.05)), "failures": ["run 2: the tile was missed"]}
+    draft.check("robust")["numbers"].update(told)
+
+
+def _other_robustness_and_witness(draft: Draft) -> None:
+    """The same beside a witness that differs from the oracle's actions by one bit of one gripper command."""
+    _other_robustness(draft)
+    actions = draft.row["witness"].copy()
+    actions[3, 6] = np.nextafter(actions[3, 6], np.float32(0))
+    draft.played(actions)
+
+
+def _other_numerics_and_witness(draft: Draft) -> None:
+    """Numbers of a check that replays the witness, beside such a witness."""
+    _other_robustness_and_witness(draft)
+    draft.check("numerics")["numbers"]["half_time_step"] = {"witness": "timeout", "oracle": "success"}
+
+
+CERTIFIED_AGAIN = {
+    "robustness_of_another": ("reject", r"robust has other numbers", _other_robustness),
+    "robustness_beside_another": ("decline", r"robust has other numbers.*oracle", _other_robustness_and_witness),
+    "numerics_beside_another": ("reject", r"numerics has other numbers", _other_numerics_and_witness),
+}
+"""Noticed by certifying again, and by nothing less."""
+
 WITNESS: dict[str, tuple[str, Change]] = {
     "nothing": (r"witness", _witness(lambda a: a[:0], played=False)),
     "half_of_it": (r"witness", _witness(lambda a: a[: len(a) // 3], played=False)),
@@ -95,6 +127,10 @@ CASES = [
     *(
         Case(f"single_quick__witness_{name}", "single_quick", "reject", says, change, quick=name in QUICK)
         for name, (says, change) in WITNESS.items()
+    ),
+    *(
+        Case(f"single_quick__witness_{name}", "single_quick", expect, says, change, level="full")
+        for name, (expect, says, change) in CERTIFIED_AGAIN.items()
     ),
     *(Case(f"{base}__witness_half_of_it", base, "reject", *WITNESS["half_of_it"]) for base in OTHERS),
 ]
