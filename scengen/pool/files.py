@@ -1,10 +1,13 @@
 """Files of a pool: their hashes, how they are replaced, and which of them are opened at all."""
 
+import errno
 import hashlib
 import os
 import stat
+from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from . import untrusted
 
@@ -20,7 +23,32 @@ def sha256(content: str | bytes) -> str:
 def sha256_of_file(path: Path) -> str:
     """Hash of a file, in hex."""
     with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return sha256_of_opened(file)
+
+
+def sha256_of_opened(file: BufferedReader) -> str:
+    """Hash of an opened file from its beginning, in hex."""
+    file.seek(0)
+    return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Numbers of a file, one of which changes when it is replaced or written. Programs cannot set the time of a change,
+    as they can set the time of the last writing."""
+
+    device: int
+    inode: int
+    size: int
+    """Size [bytes]."""
+    changed: int
+    """Time of the last change [ns]."""
+
+    @classmethod
+    def of(cls, file: BufferedReader) -> Self:
+        """The identity of an opened file."""
+        status = os.fstat(file.fileno())
+        return cls(status.st_dev, status.st_ino, status.st_size, status.st_ctime_ns)
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -41,8 +69,33 @@ def why_not_plain(path: Path) -> str:
     try:
         mode = os.lstat(path).st_mode
     except OSError:
-        return "is missing"
-    return "" if stat.S_ISREG(mode) else "is not a plain file"
+        return _MISSING
+    return "" if stat.S_ISREG(mode) else _NOT_PLAIN
+
+
+def open_plain(path: Path) -> BufferedReader:
+    """Open a plain file for reading. Nothing that waits, leads elsewhere or never ends is opened.
+
+    Raises:
+        ValueError: it is missing, or a link, a pipe or a device.
+        OSError: it cannot be opened.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        if error.errno == errno.ENOENT:
+            raise ValueError(f"it {_MISSING}") from None
+        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link; a socket, or a device without a driver
+            raise ValueError(f"it {_NOT_PLAIN}") from None
+        raise
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise ValueError(f"it {_NOT_PLAIN}")
+    return open(descriptor, "rb")
+
+
+_MISSING = "is missing"
+_NOT_PLAIN = "is not a plain file"
 
 
 def read_json_file(path: Path) -> Any:
@@ -52,8 +105,7 @@ def read_json_file(path: Path) -> Any:
         ValueError: it is not a plain file, too large, or not strict JSON.
         OSError: it cannot be read.
     """
-    if why := why_not_plain(path):
-        raise ValueError(f"it {why}")
-    if (size := path.stat().st_size) > MAX_JSON:
-        raise ValueError(f"it has {size} bytes; at most {MAX_JSON} are read")
-    return untrusted.read_json(path.read_text(), MAX_JSON)
+    with open_plain(path) as file:
+        if (size := os.fstat(file.fileno()).st_size) > MAX_JSON:
+            raise ValueError(f"it has {size} bytes; at most {MAX_JSON} are read")
+        return untrusted.read_json(file.read(MAX_JSON + 1).decode(), MAX_JSON)

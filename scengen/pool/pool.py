@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from ..errors import PoolError, UnknownName
 from .directory import Directory
-from .files import sha256_of_file, why_not_plain
-from .manifest import MANIFEST, Manifest
+from .files import Identity, open_plain, sha256_of_file, sha256_of_opened
+from .manifest import MANIFEST, FileEntry, Manifest
 from .names import Name
 from .reader import MAX_ROWS, Reader
 from .row import NAMES, NO_WITNESS, WITHOUT_WITNESS, PoolRow
+from .shards import Shard
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,26 @@ class Pool:
         return sha256_of_file(self.folder / MANIFEST)
 
     def damaged(self) -> dict[str, str]:
-        """Faults of the files, by name; empty for a sound pool."""
-        wrong = {}
-        for entry in self.manifest.files:
-            path = self.folder / entry.file
-            if why := why_not_plain(path):
-                wrong[entry.file] = why
-            elif (size := path.stat().st_size) != entry.bytes:
-                wrong[entry.file] = f"has {size} bytes instead of {entry.bytes}: truncated"
-            elif sha256_of_file(path) != entry.sha256:
-                wrong[entry.file] = "has another sha256 than the manifest says"
-        return wrong
+        """Faults of the files, by name; empty for a sound pool. From now on only the very files are read that were
+        compared: a file that is replaced or written afterwards cannot be read."""
+        faults = ((entry.file, self._fault(entry)) for entry in self.manifest.files)
+        return {name: why for name, why in faults if why}
+
+    def _fault(self, entry: FileEntry) -> str:
+        """What is wrong with a file; empty if nothing is."""
+        path = self.folder / entry.file
+        try:
+            with open_plain(path) as file:
+                identity = Identity.of(file)
+                if identity.size != entry.bytes:
+                    return f"has {identity.size} bytes instead of {entry.bytes}: truncated"
+                if sha256_of_opened(file) != entry.sha256:
+                    return "has another sha256 than the manifest says"
+        except (OSError, ValueError) as error:
+            return str(error).removeprefix("it ")
+        if self._identities.setdefault(path, identity) != identity:
+            return "has been changed since its sha256 was compared"
+        return ""
 
     def check(self) -> "Pool":
         """Raise `PoolError` unless every file is what the manifest says."""
@@ -141,7 +151,7 @@ class Pool:
             PoolError: their file cannot be read.
         """
         entry = self.manifest.rejected
-        return map(_row, Reader([] if entry is None else [(self.folder / entry.file, entry.rows)]).rows(NAMES))
+        return map(_row, Reader([] if entry is None else [self._shard(entry)]).rows(NAMES))
 
     # --- some of the scenarios ------------------------------------------------------------------------
 
@@ -195,8 +205,16 @@ class Pool:
         return self.at(place)
 
     @cached_property
+    def _identities(self) -> dict[Path, Identity]:
+        """Identities of the files whose hashes were compared."""
+        return {}
+
+    @cached_property
     def _reader(self) -> Reader:
-        return Reader([(self.folder / entry.file, entry.rows) for entry in self.manifest.shards])
+        return Reader([self._shard(entry) for entry in self.manifest.shards])
+
+    def _shard(self, entry: FileEntry) -> Shard:
+        return Shard(self.folder / entry.file, entry.rows, self._identities)
 
     def __getstate__(self) -> dict[str, Any]:
         """What goes to another process: where the pool is, and not what was read of it."""

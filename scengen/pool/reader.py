@@ -4,7 +4,6 @@ import bisect
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import PoolError
 from . import shards
 from .directory import Directory, joined
+from .shards import Shard
 
 MAX_ROWS = 20_000_000
 """Largest number of scenarios that can be found by their ids, which take 600 MB then."""
@@ -24,13 +24,9 @@ KEPT_FOOTERS = 8
 class Reader:
     """Reads the rows of several files. Places count the rows of all files from 0."""
 
-    def __init__(self, files: Sequence[tuple[Path, int]]):
-        """
-        Args:
-            files: every file with the number of its rows.
-        """
+    def __init__(self, files: Sequence[Shard]):
         self.files = files
-        self._ends = list(itertools.accumulate(rows for _, rows in files))
+        self._ends = list(itertools.accumulate(shard.rows for shard in files))
         """Place behind the last row of every file."""
 
     def rows(self, names: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -39,8 +35,8 @@ class Reader:
         Raises:
             PoolError: a file cannot be read.
         """
-        for path, _ in self.files:
-            yield from shards.read_rows(path, names)
+        for shard in self.files:
+            yield from shards.read_rows(shard, names)
 
     def rows_at(self, places: Iterable[int], names: Sequence[str]) -> Iterator[dict[str, Any]]:
         """Some columns of the rows at some places; only the groups that hold them are unpacked.
@@ -52,8 +48,8 @@ class Reader:
             PoolError: a file cannot be read.
         """
         for (number, group), found in itertools.groupby(map(self._located, places), key=lambda at: at[:2]):
-            path, metadata = self.files[number][0], self._footer(number)[0]
-            yield from shards.read_rows_at(path, metadata, group, [inside for *_, inside in found], names)
+            shard, metadata = self.files[number], self._footer(number)[0]
+            yield from shards.read_rows_at(shard, metadata, group, [inside for *_, inside in found], names)
 
     def directory(self) -> Directory:
         """Ids and indices of all rows.
@@ -61,7 +57,7 @@ class Reader:
         Raises:
             PoolError: a file cannot be read, or holds another number of rows than `files` says.
         """
-        return joined([Directory(*shards.read_keys(path, rows)) for path, rows in self.files])
+        return joined([Directory(*shards.read_keys(shard)) for shard in self.files])
 
     def categories(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
         """The different texts in a column such as `split`, and which of them each row has, shape (n,).
@@ -71,8 +67,8 @@ class Reader:
         """
         found: dict[str, int] = {}
         codes = [np.zeros(0, np.int32)]
-        for path, rows in self.files:
-            texts, here = shards.read_categories(path, name, rows)
+        for shard in self.files:
+            texts, here = shards.read_categories(shard, name)
             codes.append(np.array([found.setdefault(text, len(found)) for text in texts] or [0], np.int32)[here])
         return list(found), np.concatenate(codes)
 
@@ -90,10 +86,10 @@ class Reader:
 
         @lru_cache(KEPT_FOOTERS)
         def footer(number: int) -> tuple[pq.FileMetaData, list[int]]:
-            path, rows = self.files[number]
-            metadata, ends = shards.read_footer(path)
-            if not ends or ends[-1] != rows:
-                raise PoolError(f"{path} holds {ends[-1] if ends else 0} rows, and the manifest promises {rows}")
+            shard = self.files[number]
+            metadata, ends = shards.read_footer(shard)
+            if (found := ends[-1] if ends else 0) != shard.rows:
+                raise PoolError(f"{shard.path} holds {found} rows, and the manifest promises {shard.rows}")
             return metadata, ends
 
         return footer

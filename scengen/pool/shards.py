@@ -1,7 +1,9 @@
 """Reading the Parquet files of a pool, which may be of unknown origin."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BufferedReader
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import PoolError
 from .columns import ID, check_robot
-from .files import MAX_JSON, why_not_plain
+from .files import MAX_JSON, Identity, open_plain
 from .manifest import FORMAT
 from .row import READERS, SCHEMAS
 from .untrusted import memory_bounded
@@ -31,26 +33,39 @@ MAX_CATEGORIES = 1000
 """Largest number of different texts in a column of categories, such as the split."""
 
 
+@dataclass(frozen=True)
+class Shard:
+    """A file with rows of a pool."""
+
+    path: Path
+    rows: int
+    """Number of its rows, by the manifest."""
+    identities: Mapping[Path, Identity]
+    """Identities of the files whose hashes were compared. The file is not read if its own has changed since."""
+
+
 # --- rows -------------------------------------------------------------------------------------------------------------
 
 
-def read_rows(path: Path, names: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Some columns of one Parquet file, row by row, as the values of `PoolRow`'s fields.
+def read_rows(shard: Shard, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Some columns of all rows, one by one, as the values of `PoolRow`'s fields.
 
     Raises:
-        PoolError: the file cannot be read, or holds something else than a pool of this format.
+        PoolError: the file cannot be read, holds something else than a pool of this format, or another number of rows.
     """
     count = 0
-    with _faults_told(path, lambda: f"from row {count} on"), opened(path) as file:
+    with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
         _check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, BATCH_ROWS):
             for values in _values(batch):
-                yield values
                 count += 1
+                _check_count(shard, count, False)
+                yield values
+    _check_count(shard, count, True)
 
 
 def read_rows_at(
-    path: Path, metadata: pq.FileMetaData, group: int, places: Sequence[int], names: Sequence[str]
+    shard: Shard, metadata: pq.FileMetaData, group: int, places: Sequence[int], names: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
     """Some columns of a few rows of one group of rows; no other group is unpacked.
 
@@ -62,7 +77,7 @@ def read_rows_at(
     Raises:
         PoolError: as `read_rows`.
     """
-    with _faults_told(path, lambda: f"in group {group} of its rows"), opened(path, metadata) as file:
+    with _faults_told(shard, lambda: f"in group {group} of its rows"), opened(shard, metadata) as file:
         _check_groups(metadata, [group])
         wanted, start = iter(places), 0
         place = next(wanted, None)
@@ -102,106 +117,113 @@ def _column(column: pa.Array, name: str) -> Iterator[Any]:
 # --- columns of a few characters --------------------------------------------------------------------------------------
 
 
-def read_keys(path: Path, rows: int) -> tuple[NDArray[np.bytes_], NDArray[np.int64]]:
-    """Ids, twelve characters each, and indices of all rows of one file.
-
-    Args:
-        rows: number of rows that there must be.
+def read_keys(shard: Shard) -> tuple[NDArray[np.bytes_], NDArray[np.int64]]:
+    """Ids, twelve characters each, and indices of all rows.
 
     Raises:
-        PoolError: as `read_rows`; or there is another number of rows.
+        PoolError: as `read_rows`.
     """
     ids, indices = [np.zeros(0, "S12")], [np.zeros(0, np.int64)]
-    for batch in _small_columns(path, ("id", "index"), rows):
+    for batch in _small_columns(shard, ("id", "index")):
         texts, numbers = (batch.column(name) for name in ("id", "index"))
         right = pc.match_substring_regex(texts, f"^{ID.pattern}$")  # type: ignore[attr-defined]
         if not pc.all(right, min_count=0).as_py():  # type: ignore[attr-defined]
-            raise PoolError(f"{path} holds an id that does not match {ID.pattern}; see scengen verify")
+            raise PoolError(f"{shard.path} holds an id that does not match {ID.pattern}; see scengen verify")
         ids.append(np.array(texts.to_pylist(), "S12"))
         indices.append(numbers.to_numpy())
     return np.concatenate(ids), np.concatenate(indices)
 
 
-def read_categories(path: Path, name: str, rows: int) -> tuple[list[str], NDArray[np.int32]]:
+def read_categories(shard: Shard, name: str) -> tuple[list[str], NDArray[np.int32]]:
     """The different texts in a column, and which of them each row has.
 
-    Args:
-        rows: number of rows that there must be.
-
     Raises:
-        PoolError: as `read_keys`; or there are more than `MAX_CATEGORIES`.
+        PoolError: as `read_rows`; or there are more than `MAX_CATEGORIES`.
     """
     found: dict[str, int] = {}
     codes = [np.zeros(0, np.int32)]
-    for batch in _small_columns(path, (name,), rows):
+    for batch in _small_columns(shard, (name,)):
         encoded = batch.column(0).dictionary_encode()
         for text in (texts := encoded.dictionary.to_pylist()):
             found.setdefault(READERS[name](name, text), len(found))
             if len(found) > MAX_CATEGORIES:
-                raise PoolError(f"{path} holds more than {MAX_CATEGORIES} kinds of {name}; see scengen verify")
+                raise PoolError(f"{shard.path} holds more than {MAX_CATEGORIES} kinds of {name}; see scengen verify")
         codes.append(np.array([found[text] for text in texts], np.int32)[encoded.indices.to_numpy()])
     return list(found), np.concatenate(codes)
 
 
-def _small_columns(path: Path, names: Sequence[str], rows: int) -> Iterator[pa.RecordBatch]:
+def _small_columns(shard: Shard, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
     """Columns of a few characters, many rows at a time.
 
     Raises:
-        PoolError: as `read_rows`; or there is another number of rows.
+        PoolError: as `read_rows`.
     """
     count = 0
-    with _faults_told(path, lambda: f"from row {count} on"), opened(path) as file:
+    with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
         _check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, KEY_ROWS):
             _check_no_nulls(batch)
-            if (count := count + len(batch)) > rows:
-                break
+            count += len(batch)
+            _check_count(shard, count, False)
             yield batch
-    if count != rows:
-        told = f"more than {rows}" if count > rows else f"{count}"
-        raise PoolError(f"{path} holds {told} rows, and the manifest promises {rows}; restore it")
+    _check_count(shard, count, True)
+
+
+def _check_count(shard: Shard, count: int, ended: bool) -> None:
+    """Raise `PoolError` if a file with so many rows, or more unless it has ended, is not what the manifest says."""
+    if count > shard.rows or (ended and count < shard.rows):
+        told = f"more than {shard.rows}" if count > shard.rows else f"{count}"
+        raise PoolError(f"{shard.path} holds {told} rows, and the manifest promises {shard.rows}; restore it")
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
-def opened(path: Path, metadata: pq.FileMetaData | None = None) -> Iterator[pq.ParquetFile]:
+def opened(shard: Shard, metadata: pq.FileMetaData | None = None) -> Iterator[pq.ParquetFile]:
     """A file whose columns are those of a pool.
 
     Args:
         metadata: metadata of the file, if it is known already.
 
     Raises:
-        ValueError: it is not a plain file, or has other columns.
+        ValueError: it is not a plain file, has other columns, or has changed since its hash was compared.
     """
-    if why := why_not_plain(path):
-        raise ValueError(f"it {why}")
-    with pq.ParquetFile(
-        path,
-        metadata=metadata,
-        page_checksum_verification=True,
-        thrift_string_size_limit=MAX_JSON,
-        thrift_container_size_limit=MAX_CONTAINERS,
-    ) as file:
+    with (
+        open_plain(shard.path) as content,
+        pq.ParquetFile(
+            content,
+            metadata=metadata,
+            page_checksum_verification=True,
+            thrift_string_size_limit=MAX_JSON,
+            thrift_container_size_limit=MAX_CONTAINERS,
+        ) as file,
+    ):
+        _check_unchanged(shard, content)
         if not any(file.schema_arrow.equals(known) for known in SCHEMAS.values()):
             raise ValueError(f"its columns are not those of pool format {FORMAT}")
         yield file
+        _check_unchanged(shard, content)
 
 
-def read_footer(path: Path) -> tuple[pq.FileMetaData, list[int]]:
+def _check_unchanged(shard: Shard, content: BufferedReader) -> None:
+    if (known := shard.identities.get(shard.path)) is not None and known != Identity.of(content):
+        raise ValueError("it has been changed since its sha256 was compared")
+
+
+def read_footer(shard: Shard) -> tuple[pq.FileMetaData, list[int]]:
     """What a file says of its groups of rows, and the place behind the last row of each.
 
     Raises:
         PoolError: as `read_rows`.
     """
-    with _faults_told(path, lambda: "at all"), opened(path) as file:
+    with _faults_told(shard, lambda: "at all"), opened(shard) as file:
         groups = map(file.metadata.row_group, range(file.num_row_groups))
         return file.metadata, list(accumulate(group.num_rows for group in groups))
 
 
 @contextmanager
-def _faults_told(path: Path, where: Callable[[], str]) -> Iterator[None]:
+def _faults_told(shard: Shard, where: Callable[[], str]) -> Iterator[None]:
     """Report a file that cannot be read in one line.
 
     Raises:
@@ -211,15 +233,16 @@ def _faults_told(path: Path, where: Callable[[], str]) -> Iterator[None]:
         yield
     except (OSError, pa.ArrowException, ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:
         why = " ".join(str(error).split())[:120] or type(error).__name__
-        raise PoolError(f"{path} cannot be read {where()} ({why}); restore it") from None
+        raise PoolError(f"{shard.path} cannot be read {where()} ({why}); restore it") from None
 
 
 def _check_groups(metadata: pq.FileMetaData, groups: Iterable[int]) -> None:
-    """Refuse groups of rows that would not fit into memory, before any is unpacked."""
+    """Refuse groups of rows that lie in other files or would not fit into memory, before any is unpacked."""
     for group in map(metadata.row_group, groups):
-        size = max(
-            group.total_byte_size, sum(group.column(i).total_uncompressed_size for i in range(group.num_columns))
-        )
+        columns = [group.column(i) for i in range(group.num_columns)]
+        if elsewhere := next((column.file_path for column in columns if column.file_path), None):
+            raise ValueError(f"its rows lie in another file, {elsewhere[:60]!r}")
+        size = max(group.total_byte_size, sum(column.total_uncompressed_size for column in columns))
         if size > MAX_GROUP:
             raise ValueError(f"a group of rows has {size} bytes unpacked; at most {MAX_GROUP} are read")
 

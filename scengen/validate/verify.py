@@ -86,6 +86,7 @@ def verify(
         run.count()
         if options.level == "full" and found.pool_verdict == "sound":
             run.certify_left_out(examiner)
+        run.compare_files()
     return found.report()
 
 
@@ -244,6 +245,19 @@ class _Run:
             self.found.left_out[one.index] = one.reason
         elif isinstance(one, Examination):
             self.found.of_pool(one.id, one.verdict, "; ".join(one.reasons))
+
+    def compare_files(self) -> None:
+        """Compare the files once more, so that the report is about the pool that is there now."""
+        if self.found.pool_verdict != "sound":
+            return
+        for name, what in self.pool.damaged().items():
+            self.found.of_pool(name, "refuted", f"at the end of verification, the shard {what}")
+        try:
+            same = Manifest.read(self.pool.folder) == self.manifest
+        except PoolError:
+            same = False
+        if not same:
+            self.found.of_pool(MANIFEST, "refuted", "it has been changed during verification")
 
     def count(self) -> None:
         """Compare the counts of the manifest with what has been seen."""

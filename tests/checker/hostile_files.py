@@ -167,6 +167,26 @@ def _many(table: pa.Table) -> pa.Table:
     return table.slice(0, 1).take(pa.array(np.zeros(30_000, np.int64)))
 
 
+def _miscounted(folder: Path) -> None:
+    """Two shards, whose counts are false although their sum is right."""
+    table, shards = pq.read_table(folder / SHARD), []
+    for number, told in enumerate((2, 0)):
+        path = folder / f"scenarios-0000{number}.parquet"
+        write_table(path, table.slice(number, 1))
+        shards.append(listed(path, told))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    write_manifest(folder, {**manifest, "shards": shards})
+
+
+def _rows_elsewhere(content: bytes) -> bytes:
+    """A shard whose footer says that its columns lie in another file."""
+    metadata, written = pq.read_metadata(pa.BufferReader(content)), pa.BufferOutputStream()
+    metadata.set_file_path("aside.bin")
+    metadata.write_metadata_file(written)
+    footer = written.getvalue().to_pybytes()[4:]
+    return content[: -8 - int.from_bytes(content[-8:-4], "little")] + footer
+
+
 def _listed_often(folder: Path) -> None:
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["shards"] *= 20_000
@@ -222,6 +242,8 @@ FILES: dict[str, Callable[[Path], None]] = {
     "shard_rows_negative": _relist(rows=-2),
     "shard_rows_wrong": _relist(rows=40),
     "shard_listed_often": _listed_often,
+    "shards_miscounted": _miscounted,
+    "shard_with_rows_elsewhere": _rewritten(_rows_elsewhere),
     "scene_column_null": _table(_column("scene_xml", None)),
     "witness_long": _table(_long_witness),
     "rows_many": _table(_many, row_group_size=30_000),
@@ -239,7 +261,15 @@ FILES: dict[str, Callable[[Path], None]] = {
 }
 """What is done to the folder of a sound pool; any reason will do, as long as it is one line."""
 
-QUICK = {"time_step_tiny", "replicated_elsewhere", "shard_is_a_pipe", "shard_truncated", "manifest_deep"}
+QUICK = {
+    "time_step_tiny",
+    "shards_miscounted",
+    "shard_with_rows_elsewhere",
+    "replicated_elsewhere",
+    "shard_is_a_pipe",
+    "shard_truncated",
+    "manifest_deep",
+}
 
 
 def _scenes() -> list[Case]:

@@ -5,6 +5,7 @@ without simulation; where the physics was touched that is what matters.
 """
 
 import json
+import os
 import re
 import shutil
 import xml.etree.ElementTree as ET
@@ -27,9 +28,10 @@ from scengen.validate.claims import Claims
 from scengen.validate.junit import junit
 from scengen.validate.spot import excluded_share
 from scengen.validate.stored import settings_of_manifest, task_of_manifest
-from scengen.validate.verify import Examiner, Options, verify
+from scengen.validate.verify import Examiner, Options, _Run, verify
 from scengen.work.parallel import Limits
 
+SHARD = "scenarios-00000.parquet"
 BASE = Path(__file__).parents[1] / "checker" / "base"
 SOURCES = {"single": REFERENCE, "cage": BASE / "cage_id", "tool": BASE / "tool_id"}
 
@@ -436,8 +438,6 @@ def test_a_manifest_with_deep_or_double_entries_is_refused(mine, text):
 
 
 def test_a_pipe_or_a_link_is_no_shard(mine):
-    import os
-
     shard = mine / "scenarios-00000.parquet"
     moved = shard.rename(mine / "elsewhere")
     shard.symlink_to(moved)
@@ -448,6 +448,66 @@ def test_a_pipe_or_a_link_is_no_shard(mine):
     assert Pool.open(mine).damaged() == {shard.name: "is not a plain file"}
     with pytest.raises(PoolError, match="is not a plain file"):
         list(Pool.open(mine).columns("id"))
+
+
+def _written_over(pool, other):
+    (pool / SHARD).write_bytes((other / SHARD).read_bytes())
+
+
+def _replaced(pool, other):
+    os.replace(shutil.copy(other / SHARD, pool / "part"), pool / SHARD)
+
+
+def _other_folder(pool, other):
+    """The pool is a link to a folder, and the link is changed. The files keep all their times."""
+    pool.unlink()
+    pool.symlink_to(other)
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["left", "restored"])
+@pytest.mark.parametrize("swap", [_written_over, _replaced, _other_folder])
+def test_files_are_not_changed_between_their_hashes_and_their_reading(mine, tmp_path, monkeypatch, swap, back):
+    """A false pool has right hashes. While it is verified, a sound one stands in its place."""
+    false = Path(shutil.copytree(mine, tmp_path / "false"))
+    of = Pool.open(false)
+    write_pool(false, of.manifest.without_files(), [replace(row, instruction="Rest.") for row in of.rows()])
+    aside = Path(shutil.copytree(false, tmp_path / "aside"))
+    pool = tmp_path / "pool"
+    pool.symlink_to(false)
+    assert report(pool).verdict == "refuted"
+    damaged, count = Pool.damaged, _Run.count
+
+    def hashed(of):
+        found = damaged(of)
+        if not of.folder.with_name("swapped").exists():
+            of.folder.with_name("swapped").touch()
+            swap(pool, mine)
+        return found
+
+    def counted(run):
+        count(run)
+        if back:
+            swap(pool, aside)
+
+    monkeypatch.setattr(Pool, "damaged", hashed)
+    monkeypatch.setattr(_Run, "count", counted)
+    found = report(pool)
+    assert found.verdict == "refuted" and "changed since its sha256 was compared" in found.failed[0]["reason"]
+
+
+def test_a_manifest_is_not_changed_during_verification(mine, monkeypatch):
+    monkeypatch.setattr(_Run, "count", lambda run: changed(mine, lambda m: m.update(n=7)))
+    found = report(mine)
+    assert found.verdict == "refuted"
+    assert found.failed == [
+        {"id": "manifest.json", "verdict": "refuted", "reason": "it has been changed during verification"}
+    ]
+
+
+def test_a_shard_that_changes_after_all_was_read_is_noticed(mine, monkeypatch):
+    monkeypatch.setattr(_Run, "count", lambda run: (mine / SHARD).write_bytes(b"PAR1"))
+    found = report(mine)
+    assert found.verdict == "refuted" and found.failed[0]["reason"].startswith("at the end of verification, the shard")
 
 
 @pytest.mark.parametrize(
