@@ -16,6 +16,7 @@ from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..sim.world import World
 from ..validate.identity import source_sha256
+from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..work.log import Log
@@ -268,7 +269,8 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
 
 def player_of(subject: Subject) -> Player:
     """A player for attempts on a subject."""
-    return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
+    with scene_errors(f" of {subject.name}"):
+        return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
 
 
 def fitted(task: Task, settings: AttackSettings) -> list[Prior]:

@@ -13,6 +13,7 @@ from ..control.loop import Loop
 from ..episode import Actions, Outcome
 from ..pool import Pool, PoolRow
 from ..sim.world import Vec3, World
+from ..validate.playable import scene_errors
 from ..validate.rollout import replay
 from ..work.parallel import Limits, Workers, each
 from .robosuite import RobosuiteEnv, env_class
@@ -77,7 +78,8 @@ def compare(row: PoolRow, search: tuple[str, ...] = ()) -> Comparison:
         ignore_done=True,
     )
     settle = row.certificate.settle or 0.0
-    world = _TracedWorld.load(row.scene_xml, row.embodiment)
+    with scene_errors(f" of {row.name}"):
+        world = _TracedWorld.load(row.scene_xml, row.embodiment)
     ours = replay(env.scenario, world, row.witness, row.horizon, settle)
     theirs, reason, seconds, path = _replay_in_robosuite(env, row.witness, settle)
     env.close()

@@ -30,6 +30,7 @@ from ..pool.library import Library
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, action_size, hands
+from ..validate.playable import stored_world
 from .object_state import ObjectState, bodies_of
 from .observations import (
     Reading,
@@ -336,7 +337,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = World.load(row.scene_xml, row.embodiment, visual=self._needs_pictures)
+            self._world = stored_world(row, self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
         self._row = row
         self._world.reset()

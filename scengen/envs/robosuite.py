@@ -30,6 +30,7 @@ from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
 from ..validate.identity import check_versions
+from ..validate.playable import scene_errors
 from .object_state import ObjectState, bodies_of
 from .observations import turns_pictures
 from .pools import Folders, chosen, rows_of
@@ -228,7 +229,8 @@ class RobosuiteEnv(ManipulationEnv):
         return re.sub(r'file="[^"]*?(robosuite/models/[^"]*)"', r'file="\1"', text)
 
     def _initialize_sim(self, xml_string: str | None = None) -> None:
-        super()._initialize_sim(xml_string)
+        with scene_errors():
+            super()._initialize_sim(xml_string)
         ours, theirs = self.sim.model.opt.timestep, self.model_timestep
         if ours != theirs:
             raise BadConfig(f"robosuite.macros.SIMULATION_TIMESTEP = {theirs:g}; the scene's is {ours:g} s")

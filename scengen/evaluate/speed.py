@@ -34,6 +34,7 @@ from ..samplers.split import ID
 from ..samplers.task import Task
 from ..sim.world import JAW, World
 from ..validate.certify import Trial
+from ..validate.playable import stored_world
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..validate.settings import QUICK
@@ -278,9 +279,7 @@ def gym_costs(repeats: int) -> dict[str, Measure]:
         env, row = PoolEnv("domino_single", pool.folder), next(pool.rows())
     env.reset()
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
-    ratios = alternated(
-        [_steps_of(env, row.witness), _bare(World.load(row.scene_xml, row.embodiment), row.witness)], repeats
-    )
+    ratios = alternated([_steps_of(env, row.witness), _bare(stored_world(row), row.witness)], repeats)
     return {"env_step_to_raw": _ratio(ratios), "env_reset_ms": Measure(tuple(resets))}
 
 
@@ -295,7 +294,7 @@ def costs(repeats: int) -> dict[str, float]:
         bare = PoolEnv("domino_single", pool.folder)
         seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     brief = actions[:CAMERA_PERIODS]
-    world = World.load(row.scene_xml, row.embodiment)
+    world = stored_world(row)
     sides = [_bare(world, actions), _steps_of(bare, actions), _steps_of(_robosuite(row, False), actions)]
     names = ("MuJoCo: five bare mj_step", "scengen in Gymnasium: proprioception", "robosuite: proprioception")
     spent = zip(*alternated(sides, repeats), strict=True)

@@ -12,6 +12,7 @@ from ..pool import PoolRow
 from ..robots import panda
 from ..sim import scene_text
 from ..sim.world import compose
+from ..validate.playable import scene_errors
 
 NAME_ATTRIBUTES = {"name", "class"}
 """MJCF attributes that define the name of an element or of a class of defaults."""
@@ -28,9 +29,12 @@ def export(row: PoolRow, folder: Path, robot: bool) -> None:
 
     Raises:
         BadConfig: the folder cannot be written, or the scene refers to other files.
+        PoolError: MuJoCo does not read the scene.
     """
     target = folder / row.id
     scene_text.check(row.scene_xml)
+    with scene_errors(f" of {row.name}"):
+        compose(row.scene_xml, row.embodiment, visual=True).compile()
     try:
         target.mkdir(parents=True, exist_ok=True)
         (target / "scene.xml").write_text(_written(ET.fromstring(row.scene_xml)))

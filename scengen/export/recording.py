@@ -30,7 +30,7 @@ from ..pictures.video import check_size
 from ..pool import Pool, PoolRow, collection
 from ..sim.world import World, hands
 from ..validate.identity import check_versions
-from ..validate.playable import unplayable
+from ..validate.playable import stored_world, unplayable
 from ..versions import versions
 from ..work.parallel import Workers
 from ..work.targets import refused, try_file, try_folder
@@ -174,7 +174,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                 if row.id in lost:
                     continue
                 with ExitStack() as stack:
-                    world = World.load(row.scene_xml, row.embodiment, visual=bool(settings.camera_names))
+                    world = stored_world(row, bool(settings.camera_names))
                     scenario = tasks[row.task].scenario(row.params)
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
                     observe = partial(Snapshot.of, world, writer.streams, pictures)

@@ -14,6 +14,7 @@ from ..errors import UnknownName
 from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
+from ..validate.playable import stored_world
 from ..validate.rollout import Rollout, try_shortcut
 from .render import Camera, Picture, check_pictures
 from .video import Movie
@@ -81,7 +82,7 @@ def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> 
     shortcuts = scenario.shortcuts()
     if name not in shortcuts:
         raise UnknownName("shortcut", name, [WITNESS, *shortcuts])
-    world = World.load(row.scene_xml, row.embodiment)
+    world = stored_world(row)
     rollout = try_shortcut(scenario, world, shortcuts[name], row.horizon, row.certificate.settle or 0.0, raw)
     return Take(scenario, row.scene_xml, row.embodiment, rollout.actions), rollout
 

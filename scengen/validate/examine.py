@@ -96,7 +96,9 @@ class Examiner:
         reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]
         reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
         text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)
-        reasons += filter(None, [difference(row.scene_xml, text, row.certificate.fingerprint == fingerprint())])
+        reasons += filter(
+            None, [difference(row.scene_xml, text, row.certificate.fingerprint == fingerprint(), row.embodiment)]
+        )
         if reasons or not simulated:
             verdict: Verdict = "refuted" if reasons else "sound"
             return Examination(row.id, verdict, tuple(reasons), True, expired=self.expired)

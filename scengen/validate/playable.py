@@ -1,10 +1,10 @@
 """Trial runs of untrusted scenes in a process that can be ended, before anything else uses the scenes."""
 
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 
 from ..episode import Actions
-from ..errors import Unstable
+from ..errors import PoolError, Unstable, cut
 from ..pool import PoolRow
 from ..pool.row import NO_WITNESS
 from ..sim.world import World
@@ -17,11 +17,39 @@ Played = tuple[str, str, Actions]
 def play(what: Played) -> None:
     """Compile a scene and play actions in it. The result is not used."""
     scene_xml, embodiment, actions = what
-    world = World.load(scene_xml, embodiment)
+    with scene_errors():
+        world = World.load(scene_xml, embodiment)
     world.reset()
     with suppress(Unstable):  # later uses of the scene meet it again
         for action in actions:
             world.apply(action)
+
+
+def stored_world(row: PoolRow, visual: bool = False) -> World:
+    """The world of a stored scene at its start.
+
+    Args:
+        visual: see `World.load`.
+
+    Raises:
+        PoolError: MuJoCo does not read the scene.
+    """
+    with scene_errors(f" of {row.name}"):
+        return World.load(row.scene_xml, row.embodiment, visual)
+
+
+@contextmanager
+def scene_errors(which: str = "") -> Iterator[None]:
+    """Report errors of MuJoCo about a stored scene in one line.
+
+    Raises:
+        PoolError: that line.
+    """
+    try:
+        yield
+    except ValueError as error:
+        why = cut(" ".join(str(error).split()), 200)
+        raise PoolError(f"MuJoCo does not read the scene{which}: {why}; see scengen verify") from None
 
 
 def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[str, str]]:

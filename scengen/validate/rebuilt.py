@@ -4,7 +4,9 @@ import math
 import re
 import xml.etree.ElementTree as ET
 
-from ..errors import BadConfig
+import numpy as np
+
+from ..errors import BadConfig, cut
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.world import JAW, World
@@ -15,6 +17,13 @@ MAX_ABSOLUTE_DIFFERENCE = 1e-12
 """Largest absolute difference of equal numbers on machines with different rounding; the inertia of a body has 1e-6."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?([eE][-+]?[0-9]+)?")
 """A number as MuJoCo reads and writes it; Python's `float` also accepts `0.0_6` and Arabic digits."""
+WHOLE = frozenset(
+    "condim contype conaffinity priority group iterations ls_iterations noslip_iterations ccd_iterations".split()
+)
+"""Attributes that MuJoCo reads as whole numbers."""
+_ELEMENTS = re.compile(r"(opt|body|jnt|dof|geom|site|cam|light|eq|exclude|pair|tendon|wrap|actuator|sensor|mat)_")
+"""Beginning of the fields of a model whose whole numbers say what its elements are. Meshes and search trees have whole
+numbers that depend on rounding."""
 NOT_REBUILT = "the scene is not the one that the family builds from the parameters"
 
 
@@ -28,17 +37,21 @@ def world_of(scenario: Scenario, embodiment: str = JAW) -> World:
     return World.load(rebuild(scenario), embodiment)
 
 
-def difference(text: str, rebuilt: str, exact: bool) -> str:
-    """How the scene of a pool differs from the rebuilt one, in words; empty if it does not. Compiles nothing.
+def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> str:
+    """How the scene of a pool differs from the rebuilt one, in words; empty if it does not.
 
     Args:
         exact: whether every byte must be equal, as on a machine with the same rounding. Otherwise every element and
-            attribute must be equal, and numbers up to `MAX_RELATIVE_DIFFERENCE`.
+            attribute must be equal, and numbers up to `MAX_RELATIVE_DIFFERENCE`. Such a scene, and no other one, is
+            compiled, because MuJoCo does not read every text that says nearly the same.
+        embodiment: the robot that the scene is compiled with.
     """
     if text == rebuilt:
         return ""
     if not text or not rebuilt:
         return f"{NOT_REBUILT}: {'it' if rebuilt else 'that'} is empty"
+    if "<?" in text:
+        return f"{NOT_REBUILT}: it has instructions for programs (<?...?>)"
     try:
         scene_text.check(text)
     except BadConfig as error:
@@ -50,11 +63,32 @@ def difference(text: str, rebuilt: str, exact: bool) -> str:
             return f"{NOT_REBUILT}: it differs at {where}"
         for name in sorted(a.attrib.keys() | b.attrib.keys()):
             mine, theirs = a.attrib.get(name), b.attrib.get(name)
-            if mine != theirs and (exact or mine is None or theirs is None or not _close(mine, theirs)):
+            if mine != theirs and (
+                exact or name in WHOLE or mine is None or theirs is None or not _close(mine, theirs)
+            ):
                 return f"{NOT_REBUILT}: {name} of {where} is {str(mine)[:60]!r} instead of {str(theirs)[:60]!r}"
     if len(here) != len(there):
         return f"{NOT_REBUILT}: it has {len(here)} elements instead of {len(there)}"
-    return f"{NOT_REBUILT}: its text differs although its content does not" if exact else ""
+    if exact:
+        return f"{NOT_REBUILT}: its text differs although its content does not"
+    return _other_model(text, rebuilt, embodiment)
+
+
+def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
+    """How the model of a scene whose text says nearly the same differs from the rebuilt one; empty if it does not."""
+    try:
+        here = World.load(text, embodiment).model
+    except ValueError as error:
+        return f"{NOT_REBUILT}: MuJoCo does not read it: {cut(' '.join(str(error).split()))}"
+    there = World.load(rebuilt, embodiment).model
+    if here.names != there.names:
+        return f"{NOT_REBUILT}: its elements have other names"
+    for name in dir(there):
+        values = getattr(there, name) if _ELEMENTS.match(name) and "bvh" not in name else None
+        if isinstance(values, np.ndarray) and values.dtype.kind in "iub":
+            if not np.array_equal(values, getattr(here, name)):
+                return f"{NOT_REBUILT}: compiled, {name} differs"
+    return ""
 
 
 def _close(a: str, b: str) -> bool:

@@ -45,6 +45,12 @@ def _last_digits(draft: Draft) -> None:
         features.update({name: value * (1 + 3e-16) for name, value in features.items()})
 
 
+def _rounded(draft: Draft) -> None:
+    """There, the numbers of scenes end in other digits, too."""
+    _elsewhere(draft)
+    draft.scene(r'(name="tile_5" pos=")(\S+)', lambda found: f"{found[1]}{float(found[2]) * (1 + 1e-12)!r}")
+
+
 def _two_shards(folder: Path) -> None:
     """As large pools are written."""
     table = pq.read_table(folder / SHARD)
@@ -69,6 +75,7 @@ CASES = [
     Case("single_quick__elsewhere", "single_quick", "accept", "", _elsewhere, quick=True),
     Case("seesaw_id__elsewhere", "seesaw_id", "accept", "", _elsewhere),
     Case("single_quick__last_digits", "single_quick", "accept", "", _last_digits),
+    Case("single_quick__rounded", "single_quick", "accept", "", _rounded),
     Case("single_quick__two_shards", "single_quick", "accept", "", lambda draft: None, _two_shards),
     Case("single_quick__a_note_beside", "single_quick", "accept", "", None, _beside),
     Case("single_quick__two_workers", "single_quick", "accept", "", arguments=("workers=2",)),

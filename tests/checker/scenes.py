@@ -141,6 +141,9 @@ SINGLE: dict[str, tuple[Change, str]] = {
 ELSEWHERE_ONLY: dict[str, tuple[Change, str]] = {
     "underscore": (_attribute("slab/box", "mass", "0.0_6"), ""),
     "other_digits": (_attribute("slab/box", "mass", "\u0660.06"), ""),
+    "whole_number_nearly": (lambda d: d.scene('condim="(\\d)"', r'condim="\1.0000000001"'), ""),
+    "number_too_small": (lambda d: d.scene('pos="0 ', 'pos="1e-400 '), ""),
+    "instruction_for_programs": (lambda d: d.scene("<worldbody>", "<?scene again?><worldbody>"), ""),
     "one_in_a_million": (_scaled("slab/box", "mass", 1.00001), SAME),
 }
 """What Python reads as the same number and MuJoCo does not, or a difference that no rounding explains."""
