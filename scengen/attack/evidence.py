@@ -3,7 +3,7 @@
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -13,8 +13,19 @@ import numpy as np
 from ..episode import Actions
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
-from ..pool.columns import witness
-from ..pool.untrusted import memory_bounded, read_json
+from ..pool.columns import ID, witness
+from ..pool.files import open_plain
+from ..pool.untrusted import (
+    MAX_HORIZON,
+    SHORT_HASH,
+    WORD,
+    check_mapping,
+    check_match,
+    check_text,
+    demand,
+    memory_bounded,
+    read_json,
+)
 from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.certify import lower_bound
@@ -103,16 +114,51 @@ class Hit:
             BadConfig: the file does not exist, or holds something else.
         """
         try:
-            with memory_bounded(), np.load(path, allow_pickle=False) as stored:
-                about, actions = read_json(str(stored["about"])), witness("witness", stored["actions"])
-            about["lacks"] = tuple((str(one), str(other)) for one, other in about["lacks"])
-            about["unmoved"] = tuple(map(str, about["unmoved"]))
+            with (
+                open_plain(path.resolve()) as file,
+                memory_bounded(),
+                np.load(file, allow_pickle=False) as stored,
+            ):
+                about, actions = _plain_hit(read_json(str(stored["about"]))), witness("witness", stored["actions"])
             return cls(**about, actions=actions)
-        except FileNotFoundError:
-            raise BadConfig(f"{path} does not exist; give a hit that scengen attack has stored") from None
         except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
             why = cut(" ".join(str(error).split()))
             raise BadConfig(f"{path} is not a hit of scengen attack, or is damaged: {why}") from None
+
+
+def _plain_hit(about: Any) -> dict[str, Any]:
+    """The fields of a stored hit but its actions.
+
+    Raises:
+        ValueError: one of them is missing, unknown, or not what a hit has.
+    """
+    about = dict(check_mapping("what it says", about))
+    known = [one.name for one in fields(Hit) if one.name != "actions"]
+    for name in known:
+        demand(name in about, f"it lacks {name}")
+    for name in about:
+        demand(name in known, f"it has an unknown entry {cut(name)!r}")
+    check_match("scenario", about["scenario"], ID)
+    check_match("tier", about["tier"], WORD)
+    demand(isinstance(about["raw"], bool), "raw is neither true nor false")
+    check_text("plan", about["plan"], 10_000)
+    demand(_is_number(about["seconds"]) and 0 <= about["seconds"] <= MAX_HORIZON, "seconds is not a time")
+    check_match("digest", about["digest"], SHORT_HASH)
+    check_text("task", about["task"], 100)
+    for name, number in check_mapping("params", about["params"]).items():
+        demand(_is_number(number), f"params has no number for {cut(name)}")
+    lacks, unmoved = about["lacks"], about["unmoved"]
+    demand(
+        isinstance(lacks, list) and all(isinstance(p, list) and len(p) == 2 for p in lacks), "lacks is no list of pairs"
+    )
+    demand(isinstance(unmoved, list), "unmoved is no list of bodies")
+    for name in (*(name for pair in lacks for name in pair), *unmoved):
+        check_text("the name of a body", name, 200)
+    return {**about, "lacks": tuple((one, other) for one, other in lacks), "unmoved": tuple(unmoved)}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 OTHER_SCENARIO = "the scenario's id does not belong to its parameters; one of a pool with scans needs pool=FOLDER too"

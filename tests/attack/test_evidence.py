@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
 import pytest
 
 from scengen import cli, load_task
@@ -90,6 +91,43 @@ def test_a_file_that_is_no_hit_is_one_clear_error(tmp_path, content, capsys):
     (tmp_path / "hit.npz").write_bytes(content)
     assert cli.run(["verify", f"hits={tmp_path / 'hit.npz'}"]) == 2
     assert "is not a hit of scengen attack" in capsys.readouterr().err
+
+
+CHANGES = {
+    "params are null": {"params": None},
+    "a parameter is a text": {"params": {"count": "three"}},
+    "the scenario climbs": {"scenario": "../../x"},
+    "a tier of its own": {"tier": "<b>sure</b>\n"},
+    "raw is a number": {"raw": 1},
+    "a text for a time": {"seconds": "2"},
+    "an endless time": {"seconds": 1e9},
+    "no digest": {"digest": None},
+    "contacts of three": {"lacks": [["a", "b", "c"]]},
+    "contacts are a text": {"lacks": "ab"},
+    "bodies are numbers": {"unmoved": [3]},
+    "one more": {"more": 1},
+    "a task that is a list": {"task": []},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("command", ["verify hits={hit}", "film hit={hit} to={to}"])
+def test_what_a_hit_says_is_checked_before_it_is_used(attacked_pool, tmp_path, capsys, command, change):
+    whole = next((attacked_pool / "hits").iterdir())
+    with np.load(whole) as stored:
+        about = {**json.loads(str(stored["about"])), **CHANGES[change]}
+        np.savez_compressed(tmp_path / "hit.npz", actions=stored["actions"], about=json.dumps(about))
+    argv = command.format(hit=tmp_path / "hit.npz", to=tmp_path / "strip.png").split()
+    assert cli.run(argv) == 2
+    assert "is not a hit of scengen attack, or is damaged: " in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("command", ["verify hits={hit}", "film hit={hit} to={to}"])
+def test_a_pipe_is_no_hit(tmp_path, capsys, command):
+    os.mkfifo(tmp_path / "hit.npz")
+    argv = command.format(hit=tmp_path / "hit.npz", to=tmp_path / "strip.png").split()
+    assert cli.run(argv) == 2
+    assert "is not a plain file" in capsys.readouterr().err
 
 
 def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys, monkeypatch):
