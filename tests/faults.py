@@ -10,9 +10,16 @@ from scengen.errors import UnknownName
 
 
 def work(item):
-    """The item, or what it names: a process that hangs, crashes or takes all memory, an error."""
+    """The item, or what it names: a process that hangs, works, crashes or takes all memory; an error."""
     if item == "hang":
         time.sleep(60)
+    if item == "spin":
+        while True:
+            pass
+    if item == "busy":  # for 0.3 s of processor time
+        begun = time.process_time()
+        while time.process_time() - begun < 0.3:
+            pass
     if item == "crash":
         os.kill(os.getpid(), signal.SIGSEGV)
     if item == "memory":

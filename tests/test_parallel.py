@@ -24,11 +24,44 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.mark.parametrize("workers", [1, 3])
 def test_what_hangs_crashes_or_takes_all_memory_is_named_and_the_rest_goes_on(workers):
-    items = ["a", "hang", "b", "crash", "c", "memory", "d"]
+    items = ["a", "hang", "b", "spin", "crash", "c", "memory", "d"]
     assert sorted(each(work, items, workers, LIMITS, lost)) == [
         "a", "b", "c", "crash died: it was ended by SIGSEGV", "d", "hang took longer than 0.5 s",
-        "memory needs more than 200 MB",
+        "memory needs more than 200 MB", "spin took longer than 0.5 s",
     ]  # fmt: skip
+
+
+RUN = """
+import faults
+from scengen.work.parallel import Limits, each
+for name in each(faults.work, ["busy"] * 6, 2, Limits(0.5, 200), faults.lost):
+    print(name, flush=True)
+"""
+
+
+def test_a_suspended_run_has_the_results_of_one_that_was_not():
+    """Ctrl-Z, or a job that a cluster suspends: command and workers stand still for longer than their limit."""
+    run = subprocess.Popen([sys.executable, "-c", RUN], stdout=subprocess.PIPE, text=True, start_new_session=True,
+                           cwd=ROOT / "tests")  # fmt: skip
+    told = [run.stdout.readline()]
+    for _ in range(3):
+        time.sleep(0.1)
+        os.killpg(run.pid, signal.SIGSTOP)
+        time.sleep(1.2)
+        os.killpg(run.pid, signal.SIGCONT)
+    assert [*told, *run.stdout] == ["busy\n"] * 6 and run.wait() == 0
+
+
+def test_a_worker_that_is_suspended_alone_goes_on_later():
+    def suspended(item):
+        if not os.fork():  # a child of the worker, which wakes it
+            time.sleep(1.5)
+            os.kill(os.getppid(), signal.SIGCONT)
+            os._exit(0)
+        os.kill(os.getpid(), signal.SIGSTOP)
+        return item
+
+    assert list(each(suspended, [7], 1, LIMITS, lost)) == [7]
 
 
 def test_without_limits_one_worker_is_this_process_and_two_are_others():

@@ -9,7 +9,7 @@ from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
-from ..pictures.render import encode
+from ..pictures.render import check_pictures, encode
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
@@ -71,6 +71,7 @@ def command(arguments: Arguments) -> int:
     settings = read("film", arguments, FilmSettings)
     settings.check()
     try_file(settings.to)
+    check_pictures()
     take = _take_of_hit(settings, arguments) if settings.hit else _take_of_pool(settings, arguments)
     target, size = Path(settings.to), (settings.width, settings.height)
     with ProgressBar(err, "film", 1) as bar:

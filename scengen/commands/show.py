@@ -62,6 +62,7 @@ def command(arguments: Arguments) -> int:
         for table in report.scenario_tables(row):
             out.print(table)
         if target:
+            render.check_pictures()
             scenario = task_of(pool, search_path(arguments)).scenario(row.params)
             write(target, render.encode(film.strip(film.Take.witness(check_row(row), scenario)), "png"))
     if target:

@@ -323,5 +323,5 @@ def _passed_filter(witness: np.ndarray) -> bool:
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
+    text = ascii(value)  # some letters look alike
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -92,13 +92,13 @@ class Findings:
         for name in ("code", "category"):
             here, there = getattr(installed, name), getattr(stored, name)
             if here != there:
-                self.of_pool(MANIFEST, "refuted", f"the {name} is {there[:60]!r}, that of the task is {here!r}")
+                self.of_pool(MANIFEST, "refuted", f"the {name} is {there[:60]!a}, that of the task is {here!a}")
 
     def name_settings(self, settings: CertifySettings, levels: Mapping[str, CertifySettings]) -> None:
         """Note the level whose settings the certificates have, or how they differ from it."""
         known = levels.get(settings.name)
         if known is None:
-            told = f"the settings are called {settings.name[:60]!r}; known: {', '.join(levels)}"
+            told = f"the settings are called {settings.name[:60]!a}; known: {', '.join(levels)}"
             self.of_pool(MANIFEST, "refuted", told)
         elif settings == known:
             self.settings = settings.name
@@ -194,4 +194,8 @@ _ABSENT: Any = object()
 
 
 def _shown(value: Any) -> str:
-    return "(not there)" if value is _ABSENT else str(value)[:200]
+    """A value as text. Other letters than ASCII are escaped, because some of them look alike."""
+    if value is _ABSENT:
+        return "(not there)"
+    text = str(value)
+    return (text if text.isascii() and text.isprintable() else ascii(text)[1:-1])[:200]

@@ -66,7 +66,7 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
             if mine != theirs and (
                 exact or name in WHOLE or mine is None or theirs is None or not _close(mine, theirs)
             ):
-                return f"{NOT_REBUILT}: {name} of {where} is {str(mine)[:60]!r} instead of {str(theirs)[:60]!r}"
+                return f"{NOT_REBUILT}: {name} of {where} is {str(mine)[:60]!a} instead of {str(theirs)[:60]!a}"
     if len(here) != len(there):
         return f"{NOT_REBUILT}: it has {len(here)} elements instead of {len(there)}"
     if exact:

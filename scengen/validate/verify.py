@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import PoolError, ScengenError, cut
 from ..fingerprint import fingerprint
 from ..pool import Pool, PoolRow
-from ..pool.manifest import MANIFEST, Manifest
+from ..pool.manifest import MANIFEST, PROCESS, Manifest
 from ..samplers.task import Task
 from ..work.parallel import Limits, Workers, each
 from . import survey
@@ -257,7 +257,15 @@ class _Run:
             self.found.of_pool(MANIFEST, "refuted", "it has been changed during verification")
 
     def count(self) -> None:
-        """Compare the counts of the manifest with what has been seen."""
+        """Compare the counts of the manifest with what has been seen, and name those that rest on the author's word."""
+        remarks, manifest = self.found.remarks, self.manifest
+        if lost := sum(times for key, times in manifest.reasons.items() if key.partition(": ")[0] == PROCESS):
+            told = f"{lost} indices were lost to limits or crashes on the author's machine"
+            remarks.append(f"{told}: that their scenarios cannot be certified is the author's word")
+        if manifest.rates:
+            rollouts = sum(rate["rollouts"] for rate in manifest.rates)
+            told = f"the attack on the pool counts {rollouts} rollouts and {len(manifest.hits)} hits"
+            remarks.append(f"{told}: the hits are replayed, and the number of rollouts is the author's word")
         if not self.manifest.is_subset and len(self.pool) < self.manifest.n:
             told = f"{self.manifest.n} scenarios were asked for, and the run ended with {len(self.pool)}"
             self.found.remarks.append(f"{told}: this number is the author's word")

@@ -28,6 +28,8 @@ MAX_CRASHES = 2
 """Worker crashes after which an item is given up; deaths of whole nodes do not count."""
 MAX_DEATHS = 3
 """Deaths without a result in between, per worker, after which a run is given up."""
+MAX_SLOWDOWN = 10.0
+"""Ratio of wall-clock time to processor time on a busy node beyond which a worker hangs."""
 KEPT = "finished work is kept; repeat the command to continue"
 """Remedy after an error in the middle of a run."""
 
@@ -210,7 +212,7 @@ class _Workers:
         worker = self.idle.pop()
         worker.job = job
         if self._limits:  # it may try twice, and may have to start a process before
-            worker.deadline = time.monotonic() + 2 * self._limits.seconds + START_LIMIT
+            worker.deadline = time.monotonic() + 2 * MAX_SLOWDOWN * self._limits.seconds + START_LIMIT
         self.pending[worker.actor.run.remote(pickle.dumps(job.item))] = worker
 
     def take(self, reference: Any) -> tuple[_Job | None, Any]:
@@ -233,6 +235,11 @@ class _Workers:
         job, worker.job, worker.deadline = worker.job, None, float("inf")
         self.idle.append(worker)
         return job, reply
+
+    def postpone(self, seconds: float) -> None:
+        """Give all workers more time, because this process was suspended and could not take their answers."""
+        for worker in self.pending.values():
+            worker.deadline += seconds
 
     def overdue(self, now: float) -> list[_Worker]:
         """Remove the workers that have not answered in time."""
@@ -322,8 +329,11 @@ class Crew:
     def _look(self, jobs: _Jobs) -> None:
         """Find nodes that have come or gone, end workers that hang, and start missing ones."""
         now = time.monotonic()
-        if now - self._last_look < LOOK_INTERVAL:
+        if (passed := now - self._last_look) < LOOK_INTERVAL:
             return
+        if LOOK_INTERVAL + NODE_DEATH_DELAY < passed < float("inf"):
+            self._workers.postpone(passed)
+            self._last_ready += passed
         self._last_look = now
         self._nodes.update(now)
         for worker in self._workers.overdue(now):

@@ -25,6 +25,14 @@ EXIT_TIMEOUT = 1.0
 """Time that an idle worker has to end by itself before it is killed [s]."""
 
 
+MAX_LATENESS = 0.5
+"""Delay after which a look at a worker shows that this process was suspended, or hardly ran [s]."""
+MIN_SHARE = 0.01
+"""Share of a core below which a worker that is not suspended does nothing."""
+MIN_LOOK = 0.05
+"""Shortest time between two looks at a worker that has passed its limit of wall-clock time [s]."""
+
+
 class WorkerDied(ScengenError):
     """A worker process ended in the middle of its work."""
 
@@ -34,7 +42,7 @@ class Limits:
     """Limits on the work on one item."""
 
     seconds: float
-    """Wall-clock time [s]."""
+    """Processor time [s], or time in which nothing is done. A suspended process and a busy machine do not count."""
     megabytes: int
     """Memory beyond that of a worker at its start [MB]."""
 
@@ -176,7 +184,11 @@ class _Worker:
         self._function, self._limits = function, limits
         self._context: Any = multiprocessing.get_context(method)
         self._process: Any = None
-        self._item, self._tries, self.busy, self.deadline = None, 0, False, float("inf")
+        self._item, self._tries, self.busy = None, 0, False
+        self.deadline = float("inf")
+        """Time of the next look at the processor time that the item has used [s]."""
+        self._begun, self._looked, self._used = 0.0, 0.0, 0.0
+        """Processor time at the beginning of the item, time of the last look, and processor time then [s]."""
         self.connection: Connection
 
     def give(self, item: Any) -> None:
@@ -204,11 +216,24 @@ class _Worker:
             if kind == "lost":
                 return _Lost(self._item, value)
             raise value
-        if time.monotonic() < self.deadline or self._limits is None:
+        if time.monotonic() < self.deadline or self._limits is None or not self._overdue(self._limits.seconds):
             return None
         self._kill()
         self.busy = False
         return _Lost(self._item, f"took longer than {self._limits.seconds:g} s")
+
+    def _overdue(self, seconds: float) -> bool:
+        """Whether the item has used its processor time, or has used none since the last look. Otherwise there will be
+        another look."""
+        now, (used, stopped) = time.monotonic(), self._processor_time()
+        if used - self._begun >= seconds:
+            return True
+        suspended = stopped or now > self.deadline + MAX_LATENESS  # the latter: this process was
+        if not suspended and used - self._used < MIN_SHARE * (now - self._looked):
+            return True
+        self._looked, self._used = now, used
+        self.deadline = now + max(seconds - (used - self._begun), MIN_LOOK)
+        return False
 
     def end(self) -> None:
         """End the process, in the middle of its work if need be."""
@@ -219,12 +244,23 @@ class _Worker:
             self._process.join(EXIT_TIMEOUT)
         self._kill()
 
+    def _processor_time(self) -> tuple[float, bool]:
+        """Processor time that the process has used [s], and whether it is suspended. Both are 0 if it has ended."""
+        try:
+            state, *numbers = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return 0.0, False
+        user, system = int(numbers[10]), int(numbers[11])  # utime and stime in proc(5), which counts from 1
+        return (user + system) / os.sysconf("SC_CLK_TCK"), state in "Tt"
+
     def _begin(self) -> None:
         if self._process is None:
             self._start()
         with suppress(OSError):  # it has died, which the answer shows
             self.connection.send(self._item)
-        self.deadline = time.monotonic() + (self._limits.seconds if self._limits else float("inf"))
+        self._looked = time.monotonic()
+        self._begun = self._used = self._processor_time()[0]
+        self.deadline = self._looked + (self._limits.seconds if self._limits else float("inf"))
 
     def _start(self) -> None:
         """Start the process.

@@ -45,6 +45,22 @@ def _last_digits(draft: Draft) -> None:
         features.update({name: value * (1 + 3e-16) for name, value in features.items()})
 
 
+def _lost(draft: Draft) -> None:
+    """The last scenario is said to have been lost at a limit of the author's machine."""
+    del draft.rows[0]
+    draft.manifest.update(n=1, first_draws=1, reasons={"process: took longer than # s": 1})
+    draft.manifest["funnel"].update({stage: 1 for stage in draft.manifest["funnel"] if stage not in BEFORE_LOSS})
+
+
+BEFORE_LOSS = ("proposed", "feasible")
+
+
+def _attacked(draft: Draft) -> None:
+    """An attack of a thousand million rollouts without a hit."""
+    rate = {"tier": "random", "raw": False, "rollouts": 10**9, "hits": 0}
+    draft.manifest["attack"] = {"rates": [rate], "hits": []}
+
+
 def _rounded(draft: Draft) -> None:
     """There, the numbers of scenes end in other digits, too."""
     _elsewhere(draft)
@@ -75,6 +91,8 @@ CASES = [
     Case("single_quick__elsewhere", "single_quick", "accept", "", _elsewhere, quick=True),
     Case("seesaw_id__elsewhere", "seesaw_id", "accept", "", _elsewhere),
     Case("single_quick__last_digits", "single_quick", "accept", "", _last_digits),
+    Case("single_quick__lost", "single_quick", "accept", r"1 indices were lost.*author's word", _lost),
+    Case("single_quick__attacked", "single_quick", "accept", r"1000000000 rollouts.*author's word", _attacked),
     Case("single_quick__rounded", "single_quick", "accept", "", _rounded),
     Case("single_quick__two_shards", "single_quick", "accept", "", lambda draft: None, _two_shards),
     Case("single_quick__a_note_beside", "single_quick", "accept", "", None, _beside),

@@ -559,6 +559,15 @@ def test_a_run_that_ended_with_fewer_than_were_asked_for_is_told(mine):
     ]
 
 
+def test_letters_that_look_alike_are_told_apart(mine, capsys):
+    changed(
+        mine,
+        lambda m: m["config"]["task"].update(instruction=m["config"]["task"]["instruction"].replace("o", "\u043e")),
+    )
+    (difference,) = report(mine).differences
+    assert difference["key"] == "instruction" and "\\u043e" in difference["pool"] and difference["installed"].isascii()
+
+
 def test_own_settings_are_told(mine):
     changed(mine, lambda m: m["config"]["certify"]["rest"].update(seconds=1.0))
     assert report(mine).settings == "own settings (quick, except for rest.seconds)"
