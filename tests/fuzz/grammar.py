@@ -160,6 +160,7 @@ PATHS_IN = ["pool", "to", "json", "junit", "mesh", "film"]
 NONSENSE = {
     "tiers": ["[]", "[nope]", "[null]", "random", "[random,random]"],
     "units": ["nope", "km", "1"],
+    "up": ["w", "-q", "yy", "[x]", "null", "1", "Z"],
     "friction": ["nan", "inf", "-inf", "-1"],
     "license": ['"a\nb"', "' '", "\x1b[2J", "a:b"],
     "title": ['"a\nb"', "' '", "# x"],
