@@ -19,6 +19,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from ..attack.solution_memory import SolutionMemory, remember
 from ..episode import Actions
 from ..errors import Infeasible
 from ..params import with_values
@@ -33,7 +34,6 @@ from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
-from .solution_memory import SolutionMemory, remember
 
 BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")
 """Kinds of memory, from the weakest to the strongest."""

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from scengen import cli, load_task
+from scengen.attack.solution_memory import remember
 from scengen.ood import behaviour, features
 from scengen.ood.behaviour import INCONCLUSIVE, SOLVED_BY_MEMORY, Baseline, MemoryTrials, measure, verdict
-from scengen.ood.solution_memory import remember
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
 from scengen.validate.rebuilt import world_of

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..attack.solids import held
 from ..control.loop import ACTION, Loop
 from ..episode import Actions, Episode
 from ..errors import GaveUp
@@ -21,6 +20,7 @@ from ..geometry import Mat3, Vec3, about_z, between
 from ..scenario import Plan, Scenario
 from ..sim.world import Arm, World
 from ..skills.motion import STEP, STIFFNESS, Pace, go_to, together
+from .solids import held
 
 ARRIVAL_PACE = Pace(0.30, 0.01, 2.0)
 """Pace at which the hand moves to the beginning of a part. If it does not arrive in time, the path continues anyway."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scengen.assets.prop import table
-from scengen.ood.solution_memory import HandPath, PathPart
+from scengen.attack.solution_memory import HandPath, PathPart
 from scengen.sim import scene_text
 from scengen.sim.world import World
 
