@@ -8,8 +8,10 @@ from itertools import islice
 
 from ..samplers.keyed import unit
 from . import draws
+from .clock import CLOCK, timed
 from .evidence import CausalContacts, Hit, TierRate, hit, rates
 from .macros import Macro
+from .memories import MEMORY, remembered
 from .player import Attempt, Node, Played, Player
 from .priors import Prior, guesses
 from .retries import RETRY, retries
@@ -28,6 +30,8 @@ SEARCH = "search"
 TIER_SHARES = {
     SHORTCUT: 0.10,
     PRIOR: 0.10,
+    MEMORY: 0.04,
+    CLOCK: 0.04,
     SERVO: 0.20,
     RETRY: 0.30,
     FOREIGN: 0.08,
@@ -202,7 +206,10 @@ class Attack:
         if tier == PRIOR:
             yield from guesses(self.priors)
             return
-        lists = {SHORTCUT: shortcuts, SERVO: servo, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
+        if tier == MEMORY:
+            yield from remembered(player)
+            return
+        lists = {SHORTCUT: shortcuts, CLOCK: timed, SERVO: servo, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
         whole = list(lists[tier](player))
         for k in range(self.of):  # its own part first, then those of the others
             yield from islice(whole, (self.number + k) % self.of, None, self.of)
@@ -262,5 +269,5 @@ def _first_move(attempt: Attempt) -> tuple[int | None, str, str]:
     if one.kind in ("pursue", "pin", "block", "cradle"):
         what = f"{one.target} {one.numbers}"
     else:
-        what = str(one.numbers) if one.kind in ("follow", "answer", "shake", "turn", "move") else one.target
+        what = str(one.numbers) if one.kind in ("follow", "answer", "clock", "shake", "turn", "move") else one.target
     return attempt.stage, f"{one.kind} {one.arm}", what

@@ -23,10 +23,11 @@ from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from .adversary import PRIOR, TIERS, Attack, AttackResult, UntriedShortcut
 from .evidence import Hit, TierRate, rates, unsound
+from .experience import Experience, experience
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
-GRAMMAR = 2
+GRAMMAR = 3
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
@@ -140,11 +141,15 @@ class AttackJob:
     seed: int
     tiers: tuple[str, ...]
     priors: tuple[Prior, ...]
+    known: Experience = Experience()
+    """What the adversary knows from training."""
 
     def __call__(self, number: int) -> AttackResult:
         attacked = self.subjects[number]
         player = player_of(attacked)
         player.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
+        player.memories = {memory.name: memory.follow for memory in self.known.memories}
+        player.durations = self.known.durations
         attack = Attack(player, self.seed, number, len(self.subjects), self.priors)
         return attack.run(self.budget, self.tiers)
 
@@ -167,7 +172,6 @@ def attack(
     """
     priors = tuple(fitted(task, settings)) if PRIOR in settings.chosen else ()
     budget = max(1, settings.budget // len(subjects))
-    job = AttackJob(tuple(subjects), budget, settings.seed, settings.chosen, priors)
     identity = {
         "grammar": GRAMMAR,
         "scenarios": [one.scenario.id for one in subjects],
@@ -180,6 +184,8 @@ def attack(
         done = {record["scenario"] for record in log.records}
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
         limits = Limits(settings.limit_seconds, settings.limit_mb)
+        known = experience(task, settings.seed + FITTING_SEED, settings.chosen) if todo else Experience()
+        job = AttackJob(tuple(subjects), budget, settings.seed, settings.chosen, priors, known)
         for result in each(job, todo, settings.workers, limits, job.lost):
             for hit in result.hits:
                 replace(hit, task=task.name).store(folder)

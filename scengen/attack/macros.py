@@ -16,10 +16,10 @@
 | pursue  | body     | lead [s]                                                                     |
 | pin     | body     | lead [s]                                                                     |
 | block   | body     | lead [s]                                                                     |
-| take    | body     | skew of the jaw from the body's narrow side [rad]                            |
+| take    | body     | skew of the jaw from the body's narrow side [rad], lift [m]                  |
 | cradle  | body     | direction of the hand [rad], its pitch [rad], depth [m]                      |
 | touch   | body     | with the body in the hand                                                    |
-| bring   | body     | goal of its centre [m], height over it [m], turn of the hand [rad], drop [m] |
+| bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
 
 Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use the body in the hand.
 """
@@ -264,15 +264,15 @@ def _touch(field: MacroContext, macro: Macro) -> Plan:
     if load is None:
         raise GaveUp("no body in the hand")
     way = field.solids[macro.target].centre(field.world) - field.world.com(load)
-    velocity = 0.1 * way / max(float(np.linalg.norm(way)), 1e-9)
+    velocity = 0.15 * way / max(float(np.linalg.norm(way)), 1e-9)
     yield from plans.touch_with(field.arm, load, field.solids[macro.target].body, velocity)
 
 
 def _bring(field: MacroContext, macro: Macro) -> Plan:
-    x, y, z, over, skew, drop = macro.numbers
+    x, y, z, over, skew, aside, drop = macro.numbers
     if held(field.arm) != macro.target:
         raise GaveUp(f"{macro.target} is not in the hand")
-    yield from plans.carry_to(field.arm, macro.target, [x, y, z], over, skew, drop)
+    yield from plans.carry_to(field.arm, macro.target, [x, y, z], over, skew, drop, aside)
 
 
 KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {

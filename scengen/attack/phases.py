@@ -1,5 +1,6 @@
 """The phases of a witness: its path, the states at which its phases begin, and plans that repeat them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -23,6 +24,8 @@ MAX_PHASES = 12
 """Maximum number of phases of a witness: the shortest ones are joined."""
 PAUSE_SPEED = 0.02
 """Speed below which a hand pauses [m/s]."""
+MIN_WAIT = 0.2
+"""Shortest pause of all hands that counts as a wait [s]."""
 START_TOLERANCE = 0.02
 """Distance of the hand from the beginning of a phase above which it is first brought there [m]."""
 MIRROR = np.array([1.0, -1.0, 1.0])
@@ -69,6 +72,14 @@ class Trace:
         """First row of each phase, and first row after it."""
         rows = [stage.row for stage in self.stages]
         return list(pairwise(rows))
+
+    @property
+    def waits(self) -> list[tuple[int, int]]:
+        """First row of each wait, and first row after it."""
+        speed = np.linalg.norm(np.diff(self.hands, axis=0), axis=2).max(axis=1) / Loop.PERIOD
+        still = np.concatenate([[False], speed < PAUSE_SPEED, [False]])
+        edges = np.flatnonzero(still[1:] != still[:-1]).reshape(-1, 2)
+        return [(int(a), int(b)) for a, b in edges if (b - a) * Loop.PERIOD >= MIN_WAIT]
 
     @property
     def handled(self) -> tuple[str, ...]:
@@ -186,6 +197,18 @@ def follow(world: World, path: Trace, macro: Macro) -> Plan:
             asked[:6] = np.clip(asked[:6], -1.0, 1.0)
         yield wanted
         now += pace
+
+
+def by_the_clock(world: World, path: Trace, seconds: Sequence[float]) -> Plan:
+    """Repeat a witness with other durations of its waits [s]."""
+    stretches, row = list[tuple[int, int, float]](), 0
+    for (begin, end), lasting in zip(path.waits, seconds, strict=True):
+        pace = (end - begin) * Loop.PERIOD / max(lasting, Loop.PERIOD)
+        stretches += [(row, begin, 1.0), (begin, end, pace)]
+        row = end
+    for first, last, pace in (*stretches, (row, len(path.actions), 1.0)):
+        if first < last:
+            yield from follow(world, path, Macro("follow", "", (first, last, pace, 0.0, 0.0, 0.0, 0.0)))
 
 
 def _aim(begin: Mat3, now: Mat3, sign: Vec3) -> Mat3:

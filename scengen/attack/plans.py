@@ -6,6 +6,7 @@ of the scenario.
 """
 
 import math
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +17,7 @@ from ..geometry import UP, Mat3, Vec3, about_z, between
 from ..robots.jaw import TIP_BELOW
 from ..scenario import Plan
 from ..sim.world import Arm
-from ..skills.jaw import grasp, release
+from ..skills.jaw import RELEASE_TIME, grasp, release
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -42,6 +43,10 @@ SLOW = 0.02
 """Speed below which a body counts as stopped [m/s]."""
 STEP_BACK = Pace(0.15, 0.01, 2.0)
 """Pace away from a body."""
+WAY = Pace(0.30, 0.02, 1.5)
+"""Pace through way points with a body in the hand."""
+LOWER = Pace(0.15, 0.006, 2.0)
+"""Pace down to the place where a body is let go."""
 LIFT = 0.12
 """Height by which a grasped body is lifted [m]."""
 
@@ -170,8 +175,16 @@ def pick_where_it_is(arm: Arm, body: str, skew: float = 0.0, lift: float = LIFT)
     yield from retreat(arm, lift)
 
 
-def carry_to(arm: Arm, body: str, goal: ArrayLike, over: float, skew: float | None = None, drop: float = 0.0) -> Plan:
-    """Carry a held body to a place and let it go: over an obstacle, or along the table with a turned hand.
+def carry_to(
+    arm: Arm,
+    body: str,
+    goal: ArrayLike,
+    over: float,
+    skew: float | None = None,
+    drop: float = 0.0,
+    aside: float = 0.0,
+) -> Plan:
+    """Carry a held body to a place and let it go: over or around an obstacle, or along the table with a turned hand.
 
     Args:
         arm: the arm.
@@ -180,16 +193,28 @@ def carry_to(arm: Arm, body: str, goal: ArrayLike, over: float, skew: float | No
         over: height above the goal at which it is carried [m].
         skew: yaw of the hand while it carries, from its present one [rad]; None to keep it.
         drop: height from which the body is let go [m].
+        aside: largest distance to the left of the straight way [m].
     """
     world, target = arm.world, np.asarray(goal, float)
     rot = arm.hand_rot if skew is None else about_z(skew) @ arm.hand_rot
     lag = arm.hand - world.com(body)
-    yield from go_to(arm, [*arm.hand[:2], max(arm.hand[2], target[2] + over + lag[2])], rot, STEADY, CLOSED)
+    yield from _pass(arm, [*arm.hand[:2], max(arm.hand[2], target[2] + over + lag[2])], rot)
     lag = arm.hand - world.com(body)
-    yield from go_to(arm, [*(target + lag)[:2], target[2] + over + lag[2]], rot, STEADY, CLOSED)
-    yield from go_to(arm, target + lag + drop * UP, rot, FINE, CLOSED)
-    yield from release(arm)
-    yield from retreat(arm, 0.08)
+    if aside:
+        way = (target + lag - arm.hand)[:2]
+        middle = arm.hand[:2] + way / 2 + aside * np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
+        yield from _pass(arm, [*middle, target[2] + over + lag[2]], rot)
+    yield from _pass(arm, [*(target + lag)[:2], target[2] + over + lag[2]], rot)
+    with suppress(GaveUp):  # it is let go in any case
+        yield from go_to(arm, target + lag + drop * UP, rot, LOWER, CLOSED)
+    yield from release(arm, 0.2 if drop else RELEASE_TIME)
+    yield from retreat(arm, 0.08, WAY)
+
+
+def _pass(arm: Arm, at: ArrayLike, rot: Mat3) -> Plan:
+    """Go through a way point with a body in the hand, or as near to it as the arm comes."""
+    with suppress(GaveUp):
+        yield from go_to(arm, at, rot, WAY, CLOSED)
 
 
 def touch_with(arm: Arm, body: str, other: str, along: ArrayLike, seconds: float = 4.0) -> Plan:

@@ -1,8 +1,9 @@
 """Play an attempt of the adversary: from the start or from a saved state, through the teleoperation filter or raw."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ from ..sim.world import World
 from ..validate.rollout import Stillness
 from . import macros
 from .macros import Macro
-from .phases import follow, repeat, trace
-from .signature import Signature, signature, starts
+from .phases import by_the_clock, follow, repeat, trace
+from .signature import ContactPair, Signature, signature, starts
 from .solids import Solid, solids
 
 SETTLE_TIME = 1.0
@@ -108,6 +109,10 @@ class Player:
         """Trace of the witness."""
         self.foreign: dict[str, Actions] = {}
         """Witnesses of other scenarios, by id."""
+        self.memories: dict[str, Callable[[World], Plan]] = {}
+        """Plans that repeat training solutions, by name, the best one first."""
+        self.durations: Sequence[Sequence[float]] = ()
+        """Durations of the waits in some training solutions [s]."""
 
     @cached_property
     def solids(self) -> Mapping[str, Solid]:
@@ -121,6 +126,10 @@ class Player:
                 return follow(self.world, self.trace, macro)
             case "replay":
                 return repeat(self.foreign[macro.target], raw)
+            case "memory":
+                return self.memories[macro.target](self.world)
+            case "clock":
+                return by_the_clock(self.world, self.trace, macro.numbers)
             case "shortcut":
                 return self.scenario.shortcuts()[macro.target].plan(self.world)
             case "answer":
@@ -143,6 +152,24 @@ class Player:
             middle = (low + high) // 2
             low, high = (low, middle) if self.play((), False, self.stage(middle)).solved else (middle + 1, high)
         return low
+
+    @cached_property
+    def latches(self) -> frozenset[ContactPair]:
+        """Contacts since the start that the goal or its rules ask for, as pairs of names: those that they look up where
+        the witness has reached the goal, and that have occurred."""
+        self.rewind(len(self.trace.stages) - 1)
+        asked = set[ContactPair]()
+        touched = self.world.touched
+
+        def asking(one: str, other: str) -> bool:
+            if found := touched(one, other):
+                asked.add((one, other))
+            return found
+
+        with mock.patch.object(self.world, "touched", asking):
+            self.scenario.success(self.world)
+            self.scenario.failure(self.world)
+        return frozenset(asked)
 
     def rewind(self, k: int | None = None) -> None:
         """Put the world at stage `k` of the witness, or at the start, so that a plan can be made for it."""

@@ -28,10 +28,26 @@ PITCHES = (math.radians(20.0), math.radians(8.0))
 """Angles by which a cradling hand looks above the horizontal [rad]."""
 SIDES = (0.0, math.radians(50.0), math.radians(-50.0))
 """Directions from which a body is cradled, from that of the robot's base [rad]."""
-ROUTES = ((0.005, math.pi / 2), (0.12, 0.0), (0.005, 0.0), (0.25, 0.0), (0.12, math.pi / 2))
-"""Ways to carry a body: height above its goal [m], and turn of the hand [rad], a quarter of which puts its narrow side
-across the way."""
-DROPS = (0.0, 0.04)
+QUARTER = math.pi / 2
+"""Turn of the hand that puts its narrow side across the way [rad]."""
+HIGH = (0.2, 0.0, 0.0)
+"""The way to carry a body high over everything; see `ROUTES`."""
+ROUTES = (
+    (0.005, QUARTER, 0.0),
+    (0.12, 0.0, 0.0),
+    (0.005, 0.0, 0.0),
+    HIGH,
+    (0.02, 0.0, 0.2),
+    (0.02, 0.0, -0.2),
+    (0.12, QUARTER, 0.0),
+)
+"""Ways to carry a body: height above its goal [m], turn of the hand [rad], and the largest distance to the left of the
+straight way [m]. They go through a gap, over an obstacle, straight, high, and around both sides."""
+STRAIGHT = Macro("touch")
+"""Way to touch another body with the one in the hand: straight from where it is."""
+FROM_ABOVE = Macro("press", "", (0.0, 0.0, 0.1, 0.1))
+"""Way to touch another body with the one in the hand: on the middle of its upper face."""
+DROPS = (0.0, 0.04, 0.12)
 """Heights from which a carried body is let go [m]."""
 IDLE_TIME = 2.0
 """Time without action after which bodies that move by themselves are known [s]."""
@@ -54,7 +70,7 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     """Pursue, press down and block a body that moves by itself; then carry it to its goal if it is not reached yet."""
     if body not in moving(player):
         return
-    rest = bring(player, arm, body, *ROUTES[1], 0.0)
+    rest = bring(player, arm, body, ROUTES[1], 0.0)
     plans = [("pursue", PURSUIT_LEADS), ("pin", BLOCK_LEADS), ("block", BLOCK_LEADS)]
     for leads in zip_longest(*(leads for _, leads in plans)):
         for (kind, _), lead in zip(plans, leads, strict=True):
@@ -63,25 +79,27 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 
 def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Pick a body, touch with it what it touched in the witness, and carry it to its goal by every route."""
+    """Pick a body, touch with it what the goal asks for, and carry it to its goal by every route."""
     pick = taking(player, arm, body)
-    touches = [Macro("touch", other, (), arm.number) for other in touched_by(player, body)]
-    for drop, (over, skew) in product(DROPS, ROUTES):
-        goal = bring(player, arm, body, over, skew, drop)
+    touches = [Macro("touch", other, (), arm.number) for other in asked_of(player, body)]
+    for drop, route in product(DROPS, ROUTES):
+        goal = bring(player, arm, body, route, drop)
         yield Attempt(SERVO, (pick, goal))
         if touches:
             yield Attempt(SERVO, (pick, *touches, goal))
 
 
 def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
-    """Every handled body in the order of the witness: take it, touch with it what it touched, carry it to its goal."""
-    for drop, (over, skew) in product(DROPS, ROUTES):
-        for touching in (True, False):
+    """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
+    asked = {body: asked_of(player, body) for body in bodies}
+    ways = product(dict.fromkeys((HIGH, *ROUTES)), reversed(DROPS), (0.0, QUARTER))
+    for route, drop, skew in ways:
+        for touch in (FROM_ABOVE, STRAIGHT, None) if any(asked.values()) else (None,):
             moves: list[Macro] = []
             for body in bodies:
-                touches = [Macro("touch", other, (), arm.number) for other in touched_by(player, body)]
-                taken = [taking(player, arm, body), *(touches if touching else [])]
-                moves += [*taken, bring(player, arm, body, over, skew, drop)]
+                taken = [Macro("take", body, (skew, 0.2), arm.number)]
+                touches = [] if touch is None else [replace(touch, target=one, arm=arm.number) for one in asked[body]]
+                moves += [*taken, *touches, bring(player, arm, body, route, drop)]
             yield Attempt(SERVO, tuple(moves))
 
 
@@ -99,20 +117,24 @@ def cradled(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 def taking(player: Player, arm: Arm, body: str) -> Macro:
     """A macro that picks a body across the side with the most clearance, or else across its narrowest side."""
     found = picks(player, arm, player.solids[body])
-    return replace(found[0], arm=arm.number) if found else Macro("take", body, (0.0,), arm.number)
+    return replace(found[0], arm=arm.number) if found else Macro("take", body, (0.0, 0.12), arm.number)
 
 
-def bring(player: Player, arm: Arm, body: str, over: float, skew: float, drop: float) -> Macro:
-    """A macro that carries a held body to the place where the witness leaves it."""
-    return Macro("bring", body, (*map(float, player.goal_place(body)), over, skew, drop), arm.number)
+def bring(player: Player, arm: Arm, body: str, route: tuple[float, float, float], drop: float) -> Macro:
+    """A macro that carries a held body to the place where the witness leaves it.
+
+    Args:
+        route: one of `ROUTES`.
+        drop: height from which the body is let go [m].
+    """
+    return Macro("bring", body, (*map(float, player.goal_place(body)), *route, drop), arm.number)
 
 
-def touched_by(player: Player, body: str) -> tuple[str, ...]:
-    """Bodies of the scene that a body touches for the first time in the witness, in order; the robot is none."""
-    solids = player.solids
+def asked_of(player: Player, body: str) -> tuple[str, ...]:
+    """Bodies of the scene that a body must have touched for the goal, in the order of the witness."""
+    asked = {other for pair in player.latches if body in pair for other in pair} - {body}
     pairs = [pair for _, pair in player.trace.events if body in pair]
-    others = (other for pair in pairs for other in pair if other != body and other in solids)
-    return tuple(dict.fromkeys(others))
+    return tuple(dict.fromkeys(other for pair in pairs for other in pair if other in asked and other in player.solids))
 
 
 def moving(player: Player) -> frozenset[str]:

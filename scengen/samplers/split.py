@@ -31,7 +31,7 @@ class Part:
         """
         axis, at, severity = text.partition("@")
         if at and not (severity.isascii() and severity.isdecimal()):
-            raise BadConfig(f"split {text}: the severity after @ is a whole number, as in {axis}@1")
+            raise BadConfig(f"split {text}: the severity after @ must be a whole number, as in {axis}@1")
         return cls(axis, int(severity) if at else None)
 
 

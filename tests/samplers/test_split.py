@@ -30,10 +30,10 @@ def test_axes_and_severities_are_taken_apart():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("wide_gaps@high", "the severity after @ is a whole number, as in wide_gaps@1"),
-        ("wide_gaps@", "the severity after @ is a whole number"),
-        ("wide_gaps@-1", "the severity after @ is a whole number"),
-        ("wide_gaps@²", "the severity after @ is a whole number"),
+        ("wide_gaps@high", "the severity after @ must be a whole number, as in wide_gaps@1"),
+        ("wide_gaps@", "the severity after @ must be a whole number"),
+        ("wide_gaps@-1", "the severity after @ must be a whole number"),
+        ("wide_gaps@²", "the severity after @ must be a whole number"),
         ("id+diagonal", "id is training itself; leave it out"),
     ],
 )

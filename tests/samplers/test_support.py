@@ -203,7 +203,7 @@ def test_a_severity_is_a_split_like_any_other_and_its_twins_differ_in_nothing_el
         ("mine@1", 0, "the axis has none: give it `severities: N`"),
         ("mine@6", 5, "the axis has severities 1 to 5"),
         ("mine@0", 5, "the axis has severities 1 to 5"),
-        ("mine@high", 5, "the severity after @ is a whole number"),
+        ("mine@high", 5, "the severity after @ must be a whole number"),
         ("mine@2+mine@3", 5, "two of its axes move gap_ratio"),
     ],
 )
