@@ -11,9 +11,9 @@ from . import draws
 from .clock import CLOCK, timed
 from .evidence import CausalContacts, Hit, TierRate, hit, rates
 from .macros import Macro
-from .memories import MEMORY, remembered
+from .memories import MEMORY, TRIES, remembered
 from .player import Attempt, Node, Played, Player
-from .priors import Prior, guesses
+from .priors import GUESSES, Prior, guesses
 from .retries import RETRY, retries
 from .servo import SERVO, servo
 from .signature import Signature
@@ -43,6 +43,12 @@ TIER_SHARES = {
 the last one."""
 TIERS = tuple(TIER_SHARES)
 """All tiers, in the order in which they are played."""
+RATED = (
+    *(tier for tier in TIERS if tier not in (PRIOR, MEMORY)),
+    *(f"{PRIOR}_{count}" for count in GUESSES),
+    *(f"{MEMORY}_{count}" for count in TRIES),
+)
+"""Names under which hits are counted: tiers, and tiers with the number of answers or memories in an episode."""
 MAX_FATAL = 2
 """Number of lost episodes after which a first move is not tried again."""
 MIN_TIME_LEFT = 2.0

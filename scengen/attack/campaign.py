@@ -21,7 +21,7 @@ from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
-from .adversary import PRIOR, TIERS, Attack, AttackResult, UntriedShortcut
+from .adversary import PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
 from .evidence import Hit, TierRate, rates, unsound
 from .experience import Experience, experience
 from .player import Player
@@ -250,6 +250,8 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
     """
     counts = Counter((hit["tier"], hit["raw"]) for hit in pool.manifest.hits)
     for rate in pool.manifest.rates:
+        if rate["tier"] not in RATED:
+            yield rate["tier"], f"the attack counts rollouts of an unknown tier; known: {', '.join(RATED)}"
         if rate["hits"] != counts.pop((rate["tier"], rate["raw"]), 0):
             yield rate["tier"], "the attack counts a different number of hits than it lists"
     if counts:

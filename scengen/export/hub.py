@@ -132,7 +132,7 @@ class DatasetCard:
         tallies = [Tally.of(one for (one,) in published.pool.columns("certificate")) for published in pools]
         overview = [
             [
-                f"`{p.name}`",
+                _code(p.name),
                 p.split,
                 len(p.pool),
                 p.pool.manifest.funnel["proposed"],
@@ -147,10 +147,7 @@ class DatasetCard:
         ]
         nodes = {published.pool.task: published.pool.manifest.task_node for published in pools}
         moved = [(published.pool.task, axis) for published in pools for axis in _axes(published)]
-        axes = [
-            [f"`{task}`", axis, _escaped(nodes[task]["axes"][axis].get("why", ""))]
-            for task, axis in dict.fromkeys(moved)
-        ]
+        axes = [[_code(task), _code(axis), nodes[task]["axes"][axis].get("why", "")] for task, axis in dict.fromkeys(moved)]
         hits = _accessibility(pools, tallies)
         template = Template((Path(__file__).parent / "dataset_card.md").read_text(), keep_trailing_newline=True)
         return template.render(
@@ -166,7 +163,7 @@ class DatasetCard:
                 ["configuration", "split", "scenarios", "drawn", "settings", "robust", "verified"], overview
             ),
             axes=_table(["task", "axis", "why"], axes) if axes else "",
-            checks=_table(["check", "what holds", "if not", *(f"`{published.name}`" for published in pools)], checks),
+            checks=_table(["check", "what holds", "if not", *(_code(published.name) for published in pools)], checks),
             accessibility=_table(["configuration", "kind of plan", "actions", "hits", "bound"], hits) if hits else "",
         )
 
@@ -213,7 +210,7 @@ class Tally:
     @property
     def robust(self) -> str:
         """Successes of the oracle under jitter in the worst scenario, and their bound."""
-        return f"{self.worst['solved']} of {self.worst['runs']} (> {self.worst['bound']:.0%})"
+        return Markdown(f"{self.worst['solved']} of {self.worst['runs']} (> {self.worst['bound']:.0%})")
 
 
 def check_target(to: str) -> None:
@@ -319,16 +316,33 @@ def _accessibility(pools: Sequence[PublishedPool], tallies: Sequence[Tally]) -> 
         counted = [TierRate(r["tier"], r["raw"], r["rollouts"], r["hits"]) for r in published.pool.manifest.rates]
         for rate in rates([*counted, *tally.rates]):
             hits = f"{rate.hits} of {rate.rollouts}"
-            lines.append([f"`{published.name}`", rate.tier, spelled(rate.raw), hits, f"< {rate.bound:.1%}"])
+            bound = Markdown(f"< {rate.bound:.1%}")
+            lines.append([_code(published.name), _code(rate.tier), spelled(rate.raw), hits, bound])
     return lines
 
 
+class Markdown(str):
+    """Text that is Markdown already. Everything else in a table is escaped, because it may come from a pool."""
+
+
+def _code(name: str) -> Markdown:
+    """A name in the type of code."""
+    return Markdown(f"`{_one_line(name).translate(str.maketrans('`|', '__'))}`")
+
+
 def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(str(cell) for cell in line)} |\n" for line in lines)
+    lines = [head, [Markdown("---")] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(_cell, line))} |\n" for line in lines)
+
+
+def _cell(content: Any) -> str:
+    return content if isinstance(content, Markdown) else _escaped(content)
 
 
 def _escaped(text: Any) -> str:
     """Text of a pool, as one line without markup."""
-    plain = " ".join(printable(str(text)).split())
-    return "".join(f"\\{letter}" if letter in r"\`*_[]<>|#" else letter for letter in plain)
+    return "".join(f"\\{letter}" if letter in r"\`*_[]<>|#" else letter for letter in _one_line(text))
+
+
+def _one_line(text: Any) -> str:
+    return " ".join(printable(str(text)).split())

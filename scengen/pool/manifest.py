@@ -271,7 +271,7 @@ def _check_attack(attack: Mapping[str, Any]) -> None:
         demand(isinstance(listed, list) and len(listed) <= MAX_HITS, f"attack.{name} is not a list")
     for rate in attack["rates"]:
         entry = check_mapping("a rate of the attack", rate)
-        check_text("the tier of a rate", entry.get("tier"), 100)
+        check_match("the tier of a rate", entry.get("tier"), WORD)
         demand(isinstance(entry.get("raw"), bool), "a rate does not say whether it is raw")
         for name in ("rollouts", "hits"):
             check_whole(f"{name} of a rate", entry.get(name), MAX_INDICES)
@@ -279,6 +279,6 @@ def _check_attack(attack: Mapping[str, Any]) -> None:
         entry = check_mapping("a hit", hit)
         check_match("the file of a hit", entry.get("file"), _HIT)
         check_match("sha256 of a hit", entry.get("sha256"), HASH)
-        check_text("the tier of a hit", entry.get("tier"), 100)
+        check_match("the tier of a hit", entry.get("tier"), WORD)
         demand(isinstance(entry.get("raw"), bool), "a hit does not say whether it is raw")
     demand(len({hit["file"] for hit in attack["hits"]}) == len(attack["hits"]), "a hit is listed twice")

@@ -16,6 +16,7 @@ from ..params import canonical
 from ..pool import Pool, PoolRow
 from ..pool.files import sha256
 from ..pool.manifest import Manifest
+from ..pool.untrusted import WORD
 from ..samplers.designs import Design
 from ..samplers.split import Split
 from ..samplers.task import Draw, Task
@@ -286,7 +287,8 @@ def _attack_failed(numbers: Mapping[str, Any], settings: CertifySettings) -> boo
     rollouts = [told["rollouts"] for told in numbers.values()]
     whole = all(type(n) is int and n > 0 for n in rollouts) and sum(rollouts) <= settings.attack
     counted = all(set(n) == {"rollouts", "hits"} and 0 <= n["hits"] <= n["rollouts"] for n in numbers.values())
-    return whole and counted and bool(numbers) == bool(settings.attack)
+    named = all(WORD.fullmatch(name) for name in numbers)
+    return whole and counted and named and bool(numbers) == bool(settings.attack)
 
 
 def _solved_in_time(numbers: Mapping[str, Any], horizon: float) -> bool:

@@ -34,10 +34,10 @@ def _other_check(draft: Draft) -> None:
     certificate["reason"] = "solved: timeout"
 
 
-def _attacked(hit: dict[str, Any] | None, hits: int = 1) -> Change:
+def _attacked(hit: dict[str, Any] | None, hits: int = 1, tier: str = "retry") -> Change:
     """The manifest tells of an attack that nobody has made."""
-    listed = [] if hit is None else [{**hit, "tier": "retry", "raw": False}]
-    rates = [{"tier": "retry", "raw": False, "rollouts": 100, "hits": hits, "refuting": 0}]
+    listed = [] if hit is None else [{**hit, "tier": tier, "raw": False}]
+    rates = [{"tier": tier, "raw": False, "rollouts": 100, "hits": hits, "refuting": 0}]
     return _manifest(attack={"task": "domino_single", "rates": rates, "hits": listed})
 
 
@@ -62,6 +62,7 @@ CHANGES: dict[str, tuple[str, str, Change]] = {
     "reject_of_another_index": ("single_kept", r"reject|index|drawn", lambda d: d.rejected[0].update(index=40)),
     "left_out_by_an_attack": ("single_quick", r"way around", _left_out_by_an_attack),
     "hits_of_nobody": ("single_quick", r"hit", _attacked({"file": "hits/a.npz", "sha256": "0" * 64})),
+    "attacked_by_an_unknown_tier": ("single_quick", r"unknown tier", _attacked(None, hits=0, tier="thorough")),
     "hits_not_counted": ("single_quick", r"hits", _attacked(None, hits=3)),
     "reject_of_a_certified_index": ("single_kept", r"reject|certified too", _certified_too),
     "reject_twice": ("single_kept", r"reject", lambda d: d.rejected.append(copy.deepcopy(d.rejected[0]))),
@@ -70,4 +71,7 @@ CHANGES: dict[str, tuple[str, str, Change]] = {
     "reject_certified": ("single_kept", r"reject|verdict", lambda d: d.rejected[0]["certificate"].update(reason="")),
 }
 
-CASES = [Case(f"{base}__{name}", base, "reject", says, change) for name, (base, says, change) in CHANGES.items()]
+CASES = [
+    *(Case(f"{base}__{name}", base, "reject", says, change) for name, (base, says, change) in CHANGES.items()),
+    Case("single_quick__tier_with_markup", "single_quick", "refuse", r"tier", _attacked(None, 0, "<b>sure</b>\n# A")),
+]

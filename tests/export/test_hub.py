@@ -1,5 +1,6 @@
 """A folder for the Hugging Face Hub says what is in it, as `datasets` reads it, and holds only what verifies."""
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -13,6 +14,7 @@ from pools import certificate_of, rewritten
 
 from scengen import cli
 from scengen.certificate import CHECKS
+from scengen.errors import PoolError
 from scengen.export import hub
 from scengen.pool import Pool
 
@@ -89,7 +91,29 @@ def test_people_read_what_was_certified_and_how_it_was_verified(made):
         assert re.search(rf"^\| {name} \| {re.escape(hub.CHECK_MEANINGS[name])} \|", text, re.M), name
     assert set(hub.CHECK_MEANINGS) == set(CHECKS)
     assert "level replay" in text and "Not measured" in text and "@software{scengen," in text
-    assert Pool.open(POOLS[0]).sha256 in text and "| `domino_single` | wide_gaps | Tiles still reach" in text
+    assert Pool.open(POOLS[0]).sha256 in text and "| `domino_single` | `wide_gaps` | Tiles still reach" in text
+
+
+def test_text_of_a_pool_is_no_markup():
+    texts = ["<img src=x onerror=alert(1)>", "a | b", "`x`", "[x](http://y)", "two\nlines", "\x1b[2J"]
+    cells = [*texts, hub._code("a`|<b>")]
+    table = hub._table(["name"], [[cell] for cell in cells])
+    assert table.splitlines()[2:] == [
+        r"| \<img src=x onerror=alert(1)\> |", r"| a \| b |", r"| \`x\` |", r"| \[x\](http://y) |", r"| two\\nlines |",
+        r"| \\x1b\[2J |", "| `a__<b>` |",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("where", ["rates", "hits"])
+@pytest.mark.parametrize("tier", ["<b>sure</b>", "random |", "random\n", "x" * 101, 7, None])
+def test_a_tier_of_a_pool_is_a_word(tmp_path, where, tier):
+    folder = shutil.copytree(POOLS[0], tmp_path / "pool")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    entry = {"tier": tier, "raw": False, "rollouts": 1, "hits": 0, "file": "hits/a.npz", "sha256": "0" * 64}
+    manifest["attack"] = {"rates": [], "hits": [], where: [entry]}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(PoolError, match="tier of a"):
+        Pool.open(folder)
 
 
 def test_accessibility_adds_up_hits_of_checks():
@@ -99,8 +123,8 @@ def test_accessibility_adds_up_hits_of_checks():
     published = hub.PublishedPool(Pool.open(POOLS[0]), "quick", "")
     lines = hub._accessibility([published], [hub.Tally.of([replace(row.certificate, checks=tuple(checks))] * 2)])
     assert lines == [
-        ["`domino_single-wide_gaps@2`", "random", "raw", "2 of 60", "< 10.1%"],
-        ["`domino_single-wide_gaps@2`", "retry", "filtered", "0 of 20", "< 13.9%"],
+        ["`domino_single-wide_gaps@2`", "`random`", "raw", "2 of 60", "< 10.1%"],
+        ["`domino_single-wide_gaps@2`", "`retry`", "filtered", "0 of 20", "< 13.9%"],
     ]
 
 
