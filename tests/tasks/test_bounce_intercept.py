@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controls import ablated, each_refuted_for_its_own_reason, load, play_shortcut, replayed
+from controls import ablated, each_refuted_for_its_own_reason, load, play, play_shortcut, replayed, unguarded
 
 from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.enclosure import Enclosure
 from scengen.sim.world import IDLE
-from scengen.tasks.bounce_intercept import BounceIntercept, place_on
+from scengen.tasks.bounce_intercept import BounceIntercept
+from scengen.tasks.launched_ball import place_on, way_at
 
 TASK = load_task("bounce_intercept")
 CATCH = TASK.draw("id", 0, 0).scenario
@@ -100,6 +101,37 @@ def test_a_bounce_goes_on_from_a_saved_state():
 @pytest.mark.parametrize("name", ["go_to_where_it_is", "follow_it"])
 def test_a_hand_that_follows_it_touches_it_too_soon_or_does_not_reach_it(name):
     assert not play_shortcut(TASK, CATCH, name).solved
+
+
+@pytest.mark.parametrize(("aside", "caught"), [(0.0, True), (0.02, True), (0.045, False)])
+def test_a_hand_may_correct_its_place_by_three_centimetres_after_the_bounce(aside, caught):
+    """It waits along the path before or behind the place where it then catches the ball."""
+
+    def late(world):
+        yield from BACK.observe(world)
+        ways = BACK.predict(world)
+        at, seconds = BACK.meeting(ways, world.arm.hand, lead=0.5)
+        bounces, way = way_at(ways, seconds)
+        along = way.velocity / np.linalg.norm(way.velocity)
+        back = lambda: world.memory["bounces"] == bounces and not world.memory["at_wall"]  # noqa: E731
+        yield from BACK.wait_at(world, at + aside * along, along, back)
+        near = lambda: (world.arm.hand - world.com("ball")) @ along < BACK.closing_time * speed(world)  # noqa: E731
+        yield from BACK.wait_at(world, at, along, near)
+        yield from BACK.catch(world)
+
+    assert play(TASK, BACK, late).solved == caught
+
+
+def test_a_ball_is_not_caught_at_a_wall():
+    """Where it is slow, a hand that follows it is with it when it bounces."""
+    dead = TASK.draw("dead_walls", 3, 1).scenario
+    assert play_shortcut(TASK, dead, "follow_it").reason == "the robot touched the ball at a wall"
+    assert play_shortcut(TASK, unguarded(BounceIntercept)(**vars(dead)), "follow_it").solved
+
+
+def speed(world):
+    """Speed of the ball [m/s]."""
+    return np.linalg.norm(world.velocity("ball")[3:])
 
 
 def test_a_mirror_image_is_beside_it():

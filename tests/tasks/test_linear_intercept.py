@@ -11,12 +11,15 @@ from controls import (
     play,
     play_shortcut,
     replayed,
+    unguarded,
 )
 
 from scengen import load_task
 from scengen.assets.ball import Ball
+from scengen.predicates import displaced
 from scengen.sim.world import IDLE
-from scengen.tasks.linear_intercept import LinearIntercept
+from scengen.tasks.launched_ball import CATCHING_TIME
+from scengen.tasks.linear_intercept import NEAR_DISTANCE, LinearIntercept
 
 TASK = load_task("linear_intercept")
 CATCH = TASK.draw("id", 0, 0).scenario
@@ -75,10 +78,40 @@ def test_where_it_is_now_is_too_late(name):
     assert play_shortcut(TASK, CATCH, name).reason == "the ball rolled off the table"
 
 
-def test_a_slower_ball_could_be_followed():
-    """Why no ball is slower: a hand that follows it lags by its speed over 9.2 / s, less than half a pad."""
+def test_a_slower_ball_could_be_followed_but_for_a_rule():
+    """A hand that follows it lags by its speed over 9.2 / s, less than half a pad."""
     slow = replace(CATCH, speed=0.08, x=0.1)
-    assert play_shortcut(TASK, slow, "follow_it").solved
+    assert play_shortcut(TASK, slow, "follow_it").reason == "the hand did not wait for the ball"
+    assert play_shortcut(TASK, unguarded(LinearIntercept)(**vars(slow)), "follow_it").solved
+
+
+@pytest.mark.parametrize(("aside", "caught"), [(0.0, True), (0.025, True), (0.045, False)])
+def test_a_hand_may_correct_its_place_by_three_centimetres_while_the_ball_is_near(aside, caught):
+    """It waits along the path before or behind the place where it then catches the ball."""
+
+    def late(world):
+        yield from CATCH.observe(world)
+        at, _ = CATCH.meeting(world.com("ball"), world.velocity("ball")[3:], world.arm.hand, 1.0, spare=0.2)
+        near = lambda: displaced(world, "ball", at) < NEAR_DISTANCE - 0.05  # noqa: E731
+        yield from CATCH.wait_at(world, at + aside * CATCH.u, CATCH.u, near)
+        yield from CATCH.wait_at(
+            world, at, CATCH.u, lambda: CATCH.time_left(world, world.arm.hand) <= CATCH.closing_time
+        )
+        yield from CATCH.catch(world)
+
+    assert play(TASK, CATCH, late).solved == caught
+
+
+@pytest.mark.parametrize("caught", [True, False])
+def test_the_first_touch_must_become_the_catch(caught):
+    world = load(TASK, CATCH)
+    with world.events():
+        world.memory["first_touch"], world.memory["caught"] = 0.01, float(caught)
+    while world.time < CATCHING_TIME:
+        world.step(IDLE)
+        assert CATCH.failure(world) is None
+    world.step(IDLE), world.step(IDLE)
+    assert CATCH.failure(world) == (None if caught else "the ball was touched and not caught")
 
 
 def test_without_its_way_the_witness_closes_on_nothing():
