@@ -24,7 +24,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..work.printed import printable
-from ..work.targets import refused, try_folder
+from ..work.targets import appearing, check_unfinished, try_folder
 
 CARD_FILE = "README.md"
 """Name of the file that the Hub reads as the dataset card."""
@@ -147,7 +147,9 @@ class DatasetCard:
         ]
         nodes = {published.pool.task: published.pool.manifest.task_node for published in pools}
         moved = [(published.pool.task, axis) for published in pools for axis in _axes(published)]
-        axes = [[_code(task), _code(axis), nodes[task]["axes"][axis].get("why", "")] for task, axis in dict.fromkeys(moved)]
+        axes = [
+            [_code(task), _code(axis), nodes[task]["axes"][axis].get("why", "")] for task, axis in dict.fromkeys(moved)
+        ]
         hits = _accessibility(pools, tallies)
         template = Template((Path(__file__).parent / "dataset_card.md").read_text(), keep_trailing_newline=True)
         return template.render(
@@ -220,8 +222,7 @@ def check_target(to: str) -> None:
         raise BadConfig(f"{to} is not empty; delete it, or name another folder")
     if not path.name:
         raise BadConfig(f"to = {to}; name a new folder for the data set")
-    if (unfinished := Path(f"{path}.unfinished")).exists():
-        raise BadConfig(f"{unfinished} exists: another card is being written, or was interrupted; then delete it")
+    check_unfinished(path)
     try_folder(to)
 
 
@@ -246,24 +247,12 @@ def publish(card: DatasetCard, to: Path) -> None:
     Raises:
         BadConfig: the folder cannot be written.
     """
-    unfinished = Path(f"{to}.unfinished")
-    try:
-        unfinished.mkdir(parents=True)
-    except OSError as error:
-        raise refused(unfinished, error) from None
-    try:
+    with appearing(to, folder=True) as path:
         for published in card.pools:
             for name in (*published.scenario_files, *published.other_files):
-                (unfinished / published.name / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(published.pool.folder / name, unfinished / published.name / name)
-        (unfinished / CARD_FILE).write_text(card.readme())
-        unfinished.replace(to)
-    except OSError as error:
-        shutil.rmtree(unfinished)
-        raise refused(to, error) from None
-    except BaseException:
-        shutil.rmtree(unfinished)
-        raise
+                (path / published.name / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(published.pool.folder / name, path / published.name / name)
+        (path / CARD_FILE).write_text(card.readme())
 
 
 def own_license() -> str:

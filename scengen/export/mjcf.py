@@ -1,8 +1,9 @@
 """Scenes as files that plain MuJoCo can open from any folder."""
 
-import shutil
 import xml.etree.ElementTree as ET
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import mujoco
@@ -13,6 +14,7 @@ from ..robots import panda
 from ..sim import scene_text
 from ..sim.world import compose
 from ..validate.playable import scene_errors
+from ..work.targets import write
 
 NAME_ATTRIBUTES = {"name", "class"}
 """MJCF attributes that define the name of an element or of a class of defaults."""
@@ -35,28 +37,35 @@ def export(row: PoolRow, folder: Path, robot: bool) -> None:
     scene_text.check(row.scene_xml)
     with scene_errors(f" of {row.name}"):
         compose(row.scene_xml, row.embodiment, visual=True).compile()
+    written: list[Path] = []
     try:
-        target.mkdir(parents=True, exist_ok=True)
-        (target / "scene.xml").write_text(_written(ET.fromstring(row.scene_xml)))
-        if robot:
-            (target / "scene_with_robot.xml").write_text(_with_robot(row, target))
-    except OSError as error:
-        raise BadConfig(f"{target} cannot be written: {error.strerror}") from None
+        for path, content in _files(row, target, robot):
+            if path.parent == target or not path.exists():  # scenarios share the meshes
+                write(path, content)
+                written.append(path)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        for made in (target, target.parent / "meshes"):
+            with suppress(OSError):  # there are other files, or nothing
+                made.rmdir()
+        raise
 
 
-def _with_robot(row: PoolRow, target: Path) -> str:
-    spec = compose(row.scene_xml, row.embodiment, visual=True)
-    _add_home(spec)
-    root = ET.fromstring(spec.to_xml())
-    meshes = target.parent / "meshes"
-    meshes.mkdir(exist_ok=True)
-    for mesh in root.iterfind("asset/mesh[@file]"):
-        source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
-        copy = meshes / f"{mesh.attrib['name']}{source.suffix}"
-        if not copy.exists():
-            shutil.copyfile(source, copy)
-        mesh.set("file", f"../meshes/{copy.name}")
-    return _written(root)
+def _files(row: PoolRow, target: Path, robot: bool) -> Iterator[tuple[Path, str | bytes]]:
+    """Files of a scenario, and their contents: the scenes last."""
+    alone = _written(ET.fromstring(row.scene_xml))
+    if robot:
+        spec = compose(row.scene_xml, row.embodiment, visual=True)
+        _add_home(spec)
+        root = ET.fromstring(spec.to_xml())
+        for mesh in root.iterfind("asset/mesh[@file]"):
+            source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
+            name = f"{mesh.attrib['name']}{source.suffix}"
+            yield target.parent / "meshes" / name, source.read_bytes()
+            mesh.set("file", f"../meshes/{name}")
+        yield target / "scene_with_robot.xml", _written(root)
+    yield target / "scene.xml", alone
 
 
 def _written(root: ET.Element) -> str:

@@ -6,7 +6,6 @@ controller received in all control periods of the row. These actions have passed
 an environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
 """
 
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -33,7 +32,7 @@ from ..validate.identity import check_versions
 from ..validate.playable import stored_world, unplayable
 from ..versions import versions
 from ..work.parallel import Workers
-from ..work.targets import refused, try_file, try_folder
+from ..work.targets import appearing, check_unfinished, try_file, try_folder
 from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
@@ -87,11 +86,6 @@ class RecordSettings:
         return [] if named == [NONE] else named
 
     @property
-    def unfinished(self) -> Path:
-        """Path of the data set until it is complete."""
-        return Path(f"{self.to}.unfinished")
-
-    @property
     def rate(self) -> int:
         """Number of rows per second."""
         return self.fps or (PAPER_RATE if self.format == LEROBOT else FULL_RATE)
@@ -118,10 +112,7 @@ class RecordSettings:
             check_size(self.width, self.height)
         if Path(self.to).exists():
             raise BadConfig(f"{self.to} exists already; delete it, or give another name")
-        if self.unfinished.exists():
-            raise BadConfig(
-                f"{self.unfinished} exists: another recording is being written, or was interrupted; then delete it"
-            )
+        check_unfinished(self.to)
         (try_file if self.format == ROBOMIMIC else try_folder)(self.to)
 
 
@@ -166,10 +157,9 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
         state = ObjectState(bodies, len(hands(robot)))
         streams[NAME] = Stream(state.names, state.bounds, state.read)
     failed = []
-    _begin(settings)
-    try:
+    with appearing(settings.to, folder=settings.format == LEROBOT) as path:
         lost = dict(unplayable(_rows(pools, count), settings.workers))
-        with _writer(settings, robot, streams, next(iter(tasks)), tuple(search)) as writer:
+        with _writer(settings, path, robot, streams, next(iter(tasks)), tuple(search)) as writer:
             for row in _rows(pools, count):
                 if row.id in lost:
                     continue
@@ -183,10 +173,6 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                         failed.append(row.id)
                 progress(writer.episodes, count)
             writer.finish({"pools": [pool.sha256 for pool in pools], "versions": versions()})
-        settings.unfinished.rename(settings.to)
-    except BaseException:
-        _discard(settings.unfinished)
-        raise
     return RecordSummary(writer.episodes, writer.rows, tuple(failed), lost)
 
 
@@ -194,26 +180,6 @@ def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
     """Texts of the scenes of a task in some pools."""
     holding = [pool for pool in pools if task in pool.kinds("task")[0]]
     return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
-
-
-def _begin(settings: RecordSettings) -> None:
-    """Make the unfinished file or folder. It must not exist, as another recording may be writing it."""
-    path = settings.unfinished
-    try:
-        if settings.format == ROBOMIMIC:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch(exist_ok=False)
-        else:
-            path.mkdir(parents=True)
-    except OSError as error:
-        raise refused(path, error) from None
-
-
-def _discard(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
@@ -252,24 +218,29 @@ class Writer(Protocol):
 
 
 def _writer(
-    settings: RecordSettings, robot: str, streams: Mapping[str, Stream], task: str, search: tuple[str, ...]
+    settings: RecordSettings,
+    path: Path,
+    robot: str,
+    streams: Mapping[str, Stream],
+    task: str,
+    search: tuple[str, ...],
 ) -> Writer:
     if settings.format == LEROBOT:
-        return _LeRobotWriter(settings, robot, streams)
+        return _LeRobotWriter(settings, path, robot, streams)
     from . import robomimic
 
     size = (settings.width, settings.height)
     env, arguments = robomimic.environment(task, settings.folders, settings.camera_names, size, search)
-    return robomimic.Demonstrations(settings.unfinished, robomimic.streams_of(streams, robot), env, arguments)
+    return robomimic.Demonstrations(path, robomimic.streams_of(streams, robot), env, arguments)
 
 
 class _LeRobotWriter(DatasetWriter):
     """Writer of a LeRobot data set of replayed witnesses."""
 
-    def __init__(self, settings: RecordSettings, robot: str, streams: Mapping[str, Stream]):
+    def __init__(self, settings: RecordSettings, path: Path, robot: str, streams: Mapping[str, Stream]):
         size = (settings.width, settings.height)
         features = _features(settings, robot, streams)
-        super().__init__(settings.unfinished, settings.rate, robot, features, settings.camera_names, size)
+        super().__init__(path, settings.rate, robot, features, settings.camera_names, size)
         self.settings, self.streams = settings, streams
 
     def episode(self, replay: WitnessReplay) -> bool:

@@ -31,6 +31,7 @@ from ..errors import BadConfig
 from ..robots.panda import Names
 from ..sim.world import World, hands
 from ..versions import versions
+from .hdf5 import Output
 from .replay import Snapshot, WitnessReplay
 
 ROBOSUITE_TYPE = 1
@@ -73,17 +74,19 @@ class Demonstrations:
         """
         import h5py
 
-        try:
-            self._file = h5py.File(path, "w")
-        except OSError as error:
-            raise BadConfig(f"{path} cannot be written: {error}") from None
+        self._output = Output(path)
+        self._file = h5py.File(self._output, "w")
         self.streams, self.episodes, self.rows = streams, 0, 0
         self._environment, self._arguments = environment, arguments
         self._data = self._file.create_group("data")
         self._masks: dict[str, list[str]] = defaultdict(list)
 
     def episode(self, replay: WitnessReplay) -> bool:
-        """Add one scenario's demonstration, and return whether it reached the goal."""
+        """Add one scenario's demonstration, and return whether it reached the goal.
+
+        Raises:
+            BadConfig: the file cannot grow.
+        """
         row, name, success = replay.row, f"demo_{self.episodes}", False
         group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[Snapshot]()
         views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
@@ -118,6 +121,7 @@ class Demonstrations:
         group.attrs["ep_meta"] = json.dumps({**metadata, **place, "params": dict(row.params)})
         for mask in (row.split, *([SUCCESS] if success else [])):
             self._masks[mask].append(name)
+        self._output.check()
         self.episodes, self.rows = self.episodes + 1, self.rows + len(seen)
         return success
 
@@ -135,10 +139,12 @@ class Demonstrations:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        with self._output:
+            self._file.close()
+        if kind is None or not issubclass(kind, BadConfig):  # an error of HDF5 may come from what was not written
+            self._output.check()
 
-    @staticmethod
-    def _add(group: Any, what: str, seen: Snapshot, views: Mapping[str, str]) -> None:
+    def _add(self, group: Any, what: str, seen: Snapshot, views: Mapping[str, str]) -> None:
         """Append the pictures of a moment to the file: those of a whole episode would not fit into memory."""
         for camera, picture in seen.pictures.items():
             key, shape = f"{what}/{views[camera]}", picture.shape
@@ -147,6 +153,7 @@ class Demonstrations:
                 group.create_dataset(key, (0, *shape), np.uint8, **packed)
             group[key].resize(len(group[key]) + 1, axis=0)
             group[key][-1] = picture
+            self._output.check()
 
 
 def environment(
@@ -171,7 +178,7 @@ def environment(
     views = [cameras_of(made.task.embodiment)[camera] for camera in cameras]
     arguments = {
         "robots": [ROBOT] * len(made.robots),
-        "pool": list(pools),
+        "pool": [str(Path(pool).resolve()) for pool in pools],  # so that it plays from any working folder
         "control_freq": rate,
         "reward_shaping": False,
         "ignore_done": True,

@@ -2,11 +2,14 @@
 
 import errno
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from ..errors import BadConfig, cut
 
@@ -16,7 +19,7 @@ STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/null")
 _REMEDY = {
     errno.ENOSPC: "make room and repeat the command",
     errno.EDQUOT: "make room and repeat the command",
-    errno.EFBIG: "the file is too large here; raise the limit (ulimit -f) and repeat the command",
+    errno.EFBIG: "raise the limit of the size of files (ulimit -f) and repeat the command",
     errno.EROFS: "the place is read-only; choose another place",
     errno.EACCES: "make it writable, or choose another place",
     errno.EPERM: "make it writable, or choose another place",
@@ -111,6 +114,79 @@ def write(path: Path, content: str | bytes) -> None:
             part.unlink(missing_ok=True)
     except OSError as error:
         raise refused(path, error) from None
+
+
+def unfinished(to: Path | str) -> Path:
+    """Path of a file or folder while it is written."""
+    return Path(f"{to}.unfinished")
+
+
+def check_unfinished(to: Path | str) -> None:
+    """Raise `BadConfig` if a target is being written by another command, or was left unfinished by one."""
+    part = unfinished(to)
+    if not os.path.lexists(part):
+        return
+    try:
+        with _lock_of(part):
+            raise BadConfig(f"{cut(str(part))} was left by a command that was interrupted; delete it")
+    except Timeout:
+        raise BadConfig(
+            f"{cut(str(part))} is being written by another command; wait for it, or name another target"
+        ) from None
+    except OSError as error:
+        raise refused(part, error) from None
+
+
+@contextmanager
+def appearing(to: Path | str, folder: bool) -> Iterator[Path]:
+    """Write a file or folder that appears under its name when it is complete, and is discarded after an error.
+
+    Args:
+        folder: whether it is a folder, which is made empty; otherwise an empty file.
+
+    Yields:
+        Where to write it.
+
+    Raises:
+        BadConfig: it cannot be written, or another command is writing it.
+    """
+    part = unfinished(to)
+    try:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        with _lock_of(part):
+            part.mkdir() if folder else part.touch(exist_ok=False)
+            try:
+                yield part
+                part.replace(to)
+            except BaseException:
+                _discard(part)
+                raise
+    except Timeout:
+        check_unfinished(to)
+    except OSError as error:
+        raise refused(to, error) from None
+
+
+@contextmanager
+def _lock_of(part: Path) -> Iterator[None]:
+    """Hold the lock of an unfinished target. A process that is killed loses it.
+
+    Raises:
+        Timeout: another process holds it.
+    """
+    path = part.with_name(f"{part.name}.lock")
+    with FileLock(path, timeout=0):
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def _discard(part: Path) -> None:
+    if part.is_dir():
+        shutil.rmtree(part)
+    else:
+        part.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -332,7 +332,21 @@ def test_a_killed_recording_leaves_nothing_that_looks_finished(tmp_path, capsys)
     assert process.wait() == -signal.SIGKILL and unfinished.exists()
     assert not target.exists() and not (unfinished / "meta" / "info.json").exists()
     assert cli.run(command[3:]) == 2
-    assert "killed.unfinished exists: another recording is being written, or was interrupted" in capsys.readouterr().err
+    assert "killed.unfinished was left by a command that was interrupted; delete it" in capsys.readouterr().err
+
+
+def test_a_recording_that_is_being_written_is_left_alone(tmp_path, capsys):
+    """A lock tells it from what a killed command has left."""
+    target = tmp_path / "busy"
+    command = ["record", f"pool={REFERENCE}", f"to={target}", "cameras=none"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scengen", *command], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    )
+    while process.poll() is None and not Path(f"{target}.unfinished", "data").exists():
+        time.sleep(0.005)
+    assert cli.run(command) == 2
+    assert "busy.unfinished is being written by another command; wait for it" in capsys.readouterr().err
+    assert process.wait() == 0 and [path.name for path in tmp_path.iterdir()] == ["busy"]
 
 
 def test_an_interrupted_recording_leaves_nothing_at_all(tmp_path):

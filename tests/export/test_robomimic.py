@@ -6,6 +6,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+import robosuite
 from helpers import REFERENCE, pictures_are_possible
 from robosuite.environments.base import REGISTERED_ENVS
 
@@ -91,6 +92,18 @@ def test_robosuite_plays_a_demonstration_as_robomimic_asks_it_to(made, witnesses
 
 
 @pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
+def test_a_file_plays_from_any_folder(tmp_path, monkeypatch, witnesses):
+    """The pool was named by a path relative to the folder in which the recording was made."""
+    monkeypatch.chdir(REFERENCE.parent)
+    record(RecordSettings(REFERENCE.name, str(tmp_path / "a.hdf5"), "robomimic", n=1, cameras="none"), lambda *_: None)
+    monkeypatch.chdir(tmp_path)
+    with h5py.File("a.hdf5") as file:
+        told = json.loads(file["data"].attrs["env_args"])
+    env = robosuite.make(told["env_name"], **told["env_kwargs"])
+    env.reset()
+    assert env.row.id == witnesses[0].id
+
+
 def test_pictures_have_robosuites_names_and_follow_one_another(tmp_path, monkeypatch, witnesses):
     monkeypatch.setattr("scengen.episode.Episode.judge", lambda self: (self.world.time > 0.035 and "timeout") or None)
     path = tmp_path / "seen.hdf5"
