@@ -92,7 +92,7 @@ def test_robosuite_plays_a_demonstration_as_robomimic_asks_it_to(made, witnesses
 
 
 @pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL on this machine")
-def test_a_file_plays_from_any_folder(tmp_path, monkeypatch, witnesses):
+def test_a_file_plays_from_any_folder(tmp_path, monkeypatch):
     """The pool was named by a path relative to the folder in which the recording was made."""
     monkeypatch.chdir(REFERENCE.parent)
     record(RecordSettings(REFERENCE.name, str(tmp_path / "a.hdf5"), "robomimic", n=1, cameras="none"), lambda *_: None)
@@ -101,7 +101,7 @@ def test_a_file_plays_from_any_folder(tmp_path, monkeypatch, witnesses):
         told = json.loads(file["data"].attrs["env_args"])
     env = robosuite.make(told["env_name"], **told["env_kwargs"])
     env.reset()
-    assert env.row.id == witnesses[0].id
+    assert env.row.id in {row.id for row in Pool.open(REFERENCE).rows()}
 
 
 def test_pictures_have_robosuites_names_and_follow_one_another(tmp_path, monkeypatch, witnesses):
