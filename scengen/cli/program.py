@@ -46,6 +46,7 @@ def main() -> NoReturn:
         with suppress(OSError):
             sys.stdout.flush()
         signals.end()  # at once: Python takes seconds to take itself apart on a busy machine
+    signals.finish(status)
     sys.exit(status)
 
 
@@ -57,10 +58,14 @@ class Signals:
         self.working = False
         """Whether the command has begun. Before that, while modules are imported, nothing has to be cleaned up."""
         self._received = False
+        self._finished = False
+        """Whether the command has ended, and Python and Ray take themselves apart."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._receive)
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
+        if self._finished:
+            self.end()
         self.status = 128 + number
         if self._received or not self.working:
             self.end()
@@ -69,6 +74,10 @@ class Signals:
         timer.daemon = True
         timer.start()
         raise KeyboardInterrupt
+
+    def finish(self, status: int) -> None:
+        """Let a signal from now on end the process with the status of the command."""
+        self.status, self._finished, self.working = status, True, True
 
     def end(self) -> NoReturn:
         """Leave without a further step of Python, and end child processes."""

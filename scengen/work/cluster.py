@@ -1,5 +1,6 @@
 """Work on a Ray cluster: the same items and the same results, even if workers and nodes are lost."""
 
+import ctypes
 import importlib.util
 import logging
 import os
@@ -89,6 +90,8 @@ class Cluster:
         with _sigterm_restored(), tempfile.TemporaryFile("w+") as output:
             try:
                 with _stderr_to(output):
+                    if self.address == LOCAL:
+                        _adopt_orphans()
                     ray.init(self.address, log_to_driver=False, logging_level=logging.CRITICAL, **settings)
                 if self.address == LOCAL:
                     self._check_loopback(ray)
@@ -169,6 +172,16 @@ class Cluster:
         except (OSError, OverflowError, UnicodeError) as error:
             why = f"no answer ({one_line(error)}); check that the cluster runs, and give its HOST:PORT"
             raise ClusterError(f"executor.address = {cut(self.address)}: {why}") from None
+
+
+def _adopt_orphans() -> None:
+    """Become the parent of processes whose parents die. Agents of Ray outlive the server that has started them, and an
+    interrupted command ends its children."""
+    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+
+
+_PR_SET_CHILD_SUBREAPER = 36
+"""Option of prctl: descendants without a parent become children of this process (linux/prctl.h)."""
 
 
 def _use_own_token() -> None:
