@@ -52,6 +52,13 @@ def _lost(draft: Draft) -> None:
     draft.manifest["funnel"].update({stage: 1 for stage in draft.manifest["funnel"] if stage not in BEFORE_LOSS})
 
 
+def _cyrillic(draft: Draft) -> None:
+    """A letter of the instruction is another one that looks the same."""
+    text = draft.task["instruction"].replace("o", "\u043e", 1)
+    draft.task["instruction"] = text
+    draft.every(instruction=text)
+
+
 BEFORE_LOSS = ("proposed", "feasible")
 
 
@@ -93,6 +100,7 @@ CASES = [
     Case("single_quick__last_digits", "single_quick", "accept", "", _last_digits),
     Case("single_quick__lost", "single_quick", "accept", r"1 indices were lost.*author's word", _lost),
     Case("single_quick__attacked", "single_quick", "accept", r"1000000000 rollouts.*author's word", _attacked),
+    Case("single_quick__letters_alike", "single_quick", "accept", r"u043e", _cyrillic),
     Case("single_quick__rounded", "single_quick", "accept", "", _rounded),
     Case("single_quick__two_shards", "single_quick", "accept", "", lambda draft: None, _two_shards),
     Case("single_quick__a_note_beside", "single_quick", "accept", "", None, _beside),

@@ -1,9 +1,14 @@
 """False claims about what a run has left out: kept rejects, reasons, and an attack on the finished pool."""
 
 import copy
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from forgery import Case, Draft
+import numpy as np
+from forgery import Case, Draft, sha256, write_manifest
 from labels import Change, _config, _from, _manifest
 
 
@@ -49,6 +54,42 @@ def _left_out_by_an_attack(draft: Draft) -> None:
     draft.manifest["funnel"].update(certified=1)
 
 
+_ENTRY = {"file": "hits/a.npz", "sha256": "0" * 64}
+
+
+def _hit(make: Callable[[Path], None]) -> Callable[[Path], None]:
+    """A file in the place of a hit that the manifest lists, with a hash to match."""
+
+    def damage(folder: Path) -> None:
+        path = folder / "hits" / "a.npz"
+        path.parent.mkdir()
+        make(path)
+        if path.is_file():
+            manifest = json.loads((folder / "manifest.json").read_text())
+            manifest["attack"]["hits"][0]["sha256"] = sha256(path.read_bytes())
+            write_manifest(folder, manifest)
+
+    return damage
+
+
+def _npz(**about: Any) -> Callable[[Path], None]:
+    """A hit whose description has these entries."""
+    whole = {"scenario": "0" * 12, "tier": "retry", "raw": False, "plan": "", "seconds": 1.0, "digest": "0" * 16,
+             "lacks": [], "unmoved": [], "params": {}, "task": "domino_single", **about}  # fmt: skip
+    return lambda path: np.savez(path, actions=np.zeros((3, 7), np.float32), about=json.dumps(whole))
+
+
+HITS: dict[str, tuple[str, Callable[[Path], None]]] = {
+    "is_a_pipe": (r"plain file", os.mkfifo),
+    "is_a_link": (r"plain file", lambda path: path.symlink_to("/dev/zero")),
+    "is_noise": (r"not a hit", lambda path: path.write_bytes(bytes(range(256)))),
+    "without_parameters": (r"not a hit.*params", _npz(params=None)),
+    "of_endless_time": (r"not a hit.*seconds", _npz(seconds=1e300)),
+    "of_another_scenario": (r"hit", _npz(params={"count": 5})),
+}
+"""What stands in the place of a hit."""
+
+
 CHANGES: dict[str, tuple[str, str, Change]] = {
     # name: base, reason, change
     "reject_without_its_scene": ("single_kept", r"reject|scene", lambda d: d.rejected[0].update(scene_xml="")),
@@ -73,5 +114,9 @@ CHANGES: dict[str, tuple[str, str, Change]] = {
 
 CASES = [
     *(Case(f"{base}__{name}", base, "reject", says, change) for name, (base, says, change) in CHANGES.items()),
+    *(
+        Case(f"single_quick__hit_{name}", "single_quick", "reject", says, _attacked(_ENTRY), _hit(make))
+        for name, (says, make) in HITS.items()
+    ),
     Case("single_quick__tier_with_markup", "single_quick", "refuse", r"tier", _attacked(None, 0, "<b>sure</b>\n# A")),
 ]
