@@ -45,7 +45,7 @@ MAX_HITS = 10_000
 _SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _HIT = re.compile(r"hits/[A-Za-z0-9_-]{1,200}\.npz")
 _SAMPLER = re.compile(r"iid|sobol|(lhs|grid):[0-9]{1,6}")
-_NUMBER = re.compile(r"\d+(\.\d+)?")
+_NUMBER = re.compile(r"((?<!\w)-)?\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)

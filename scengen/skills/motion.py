@@ -19,7 +19,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
-from ..sim.world import Arm, World
+from ..sim.world import ROBOT, Arm, World
 
 OPEN = -1.0
 """Gripper command: jaw open, or suction off."""
@@ -145,13 +145,20 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
             return
         if world.time > end:
             short = f"{1000 * math.sqrt(left @ left):.0f} mm and {math.degrees(math.sqrt(turn @ turn)):.0f} deg short"
-            raise GaveUp(f"the hand stayed {short} of its target for {pace.give_up:g} s")
+            place = ", ".join(f"{value:.2f}" for value in goal.tolist())
+            raise GaveUp(f"the hand stayed {short} of its target ({place}) m for {pace.give_up:g} s{_touching(arm)}")
         ahead = goal - setpoint
         distance = math.sqrt(ahead @ ahead)
         speed = min(pace.speed, 4.0 * distance)
         velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)
         setpoint = setpoint + velocity * Loop.PERIOD
         yield steer(arm, setpoint, velocity, turn, grip)
+
+
+def _touching(arm: Arm) -> str:
+    """Bodies that an arm touches, for the reason of a move that gave up; empty if there are none."""
+    touched = sorted(arm.world.touching_bodies(arm.label) - {ROBOT})
+    return f", touching {', '.join(touched)}" if touched else ""
 
 
 def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STEADY, grip: float | None = None) -> Plan:
@@ -182,7 +189,8 @@ def push(arm: Arm, velocity: ArrayLike, until: Condition, grip: float | None = N
     end = world.time + give_up
     while not until():
         if world.time > end:
-            raise GaveUp(f"end condition not met after pushing for {give_up:g} s")
+            way = ", ".join(f"{value:.2f}" for value in along.tolist())
+            raise GaveUp(f"pushing with ({way}) m/s for {give_up:g} s met no end condition{_touching(arm)}")
         setpoint = setpoint + along * Loop.PERIOD
         yield steer(arm, setpoint, along, between(arm.hand_rot, rot), grip)
 
@@ -219,7 +227,8 @@ def turn_to(
         if math.sqrt(left @ left) < within:
             return
         if world.time > end:
-            raise GaveUp(f"the hand stayed {math.degrees(math.sqrt(left @ left)):.0f} deg short for {give_up:g} s")
+            short = f"{math.degrees(math.sqrt(left @ left)):.0f} deg short of its turn"
+            raise GaveUp(f"the hand stayed {short} for {give_up:g} s{_touching(arm)}")
         turned = min(angle, turned + rate * Loop.PERIOD)
         aim = rotation(turned / max(angle, 1e-9) * way) @ start
         yield steer(arm, here, np.zeros(3), between(arm.hand_rot, aim), grip)
@@ -247,7 +256,7 @@ def wait(arm: Arm, until: Condition, give_up: float) -> Plan:
     end = arm.world.time + give_up
     while not until():
         if arm.world.time > end:
-            raise GaveUp(f"the condition did not hold within {give_up:g} s")
+            raise GaveUp(f"waiting for {give_up:g} s met no end condition{_touching(arm)}")
         yield arm.idle
 
 

@@ -1,6 +1,7 @@
 """Moves end when the world says so, turn the wrist the nearer way, give up in time, and can be joined."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -83,15 +84,25 @@ def test_a_pace_says_how_fast_the_hand_goes_and_how_near_it_must_come(pace):
 
 def test_a_move_that_takes_too_long_gives_up_and_says_how_far_it_came():
     w = world()
-    with pytest.raises(GaveUp, match=r"the hand stayed 2\d\d mm and \d deg short of its target for 0.3 s"):
-        play(w, go_to(w.arm, w.arm.hand + 0.3 * heading(90.0), pace=Pace(0.25, 0.005, give_up=0.3)))
+    goal = w.arm.hand + 0.3 * heading(90.0)
+    place = re.escape(", ".join(f"{value:.2f}" for value in goal))
+    with pytest.raises(
+        GaveUp, match=rf"the hand stayed 2\d\d mm and \d deg short of its target \({place}\) m for 0.3 s$"
+    ):
+        play(w, go_to(w.arm, goal, pace=Pace(0.25, 0.005, give_up=0.3)))
     assert w.time == pytest.approx(0.31, abs=0.011)
-    with pytest.raises(GaveUp, match="after pushing for 0.2 s"):
+    with pytest.raises(GaveUp, match=r"pushing with \(0.00, 0.00, 0.10\) m/s for 0.2 s met no end condition$"):
         play(w, push(w.arm, 0.1 * UP, until=lambda: False, give_up=0.2))
-    with pytest.raises(GaveUp, match="within 0.2 s"):
+    with pytest.raises(GaveUp, match="waiting for 0.2 s met no end condition$"):
         play(w, wait(w.arm, lambda: False, give_up=0.2))
     with pytest.raises(GaveUp, match="deg short"):
         play(w, turn_to(w.arm, facing_down(2.0), give_up=0.2))
+
+
+def test_a_move_that_gives_up_names_what_the_hand_touches():
+    w = world()
+    with pytest.raises(GaveUp, match="for 2 s, touching table$"):
+        play(w, go_to(w.arm, w.arm.hand - 0.6 * UP, facing_down(), Pace(0.3, 0.003, 2.0)))
 
 
 def test_a_push_keeps_its_velocity_until_the_world_says_stop():
