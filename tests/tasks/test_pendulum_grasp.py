@@ -20,10 +20,12 @@ from controls import (
 from scengen import load_task
 from scengen.assets.pendulum import Pendulum
 from scengen.sim.world import IDLE
+from scengen.skills.motion import CLOSED, OPEN, hold
 from scengen.tasks.pendulum_grasp import APEX_SHARE, BOB, HINGE, PendulumGrasp
 
 TASK = load_task("pendulum_grasp")
 GRASP = TASK.draw("id", 0, 0).scenario
+MISS = "the jaw closed on nothing"
 
 
 def closing(scenario, late):
@@ -84,6 +86,36 @@ def test_a_bob_that_is_stopped_and_lifted_by_hand_is_lost_by_a_rule_alone():
 
 def test_a_jaw_that_closes_on_nothing_has_had_its_try():
     assert closing(GRASP, -GRASP.period / 2).reason == "the jaw closed on nothing"
+
+
+@pytest.mark.parametrize(("periods", "then", "reason"), [(5, OPEN, ""), (8, OPEN, MISS), (2, 0.0, MISS)])
+def test_a_jaw_that_begins_to_close_has_had_its_try(periods, then, reason):
+    """Far from the bob, for some control periods. Then it opens again, or stops. Five periods are an accident."""
+
+    def begins(world):
+        yield from hold(world.arm, 0.6, OPEN)
+        for _ in range(periods):
+            yield [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, CLOSED]
+        yield from hold(world.arm, 0.6, then)
+
+    found, free = (play(TASK, family(**vars(GRASP)), begins) for family in (PendulumGrasp, unguarded(PendulumGrasp)))
+    assert (found.reason if found.outcome == "failure" else "") == reason
+    assert free.outcome == "timeout"
+
+
+@pytest.mark.parametrize(("wide", "lost"), [(-0.05, False), (-0.5, True)])
+def test_a_jaw_touches_the_bob_soon_after_it_was_wide_open(wide, lost):
+    """When it was, before it begins to touch [s]. The rule that the paper states does not see it: it is at the apex."""
+    world = load(TASK, GRASP)
+    solution_of = GRASP.oracle(world)
+    while not world.touching("robot", BOB):
+        with world.events():
+            GRASP.events(world)
+        world.step(next(solution_of))
+    assert GRASP.at_apex(world) and GRASP.failure(world) is None
+    with world.events():
+        world.memory["wide"] = world.time + wide
+    assert GRASP.narrow(world) == lost
 
 
 def test_where_it_hangs_still_the_witness_closes_on_nothing():
