@@ -4,6 +4,7 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -32,7 +33,7 @@ from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
-from ..work.targets import refused
+from ..work.targets import write
 from .player import SETTLE_TIME, Attempt, Node, Played, Player
 from .signature import ContactPair, pairs
 
@@ -93,18 +94,14 @@ class Hit:
         return {**kept, "lacks": [list(pair) for pair in self.lacks], "unmoved": list(self.unmoved)}
 
     def store(self, folder: Path) -> None:
-        """Write the hit as `<name>.npz`.
+        """Write the hit as `<name>.npz`, whole or not at all.
 
         Raises:
             BadConfig: the file cannot be written.
         """
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with open(folder / f"{self.name}.npz", "wb") as file:
-                about = {**self.plain(), "params": dict(self.params)}
-                np.savez_compressed(file, actions=self.actions, about=json.dumps(about))
-        except OSError as error:
-            raise refused(folder, error) from None
+        content, about = BytesIO(), {**self.plain(), "params": dict(self.params)}
+        np.savez_compressed(content, actions=self.actions, about=json.dumps(about))
+        write(folder / f"{self.name}.npz", content.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> "Hit":

@@ -16,6 +16,7 @@ from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.playable import stored_world
 from ..validate.rollout import Rollout, try_shortcut
+from ..work.targets import appearing
 from .render import Camera, Picture, check_pictures
 from .video import Movie
 
@@ -143,7 +144,7 @@ def movie(
     camera: str | None = None,
     progress: Progress = lambda done, total: None,
 ) -> int:
-    """Write an MP4 in real time. Returns the number of its frames.
+    """Write an MP4 in real time, whole or not at all. Returns the number of its frames.
 
     Args:
         fps: frames per second, a divisor of the control rate of 100 Hz.
@@ -152,9 +153,14 @@ def movie(
     Raises:
         NoPictures, NoVideo: OpenGL or PyAV is missing.
         UnknownName: there is no such camera.
+        BadConfig: the file cannot be written.
     """
     periods = range(0, len(take.actions) + 1, periods_between(fps))
-    with closing(Camera(take.world(), width, height)) as eye, Movie(path, fps, width, height) as film:
+    with (
+        closing(Camera(take.world(), width, height)) as eye,
+        appearing(path, folder=False) as part,
+        Movie(part, fps, width, height) as film,
+    ):
         if camera is None:
             eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
         for _ in take.moments(eye.world, periods):

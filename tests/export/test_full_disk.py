@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from helpers import REFERENCE
 
+from scengen.pool import Pool
+
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
     "record robomimic": ("record to={to}.hdf5 format=robomimic n=1", 100),
@@ -45,3 +47,44 @@ def test_what_was_exported_before_is_kept(tmp_path):
     before.write_text("<mujoco/>")
     assert limited(*COMMANDS["export"], tmp_path / "new")[0] == 2
     assert list(tmp_path.rglob("*.xml")) == [before] and before.read_text() == "<mujoco/>"
+
+
+def test_a_film_before_is_kept(tmp_path):
+    film = tmp_path / "new.mp4"
+    film.write_bytes(b"film before")
+    scenario = next(iter(Pool.open(REFERENCE).rows())).id
+    status, told = limited(f"film to={film} id={scenario} fps=10 width=160 height=120", 2, tmp_path / "new")
+    assert status == 2 and told.splitlines()[-1].endswith(
+        "file too large; raise the limit of the size of files (ulimit -f) and repeat the command"
+    ), told
+    assert list(tmp_path.iterdir()) == [film] and film.read_bytes() == b"film before"
+
+
+STORE = """
+import sys
+from pathlib import Path
+import numpy as np
+from scengen.attack.evidence import Hit
+from scengen.errors import BadConfig
+actions = np.random.default_rng(int(sys.argv[2])).random((400, 8))
+hit = Hit("0123456789ab", "random", True, "a plan", 1.0, "0" * 16, (), (), {"a": 1.0}, actions)
+try:
+    hit.store(Path(sys.argv[1]))
+except BadConfig as error:
+    sys.exit(f"refused: {error}")
+"""
+
+
+def stored(folder, seed, kilobytes):
+    line = shlex.join([sys.executable, "-c", STORE, str(folder), str(seed)])
+    shell = f"trap '' XFSZ; ulimit -f {kilobytes}; exec {line}"
+    return subprocess.run(["bash", "-c", shell], capture_output=True, text=True, cwd=ROOT).stderr
+
+
+def test_a_hit_before_is_kept(tmp_path):
+    assert stored(tmp_path, 0, "unlimited") == ""
+    (hit,) = tmp_path.iterdir()
+    before = hit.read_bytes()
+    told = stored(tmp_path, 1, 1)
+    assert told.startswith("refused: ") and "file too large" in told.lower(), told
+    assert list(tmp_path.iterdir()) == [hit] and hit.read_bytes() == before
