@@ -7,14 +7,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control.loop import Loop
-from .errors import Unstable
-from .scenario import Scenario
+from .errors import UnknownName, Unstable
+from .scenario import Scenario, Strict
 from .sim.world import World
 
 Outcome = Literal["success", "failure", "timeout", "unstable"]
 """Result of an episode."""
+Rules = Literal["strict", "paper"]
+"""Rules of an episode: all of them, or without those that the paper lacks (`scenario.Strict`)."""
+STRICT: Rules = "strict"
+PAPER: Rules = "paper"
+RULES: tuple[Rules, ...] = (STRICT, PAPER)
 Actions = NDArray[np.float32]
 """Actions of an episode, shape (n, 7 * arms): one row per control period, exactly as the controller received it."""
+
+
+def check_rules(name: str) -> Rules:
+    """The rules of a name.
+
+    Raises:
+        UnknownName: there are none.
+    """
+    if name not in RULES:
+        raise UnknownName("rules", str(name), RULES)
+    return name
 
 
 class Episode:
@@ -24,15 +40,16 @@ class Episode:
     each control period and `judge` after it.
     """
 
-    def __init__(self, scenario: Scenario, world: World, horizon: float = math.inf):
+    def __init__(self, scenario: Scenario, world: World, horizon: float = math.inf, rules: Rules = STRICT):
         """Start an episode in a world at its start.
 
         Args:
             scenario: the scenario that sets events and goal.
             world: a world of that scenario's scene.
             horizon: time limit for reaching the goal [s].
+            rules: rules that end it.
         """
-        self.scenario, self.world, self.horizon = scenario, world, horizon
+        self.scenario, self.world, self.horizon, self.rules = scenario, world, horizon, rules
         self.outcome: Outcome | None = None
         """Outcome so far; None while it is open. A later failure turns a success into a failure."""
         self.reason = ""
@@ -63,7 +80,7 @@ class Episode:
 
     def judge(self) -> Outcome | None:
         """Judge the past control period: failure takes precedence over success, success over the time limit."""
-        if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
+        if self.outcome in (None, "success") and (lost := self._failure()):
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
         elif self.outcome is None:
@@ -73,6 +90,10 @@ class Episode:
             elif self.world.time > self.horizon - 1e-9:
                 self.outcome, self.reason = "timeout", f"the goal was not reached in {self.horizon:g} s"
         return self.outcome
+
+    def _failure(self) -> str | None:
+        lost = self.scenario.failure(self.world)
+        return None if self.rules == PAPER and isinstance(lost, Strict) else lost
 
     def settled(self) -> tuple[Outcome, str]:
         """The final outcome and its reason, after the time for which a reached goal has to last."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..episode import Actions
+from ..episode import STRICT, Actions, Rules, check_rules
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
 from ..pool import Pool, PoolRow
 from ..pool.files import sha256, why_not_plain
@@ -21,6 +21,7 @@ from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
+from ..work.targets import write
 from .adversary import PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
 from .evidence import Hit, TierRate, rates, unsound
 from .experience import Experience, experience
@@ -53,6 +54,7 @@ class AttackSettings:
     budget: int = 200
     seed: int = 0
     tiers: str | list[str] | None = None
+    rules: str = STRICT
     workers: Workers = 1
     limit_seconds: float = 3600.0
     limit_mb: int = 4000
@@ -67,6 +69,7 @@ class AttackSettings:
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
+        check_rules(self.rules)
         at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
         for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
             if tier not in TIERS:
@@ -91,6 +94,8 @@ class AttackReport:
     """The result of an attack on several scenarios."""
 
     task: str
+    rules: Rules
+    """Rules under which the hits reach the goal."""
     scenarios: tuple[str, ...]
     """Ids of the scenarios."""
     rates: tuple[TierRate, ...]
@@ -120,6 +125,7 @@ class AttackReport:
         """The report as plain data, without actions, folder and processor time."""
         return {
             "task": self.task,
+            "rules": self.rules,
             "grammar": GRAMMAR,
             "scenarios": list(self.scenarios),
             "rollouts": self.rollouts,
@@ -141,12 +147,14 @@ class AttackJob:
     seed: int
     tiers: tuple[str, ...]
     priors: tuple[Prior, ...]
+    rules: Rules = STRICT
+    """Rules that end an episode."""
     known: Experience = Experience()
     """What the adversary knows from training."""
 
     def __call__(self, number: int) -> AttackResult:
         attacked = self.subjects[number]
-        player = player_of(attacked)
+        player = player_of(attacked, self.rules)
         player.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
         player.memories = {memory.name: memory.follow for memory in self.known.memories}
         player.durations = self.known.durations
@@ -171,13 +179,14 @@ def attack(
         progress: called with the number of scenarios done, and the number of hits.
     """
     priors = tuple(fitted(task, settings)) if PRIOR in settings.chosen else ()
-    budget = max(1, settings.budget // len(subjects))
+    budget, rules = max(1, settings.budget // len(subjects)), check_rules(settings.rules)
     identity = {
         "grammar": GRAMMAR,
         "scenarios": [one.scenario.id for one in subjects],
         "budget": budget,
         "seed": settings.seed,
         "tiers": list(settings.chosen),
+        "rules": settings.rules,
         "source_sha256": source_sha256(task.family),
     }
     with Log(folder / "attack.jsonl", identity) as log:
@@ -185,13 +194,13 @@ def attack(
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
         limits = Limits(settings.limit_seconds, settings.limit_mb)
         known = experience(task, settings.seed + FITTING_SEED, settings.chosen) if todo else Experience()
-        job = AttackJob(tuple(subjects), budget, settings.seed, settings.chosen, priors, known)
+        job = AttackJob(tuple(subjects), budget, settings.seed, settings.chosen, priors, rules, known)
         for result in each(job, todo, settings.workers, limits, job.lost):
             for hit in result.hits:
                 replace(hit, task=task.name).store(folder)
             log.add(_record(result))
             progress(len(log.records), sum(len(record["hits"]) for record in log.records))
-        return _report(task, subjects, log, folder, priors)
+        return _report(task, rules, subjects, log, folder, priors)
 
 
 def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
@@ -231,13 +240,12 @@ def store_in_pool(report: AttackReport, folder: Path) -> dict[str, Any]:
         folder: folder of the pool.
 
     Raises:
-        OSError: the hits cannot be written.
+        BadConfig: the hits cannot be written.
     """
     files = []
     for hit in report.hits:
-        (folder / HITS_FOLDER).mkdir(parents=True, exist_ok=True)
         content = (report.folder / f"{hit.name}.npz").read_bytes()
-        (folder / HITS_FOLDER / f"{hit.name}.npz").write_bytes(content)
+        write(folder / HITS_FOLDER / f"{hit.name}.npz", content)
         files.append({"file": f"{HITS_FOLDER}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
     return {**report.plain(), "hits": files}
 
@@ -275,10 +283,10 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
             yield entry["file"], str(error)
 
 
-def player_of(subject: Subject) -> Player:
+def player_of(subject: Subject, rules: Rules = STRICT) -> Player:
     """A player for attempts on a subject."""
     with scene_errors(f" of {subject.name}"):
-        return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness)
+        return Player(subject.scenario, subject.scene_xml, subject.embodiment, subject.horizon, subject.witness, rules)
 
 
 def fitted(task: Task, settings: AttackSettings) -> list[Prior]:
@@ -327,7 +335,9 @@ def _record(result: AttackResult) -> dict[str, Any]:
     return {"scenario": result.scenario, **about}
 
 
-def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]) -> AttackReport:
+def _report(
+    task: Task, rules: Rules, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]
+) -> AttackReport:
     order = [one.scenario.id for one in subjects]
     records = sorted(log.records, key=lambda record: order.index(record["scenario"]))
     counts = [TierRate(**rate) for record in records for rate in record["rates"]]
@@ -336,7 +346,7 @@ def _report(task: Task, subjects: Sequence[Subject], log: Log, folder: Path, pri
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
     return AttackReport(
-        task.name, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, lost, folder, cpu
+        task.name, rules, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, lost, folder, cpu
     )
 
 

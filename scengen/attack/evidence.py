@@ -11,7 +11,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from ..episode import Actions
+from ..episode import RULES, STRICT, Actions, Rules
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
 from ..pool.columns import ID, witness
@@ -73,6 +73,8 @@ class Hit:
     """Actions of the rollout, as the controller received them."""
     task: str = ""
     """Name of the task; empty for a family that belongs to none."""
+    rules: Rules = STRICT
+    """Rules under which it reaches the goal."""
 
     @property
     def refutes(self) -> bool:
@@ -142,6 +144,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     demand(_is_number(about["seconds"]) and 0 <= about["seconds"] <= MAX_HORIZON, "seconds is not a time")
     check_match("digest", about["digest"], SHORT_HASH)
     check_text("task", about["task"], 100)
+    demand(about["rules"] in RULES, "rules are neither strict nor paper")
     for name, number in check_mapping("params", about["params"]).items():
         demand(_is_number(number), f"params has no number for {cut(name)}")
     lacks, unmoved = about["lacks"], about["unmoved"]
@@ -174,7 +177,7 @@ def unsound(hit: Hit, task: Task) -> str:
     if scenario.id != hit.scenario:
         return OTHER_SCENARIO
     world = world_of(scenario, task.embodiment)
-    again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME)
+    again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME, rules=hit.rules)
     return "" if again.solved else f"its actions do not reach the goal: {again.reason}"
 
 
@@ -223,7 +226,7 @@ def hit(
         causal: contacts of the witness that a hit should have.
     """
     fresh = World.load(player.scene_xml, player.embodiment)
-    again = replay(player.scenario, fresh, played.actions, player.horizon, SETTLE_TIME)
+    again = replay(player.scenario, fresh, played.actions, player.horizon, SETTLE_TIME, rules=player.rules)
     if not again.solved or again.digest != played.digest:
         return None
     left = played.signature
@@ -238,6 +241,7 @@ def hit(
         unmoved=tuple(sorted(player.trace.signature.moved - left.moved)),
         params=values(player.scenario),
         actions=played.actions,
+        rules=player.rules,
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..control.teleop import unfiltered
-from ..episode import Actions, Episode, Outcome
+from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import BadConfig, GaveUp
 from ..geometry import Vec3
 from ..scenario import Plan, Scenario
@@ -94,7 +94,16 @@ class Played:
 class Player:
     """Plays attempts on one scenario. It holds the world and the data that macros need."""
 
-    def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, horizon: float, witness: Actions):
+    def __init__(
+        self,
+        scenario: Scenario,
+        scene_xml: str,
+        embodiment: str,
+        horizon: float,
+        witness: Actions,
+        rules: Rules = STRICT,
+    ):
+        self.rules: Rules = rules
         self.scenario, self.scene_xml, self.embodiment, self.horizon = scenario, scene_xml, embodiment, horizon
         self.world = World.load(scene_xml, embodiment)
         self._places = starts(self.world)
@@ -209,7 +218,7 @@ class Player:
         """
         node = node or self.start
         self.world.restore(node.state)
-        episode = Episode(self.scenario, self.world, self.horizon)
+        episode = Episode(self.scenario, self.world, self.horizon, self.rules)
         episode.held = node.held
         return _RunningAttempt(self, episode, node, raw).to_end(steps)
 

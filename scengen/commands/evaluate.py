@@ -16,12 +16,14 @@ def command(arguments: Arguments) -> int:
     with ProgressBar(err, f"evaluate {settings.policy}", 1, settings.workers) as progress_bar:
         found = evaluate(settings, progress_bar.of, search_path(arguments))
     lines = table(found.episodes)
-    shown = Table("", "split", "ID", "OOD", "difference", title=f"{settings.policy}: success [%]", title_justify="left")
+    title = f"{settings.policy}: success [%], {settings.rules} rules"
+    shown = Table("", "split", "ID", "OOD", "difference", title=title, title_justify="left")
     for line in lines:
         shown.add_row(*cells(line))
     out.print(shown)
     write(settings.folder / "table.md", markdown(lines, settings))
-    write_json(str(settings.folder / "table.json"), {"policy": settings.policy, "table": plain(lines)})
+    told = {"policy": settings.policy, "rules": settings.rules, "table": plain(lines)}
+    write_json(str(settings.folder / "table.json"), told)
     called = names(map(Pool.open, settings.folders), found.lost)
     for scenario, why in found.lost.items():
         warn(f"UNKNOWN {called[scenario]}: {why}; its episodes are left out")

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import compose, task_files
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
-from ..episode import Episode, Outcome
+from ..episode import STRICT, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..orientation import Orientation
 from ..params import Value
@@ -131,6 +131,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         scenario: str | None = None,
         split: str | None = None,
         action_repeat: int = 1,
+        rules: Rules = STRICT,
     ):
         """Open the pools.
 
@@ -153,6 +154,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             action_repeat: control periods for which an action is held, 4 for data of 25 Hz. The controller, the events,
                 the goal and the filter keep running at 100 Hz; the filter gets the same action several times. The
                 time limit in seconds does not change. A step ends early if the episode ends.
+            rules: "strict", those of the certificates, or "paper", without the failures that the paper lacks
+                (docs/paper.md).
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
@@ -162,9 +165,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         _check_render_mode(render_mode)
         check_filter(action_filter)
         _check_action_repeat(action_repeat)
+        check_rules(rules)
         check_size(width=width, height=height)
         self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
+        self.rules: Rules = rules
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._rows = chosen(rows, scenario, split)
@@ -341,7 +346,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._scenario = self.task.scenario(row.params)
         self._row = row
         self._world.reset()
-        self._episode = Episode(self._scenario, self._world, row.horizon)
+        self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
     def _advance(self, action: NDArray[np.floating]) -> Outcome | None:
         return self._episode.step(self.world.filter(action) if self.action_filter else unfiltered(action))

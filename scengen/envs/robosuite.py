@@ -21,7 +21,7 @@ from .. import compose, task_files
 from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
 from ..control.teleop import check_filter
-from ..episode import Episode
+from ..episode import STRICT, Episode, Rules, check_rules
 from ..errors import BadConfig, PoolError, UnknownName
 from ..pictures.opengl import check_size, current, release
 from ..pool import PoolRow
@@ -94,6 +94,7 @@ class RobosuiteEnv(ManipulationEnv):
         control_freq: int = 100,
         horizon: int | None = None,
         action_filter: str | None = None,
+        rules: Rules = STRICT,
         reward_scale: float = 1.0,
         reward_shaping: bool = False,
         **arguments: Any,
@@ -110,6 +111,7 @@ class RobosuiteEnv(ManipulationEnv):
             gripper_types: "default" for the hands of the task; other hands are refused.
             control_freq: actions per second.
             horizon: actions in an episode. Default: the task's time limit.
+            rules: "strict", those of the certificates, or "paper", without the failures that the paper lacks.
             action_filter: None, the paper's interface for policies; or "teleop" for the filter of teleoperation and of
                 the oracles, which is defined for 100 Hz.
             reward_scale: reward of a reached goal.
@@ -121,12 +123,14 @@ class RobosuiteEnv(ManipulationEnv):
                 MuJoCo or robosuite; pictures cannot have this size, or are turned by a quarter and are not square.
         """
         _check_filter_rate(action_filter, control_freq)
+        check_rules(rules)
         if reward_shaping:
             raise BadConfig("reward_shaping = True; the only reward is that of the goal: give reward_shaping=False")
         for name in ("camera_widths", "camera_heights"):
             for edge in np.atleast_1d(np.array(arguments.get(name, ()), object)):
                 check_size(**{name: edge})
         self.action_filter, self.reward_scale, self.use_object_obs = action_filter, reward_scale, use_object_obs
+        self.rules: Rules = rules
         self.task = compose.load_task(self.NAME, self.SEARCH)
         self._choice = _choice(self.NAME, scenario, pool)
         grippers = self._certified_grippers(gripper_types)
@@ -270,7 +274,7 @@ class RobosuiteEnv(ManipulationEnv):
             controller.new_update = True
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
-        self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon), 0
+        self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon, self.rules), 0
         self._begun = False
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
+from ..episode import STRICT, check_rules
 from ..errors import BadConfig, PoolError, ScengenError, at_least
 from ..pool import Pool, collection
 from ..pool.library import Library
@@ -47,6 +48,7 @@ class EvaluateSettings:
     fresh: bool = False
     action_filter: str | None = None
     action_repeat: int = 1
+    rules: str = STRICT
 
     @cached_property
     def folders(self) -> list[str]:
@@ -61,6 +63,7 @@ class EvaluateSettings:
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         check_filter(self.action_filter)
+        check_rules(self.rules)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
         if self.action_repeat != 1 and self.policy in FULL_RATE_POLICIES:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.policy} acts at 100 Hz: leave it out")
@@ -167,7 +170,7 @@ def _first_scenarios(pool: Pool, seeds: int) -> Scenarios:
 
 def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
     """Everything on which the outcome of a rollout depends. More seeds or rollouts continue the same run."""
-    names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat")
+    names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules")
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
@@ -247,6 +250,7 @@ class PolicyPlayer:
                 height=settings.height,
                 action_filter=settings.action_filter,
                 action_repeat=settings.action_repeat,
+                rules=check_rules(settings.rules),
                 settle=True,
                 search=self.search,
             )

@@ -54,7 +54,8 @@ def markdown(lines: Sequence[TableLine], settings: EvaluateSettings) -> str:
     """The table as Markdown, rates and 95 % intervals in percent."""
     head = (
         f"Policy `{settings.policy}`: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
-        f"{settings.rollouts} rollouts each\n\n| | split | ID | OOD | difference |\n|---|---|---|---|---|\n"
+        f"{settings.rollouts} rollouts each, {settings.rules} rules\n\n"
+        "| | split | ID | OOD | difference |\n|---|---|---|---|---|\n"
     )
     return head + "".join(f"| {' | '.join(cells(line))} |\n" for line in lines)
 

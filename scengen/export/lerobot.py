@@ -15,6 +15,7 @@ which it reaches LeRobot's usual size.
 import json
 from collections import defaultdict
 from collections.abc import Mapping
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -195,7 +196,8 @@ class DatasetWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._close()
+        with suppress(OSError) if error else nullcontext():  # the first error counts
+            self._close()
 
     def _write(self, columns: Mapping[str, np.ndarray]) -> None:
         path = self.folder / DATA_PATH.format(**_chunk_and_file(self._file))

@@ -1,5 +1,6 @@
 """MP4 files. Needs PyAV (`pip install scengen[record]`), whose wheels include FFmpeg."""
 
+from contextlib import nullcontext, suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -46,6 +47,7 @@ class Movie:
         except ImportError:
             raise NoVideo("no PyAV for MP4 files; run pip install 'scengen[record]'") from None
         self.path, self.fps, self.frames = path, fps, 0
+        self._closed = False
         self._encode = av.VideoFrame.from_ndarray
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,9 +67,14 @@ class Movie:
         self.frames += 1
 
     def close(self) -> None:
-        """Write the remaining frames and the index."""
-        self._file.mux(self._stream.encode())
-        self._file.close()
+        """Write the remaining frames and the index, unless this has been tried before."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._file.mux(self._stream.encode())
+        finally:
+            self._file.close()
 
     def __enter__(self) -> "Movie":
         return self
@@ -75,4 +82,5 @@ class Movie:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        with suppress(OSError) if error else nullcontext():  # the first error counts
+            self.close()

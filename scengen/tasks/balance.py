@@ -36,7 +36,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import PAD, PALM_ACROSS, PALM_ALONG, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
@@ -85,7 +85,7 @@ class Balance(Scenario):
         if fallen(world, "rod"):
             return "the rod fell off the table"
         let_go = not world.touching(ROBOT, "rod")
-        return "the rod was let go and tipped" if let_go and world.tilt("rod") > MAX_TILT else None
+        return Strict("the rod was let go and tipped") if let_go and world.tilt("rod") > MAX_TILT else None
 
     # --- oracle ---------------------------------------------------------------------------
 

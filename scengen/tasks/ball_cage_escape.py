@@ -39,7 +39,7 @@ from ..geometry import UP, Mat3, Vec3, about_z, shortest
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, turn_about_vertical, turn_to, wait
@@ -98,14 +98,14 @@ class BallCageEscape(Scenario):
     def failure(self, world: World) -> str | None:
         if fallen(world, "ball", below=0.0):
             return "the ball fell off the table"
-        if world.touched("cage", "table") or fallen(world, "cage", below=0.0):
-            return "the cage was dropped or set down"
+        if fallen(world, "cage", below=0.0):
+            return "the cage fell off the table"
         at, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
         if self.cage.traps(at, r):
             return "the ball fell into the trap"
         if self.cage.on_sill(at, r) and lean(world.rot("cage")) < self.cage.tilt_over_sill(r) - TILT_TOLERANCE:
-            return "the ball was shaken over the sill"
-        return None
+            return Strict("the ball was shaken over the sill")
+        return Strict("the cage was dropped or set down") if world.touched("cage", "table") else None
 
     def out(self, world: World) -> bool:
         """Whether the whole ball is outside the cuboid that the cage fills."""

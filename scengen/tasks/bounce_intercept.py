@@ -20,14 +20,14 @@ Decisions, where the paper (App. B, T13) is silent:
 * The walls take 12 to 20 % of the speed in training, like fresh cushions; a bounce takes 22 ms.
 * The hand may be anywhere, also between the walls. If it touches the ball before the ball has met a wall, the episode
   is lost: that catch would be another task (T12). "Above the table" means 4 cm higher than before, as there.
-* Strict rules that the paper lacks (`launched_ball`). The hand waits within 3 cm of where it is when the ball leaves
+* Strict rules that the paper lacks (`launched_ball`). The hand waits within 25 mm of where it is when the ball leaves
   the last wall, and the first touch is the catch. Otherwise T12 after the bounce was enough: a hand that followed the
   ball caught 8 of 12, and one that went ahead on its straight line 11 of 12; now 0 of 12. A policy may still correct
   its place for the speed that the wall took. "The catchable zone" of the paper begins 6 cm from the walls: a hand that
   followed a slow ball up to a wall (axis `dead_walls`) was in its place when the ball left it.
 * Aims, places and both sides are drawn so widely that no place serves many: after a bounce, 16 % of the balls come
   within 20 mm of the best one, between open fingers that are turned the right way there. A hand that hovers over the
-  best of many places, and moves 3 cm after the bounce, catches 10 of 60.
+  best of many places, and moves 25 mm after the bounce, catches 10 of 60.
 
 The oracle predicts again after every bounce: the speed after a bounce depends on when in a time step the ball meets the
 wall.
@@ -49,7 +49,7 @@ from ..params import param
 from ..physics import GRAVITY, SPIN, slipping
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Plan, Refutation, Shortcut, on_table, require
+from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.motion import Condition
@@ -115,12 +115,14 @@ class BounceIntercept(LaunchedBall):
         return world.touching("enclosure", "ball")
 
     def failure(self, world: World) -> str | None:
+        if lost := super().failure(world):
+            return lost
         if world.touching(ROBOT, "ball") and not world.memory["bounces"]:
-            return "the robot touched the ball before it was thrown back"
+            return Strict("the robot touched the ball before it was thrown back")
         first = world.touching(ROBOT, "ball") and not world.memory["first_touch"]
         if first and self._wall_distance(world.com("ball")) < CATCHABLE_DISTANCE:
-            return "the robot touched the ball at a wall"
-        return super().failure(world)
+            return Strict("the robot touched the ball at a wall")
+        return None
 
     # --- oracle ---------------------------------------------------------------------------
 

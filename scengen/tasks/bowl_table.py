@@ -48,7 +48,7 @@ from ..predicates import fallen, over
 from ..robots import panda
 from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, motion, suction
 from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over
@@ -120,10 +120,11 @@ class BowlTable(Scenario):
         if fallen(world, "bowl"):
             return "the bowl fell off the table"
         if world.velocity("bowl")[5] < -MAX_FALL_SPEED:
-            return "the bowl was dropped"
+            return Strict("the bowl was dropped")
         touched, tilt = world.touching_bodies("bowl") - {ROBOT}, world.tilt("bowl")
         stored = touched == {"rack"} and tilt > math.pi - FALL_ANGLE
-        return "the bowl lay on its side or upside down" if touched and tilt > FALL_ANGLE and not stored else None
+        askew = touched and tilt > FALL_ANGLE and not stored
+        return Strict("the bowl lay on its side or upside down") if askew else None
 
     # --- oracle ---------------------------------------------------------------------------
 

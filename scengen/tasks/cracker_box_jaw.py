@@ -38,7 +38,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
-from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
@@ -83,9 +83,9 @@ class CrackerBoxJaw(BoxAndSlot):
         return flat and seated(world, "box", "slot", self.seat, SEAT_TOLERANCE, HEIGHT_TOLERANCE)
 
     def failure(self, world: World) -> str | None:
-        if self.let_go_steep(world):
-            return "the box was let go steeply in the slot"
-        return "the box fell off the table" if fallen(world, "box") else None
+        if fallen(world, "box"):
+            return "the box fell off the table"
+        return Strict("the box was let go steeply in the slot") if self.let_go_steep(world) else None
 
     def let_go_steep(self, world: World) -> bool:
         """Whether the box stands in the slot, or falls in it, from more than the angle at which it may be let go."""

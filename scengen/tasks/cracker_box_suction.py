@@ -36,7 +36,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
-from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import poke
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, push, retreat, turn_to, until
@@ -81,7 +81,7 @@ class CrackerBoxSuction(BoxAndSlot):
     def failure(self, world: World) -> str | None:
         if fallen(world, "box"):
             return "the box fell off the table"
-        return "the box was dropped" if self.fall_speed(world) > MAX_FALL_SPEED else None
+        return Strict("the box was dropped") if self.fall_speed(world) > MAX_FALL_SPEED else None
 
     def fall_speed(self, world: World) -> float:
         """Speed of the box' fastest corner on its way down [m/s]."""

@@ -41,7 +41,7 @@ from ..predicates import fallen
 from ..robots import panda
 from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
 from ..robots.suction import PULL
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, motion, suction
 from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
@@ -102,9 +102,9 @@ class CupInversion(Scenario):
         if fallen(world, "cup"):
             return "the cup fell off the table"
         if world.velocity("cup")[5] < -MAX_FALL_SPEED and not world.touching(ROBOT, "cup"):
-            return "the cup was dropped"
+            return Strict("the cup was dropped")
         askew = FALL_ANGLE < world.tilt("cup") < INVERTED_ANGLE
-        return "the cup was knocked over" if askew and world.touching("cup", "table") else None
+        return Strict("the cup was knocked over") if askew and world.touching("cup", "table") else None
 
     # --- oracle ---------------------------------------------------------------------------
 

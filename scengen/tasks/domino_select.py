@@ -44,7 +44,7 @@ from ..geometry import UP, Vec3, about_z, heading
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import go_to, push, retreat, wait
@@ -99,11 +99,11 @@ class DominoSelect(Scenario):
     def failure(self, world: World) -> str | None:
         firsts = [f"tile_{k}_0" for k in range(LANES)]
         if touched_only(world, *firsts):
-            return "the robot touched a slab or a tile other than a first one"
+            return Strict("the robot touched a slab or a tile other than a first one")
         if len(touched := [tile for tile in firsts if world.touched(ROBOT, tile)]) > 1:
-            return "the robot touched a second chain"
+            return Strict("the robot touched a second chain")
         away = any(carried(world, tile, self.feet[tile], CARRY_TOLERANCE) for tile in touched)
-        return "the robot carried the first tile away" if away else None
+        return Strict("the robot carried the first tile away") if away else None
 
     # --- oracle ---------------------------------------------------------------------------
 

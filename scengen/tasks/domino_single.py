@@ -26,7 +26,7 @@ from ..geometry import UP, Vec3, heading
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import COARSE, FINE, go_to, push, wait
@@ -73,9 +73,9 @@ class DominoSingle(Scenario):
         if world.touched(ROBOT, "slab"):
             return "the robot touched the slab"
         if touched_only(world, "tile_0"):
-            return "the robot touched a tile other than the first"
+            return Strict("the robot touched a tile other than the first")
         if carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE):
-            return "the robot carried the first tile away"
+            return Strict("the robot carried the first tile away")
         return None
 
     # --- oracle ---------------------------------------------------------------------------

@@ -38,7 +38,7 @@ from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners
 from ..params import param
 from ..robots import jaw
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, grasp, pick, put, release
 from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
@@ -81,13 +81,13 @@ class GalileoRampDrop(Scenario):
     def failure(self, world: World) -> str | None:
         along, touching = self.along(world.com("ball")), world.touching(ROBOT, "ball")
         if along > 0.0 and touching:
-            return "the robot touched the ball beyond the middle of the ramp"
+            return Strict("the robot touched the ball beyond the middle of the ramp")
         if touching and world.touched("ball", "ramp/far"):
-            return "the ball was touched again after its run"
+            return Strict("the ball was touched again after its run")
         if not touching and self.gap(world.com("ball")) > 0.01:  # at its release a ball hops by 1 to 2 mm
-            return "the ball was not let go on the floor of the ramp"
+            return Strict("the ball was not let go on the floor of the ramp")
         if along > self.patch_edge:
-            return "the ball went past the patch"
+            return Strict("the ball went past the patch")
         return None
 
     # --- oracle ---------------------------------------------------------------------------

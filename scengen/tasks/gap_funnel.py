@@ -45,7 +45,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills import motion
 from ..skills.jaw import carry, pick, release
@@ -108,10 +108,10 @@ class GapFunnel(Scenario):
         if fallen(world, "ball"):
             return "the ball fell off the table"
         if world.touched("ball", "wall"):
-            return "the ball struck the wall"
+            return Strict("the ball struck the wall")
         if world.touching(ROBOT, "ball") and (world.com("ball") - self.gap_at) @ self.normal > 0.0:
-            return "the robot touched the ball behind the wall"
-        return "the ball was lifted" if world.com("ball")[2] - self.start[2] > MAX_RISE else None
+            return Strict("the robot touched the ball behind the wall")
+        return Strict("the ball was lifted") if world.com("ball")[2] - self.start[2] > MAX_RISE else None
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -36,7 +36,19 @@ from ..geometry import UP, Outline, Vec3, corners, gap
 from ..params import check_bounds, param
 from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
-from ..scenario import Action, Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import (
+    Action,
+    Answer,
+    Plan,
+    Planner,
+    Refutation,
+    Scenario,
+    Shortcut,
+    Strict,
+    on_table,
+    require,
+    within_reach,
+)
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put, release, weigh
@@ -108,13 +120,13 @@ class MassSort(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
-        for cube, rank in self.belongs(world).items():
-            zone = self.zone_of(world, cube)
-            if zone is not None and zone != rank:
-                return "a cube was put into a wrong zone"
-            if zone is not None and not self.probed(world):
-                return "a cube was put into a zone before each had been lifted"
-        return "a cube fell off the table" if fallen(world, *self.cubes) else None
+        zones = {cube: self.zone_of(world, cube) for cube in self.cubes}
+        if any(zones[cube] not in (None, rank) for cube, rank in self.belongs(world).items()):
+            return "a cube was put into a wrong zone"
+        if fallen(world, *self.cubes):
+            return "a cube fell off the table"
+        early = any(zone is not None for zone in zones.values()) and not self.probed(world)
+        return Strict("a cube was put into a zone before each had been lifted") if early else None
 
     def events(self, world: World) -> None:
         """Notice which cubes have been lifted."""

@@ -42,7 +42,7 @@ from ..geometry import UP, Outline, Vec3, about_z, corners, gap
 from ..params import check_bounds, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, STEADY, closing_along, go_to, push, retreat
@@ -121,11 +121,13 @@ class OccluderPush(Scenario):
 
     def failure(self, world: World) -> str | None:
         red = self.cubes[self.reddest(world)]
+        if fallen(world, red):
+            return "the red cube fell off the table"
         for cube in self.cubes:
             let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
             if cube != red and let_go and self.on_patch(world, cube):
-                return "another cube was put on the patch"
-        return "the red cube fell off the table" if fallen(world, red) else None
+                return Strict("another cube was put on the patch")
+        return None
 
     def reddest(self, world: World) -> int:
         """Index of the red cube, by its colour in the scene."""

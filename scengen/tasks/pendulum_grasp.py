@@ -46,7 +46,7 @@ from ..params import param
 from ..predicates import still
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp
@@ -135,10 +135,10 @@ class PendulumGrasp(Scenario):
 
     def failure(self, world: World) -> str | None:
         if world.touching(ROBOT, BOB) and not self.at_apex(world):
-            return "the robot touched the pendulum away from its turning point"
+            return Strict("the robot touched the pendulum away from its turning point")
         if world.arm.gap < MISS_SHARE * 2 * self.pendulum.radius or self.missed(world):
-            return "the jaw closed on nothing"
-        return "the jaw did not close from wide open" if self.narrow(world) else None
+            return Strict("the jaw closed on nothing")
+        return Strict("the jaw did not close from wide open") if self.narrow(world) else None
 
     def missed(self, world: World) -> bool:
         """Whether a jaw that was wide open has begun to close and not met the bob in time. A rule of ours."""

@@ -26,7 +26,7 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
 from ..predicates import fallen
 from ..robots.jaw import PALM_ABOVE, TIP_BELOW
-from ..scenario import Plan, Scenario
+from ..scenario import Plan, Scenario, Strict
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw, motion
 from ..skills.handover import CLOSING, LEFT, OVERLAP, STAND_OFF, sideways, steepness, take_rim
@@ -112,13 +112,13 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
         return float(min(faces) - self.plate.radius * math.sqrt(1.0 - min(1.0, normal[2] ** 2)))
 
     def failure(self, world: World) -> str | None:
+        if fallen(world, "plate"):
+            return "the plate fell off the table"
         # A rim up to 10 mm higher than that of a plate that lies on the table counts as lying.
         lies = self.lowest(world) < TABLE_TOP + self.plate.rise + 0.010
         if lies and float(np.abs(self.middle(world)[:2]).max()) > TABLE_HALF - EDGE_MARGIN - self.plate.radius:
-            return "the plate was pushed to the table's edge"
-        if fallen(world, "plate"):
-            return "the plate fell off the table"
-        return "the plate was dropped" if world.velocity("plate")[5] < -MAX_FALL_SPEED else None
+            return Strict("the plate was pushed to the table's edge")
+        return Strict("the plate was dropped") if world.velocity("plate")[5] < -MAX_FALL_SPEED else None
 
     # --- attempts with one jaw --------------------------------------------------------------
 

@@ -41,7 +41,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
 from ..robots.jaw import FINGER_ACROSS, PAD, PALM_ABOVE, TIP_BELOW, pinch
-from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills import jaw
 from ..skills.handover import OVERLAP, STAND_OFF, steepness, take_rim
@@ -76,9 +76,8 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
     proud: float = param(0.04, "m", 0.0, 0.1)  # height by which the plate stands out of the slot
 
     def failure(self, world: World) -> str | None:
-        if world.touching("plate", "shelf") and not self.over_slot(world):
-            return "the plate knocked against the shelf"
-        return super().failure(world)
+        knocked = world.touching("plate", "shelf") and not self.over_slot(world)
+        return super().failure(world) or (Strict("the plate knocked against the shelf") if knocked else None)
 
     def over_slot(self, world: World) -> bool:
         """Whether the plate is on edge within 30 deg, its middle over the slot or in it."""

@@ -40,7 +40,7 @@ from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
 from ..params import param
 from ..physics import GRAVITY
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import COARSE, Pace, closing_along, go_to, push, wait
@@ -140,12 +140,13 @@ class RampSort(Scenario):
             ball, side = f"ball_{i}", self.arrived(world, i)
             if side == (-red_side if red else red_side):
                 return "a ball is in the bin of the other colour"
-            if side and not world.touched(ball, "ramp"):
-                return "a ball came into its bin without the ramp"
             if world.touched(ball, "table") or world.com(ball)[2] < TABLE_TOP:
                 return "a ball is on the table or on the floor"
+        for i in range(len(self.colours)):
+            if self.arrived(world, i) and not world.touched(f"ball_{i}", "ramp"):
+                return Strict("a ball came into its bin without the ramp")
             if self.high_over_ramp(world, i):
-                return "a ball was carried over the ramp or the bins"
+                return Strict("a ball was carried over the ramp or the bins")
         return None
 
     def arrived(self, world: World, i: int) -> int:

@@ -43,7 +43,7 @@ from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat
@@ -111,10 +111,12 @@ class SeesawBalance(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
+        if fallen(world, *world.free_bodies):
+            return "a block fell off the table"
         others = {ROBOT, *world.free_bodies} - {"target"}
         if any(world.touched(other, "target") for other in others):
-            return "the target was touched"
-        return "a block fell" if world.touched("target", "table") or fallen(world, *world.free_bodies) else None
+            return Strict("the target was touched")
+        return Strict("the target fell on the table") if world.touched("target", "table") else None
 
     def along(self, world: World, block: str) -> float:
         """Place of a block along the deck, from the axle [m]."""

@@ -34,7 +34,7 @@ from ..geometry import UP, Vec3, about_z
 from ..params import check_bounds, param
 from ..predicates import fallen, still
 from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
 from ..skills.motion import OPEN, Pace, closing_along, go_to, hand_yaw, retreat
@@ -112,7 +112,7 @@ class ShapeStack(Scenario):
         if fallen(world, *self.pieces):
             return "a shape fell off the table"
         toppled = (n for n in self.pieces if world.tilt(n) > FALL_ANGLE and not world.touching(ROBOT, n))
-        return "a shape toppled" if next(toppled, None) else None
+        return Strict("a shape toppled") if next(toppled, None) else None
 
     # --- oracle ---------------------------------------------------------------------------
 

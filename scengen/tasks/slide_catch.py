@@ -44,7 +44,7 @@ from ..geometry import UP, Vec3, about_z, yaw_of
 from ..params import check_bounds, param
 from ..physics import slid, slip_angle
 from ..predicates import fallen, still
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
@@ -133,20 +133,20 @@ class SlideCatch(Scenario):
         return all(self.caught(world, block, 0.005) and still(world, block, 0.02) for block in self.blocks)
 
     def failure(self, world: World) -> str | None:
+        if any(world.touching(block, "table") for block in self.blocks):
+            return "a block fell on the table"
+        if fallen(world, "bin", *self.blocks):
+            return "something fell off the table"
         for block in self.blocks:
             if world.touching(ROBOT, block):
-                return "the robot touched a block"
-            if world.touching(block, "table"):
-                return "a block fell on the table"
+                return Strict("the robot touched a block")
             if world.touching("bin", block) and self.on_ramp(world, block):
-                return "the bin touched a block on the ramp"
+                return Strict("the bin touched a block on the ramp")
         if world.touching(ROBOT, "incline/slab"):
-            return "the robot touched the ramp"
+            return Strict("the robot touched the ramp")
         if self.turned(world):
-            return "the bin was turned while the ramp tilted"
-        if world.tilt("bin") > math.radians(20.0):
-            return "the bin tipped over"
-        return "something fell off the table" if fallen(world, "bin", *self.blocks) else None
+            return Strict("the bin was turned while the ramp tilted")
+        return Strict("the bin tipped over") if world.tilt("bin") > math.radians(20.0) else None
 
     def turned(self, world: World) -> bool:
         """Whether the ramp has begun to tilt, and the bin is not square to the lip."""

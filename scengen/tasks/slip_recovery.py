@@ -48,7 +48,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.grip import extent, take
@@ -130,9 +130,9 @@ class SlipRecovery(Scenario):
     def failure(self, world: World) -> str | None:
         if world.memory["slid"] > MAX_SLIDE:
             return "the robot slid the thing over the table"
-        if world.memory["kept"]:
-            return "the hand kept the thing through a slip"
-        return "the thing fell off the table" if fallen(world, "thing") else None
+        if fallen(world, "thing"):
+            return "the thing fell off the table"
+        return Strict("the hand kept the thing through a slip") if world.memory["kept"] else None
 
     def events(self, world: World) -> None:
         """Track where the object is carried and pushed, and open the jaw at the place of a slip."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import ACTION, Loop
 from ..control.teleop import MOTION, unfiltered
-from ..episode import Actions, Episode, Outcome
+from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
@@ -124,6 +124,7 @@ def run(
     jitter: Jitter | None = None,
     until_settled: bool = False,
     raw: bool = False,
+    rules: Rules = STRICT,
 ) -> Rollout:
     """Play a plan from the start of `world` until success, failure or the horizon.
 
@@ -135,10 +136,11 @@ def run(
         until_settled: whether the episode may end once the plan has ended, everything is at rest, and no event is
             pending.
         raw: whether actions go to the controller as they are, clipped; else through the teleoperation filter.
+        rules: rules that end the episode.
     """
     world.reset()
     stillness = Stillness(scenario, world) if until_settled else None
-    return _play(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness)
+    return _play(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness, rules)
 
 
 def replay(
@@ -148,11 +150,12 @@ def replay(
     horizon: float,
     settle: float = 1.0,
     until_settled: bool = False,
+    rules: Rules = STRICT,
 ) -> Rollout:
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
     stillness = Stillness(scenario, world) if until_settled else None
-    return _play(scenario, world, _Recorded(world, actions), horizon, settle, stillness)
+    return _play(scenario, world, _Recorded(world, actions), horizon, settle, stillness, rules)
 
 
 def try_shortcut(
@@ -241,9 +244,10 @@ def _play(
     horizon: float,
     settle: float,
     stillness: Stillness | None,
+    rules: Rules = STRICT,
 ) -> Rollout:
     actions: list[NDArray[np.float32]] = []
-    episode = Episode(scenario, world, horizon)
+    episode = Episode(scenario, world, horizon, rules)
 
     def step() -> Outcome | None:
         actions.append(source.next())

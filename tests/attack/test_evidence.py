@@ -131,7 +131,7 @@ def test_a_pipe_is_no_hit(tmp_path, capsys, command):
 
 
 def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("scengen.attack.campaign.player_of", lambda subject: os._exit(3))
+    monkeypatch.setattr("scengen.attack.campaign.player_of", lambda subject, rules: os._exit(3))
     argv = ["attack", "task=domino_single", "n=1", "budget=2", "tiers=[random]", f"to={tmp_path}"]
     assert cli.run(argv) == 2
     assert "unknown: the attack on" in capsys.readouterr().out

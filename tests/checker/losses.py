@@ -75,7 +75,7 @@ def _hit(make: Callable[[Path], None]) -> Callable[[Path], None]:
 def _npz(**about: Any) -> Callable[[Path], None]:
     """A hit whose description has these entries."""
     whole = {"scenario": "0" * 12, "tier": "retry", "raw": False, "plan": "", "seconds": 1.0, "digest": "0" * 16,
-             "lacks": [], "unmoved": [], "params": {}, "task": "domino_single", **about}  # fmt: skip
+             "lacks": [], "unmoved": [], "params": {}, "task": "domino_single", "rules": "strict", **about}  # fmt: skip
     return lambda path: np.savez(path, actions=np.zeros((3, 7), np.float32), about=json.dumps(whole))
 
 

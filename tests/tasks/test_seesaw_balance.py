@@ -218,7 +218,7 @@ def test_without_the_counterweight_the_witness_levels_nothing():
 
 
 def test_dropping_the_target_loses():
-    assert SeesawBalance().failure(settled(SeesawBalance(), -0.1, 0.33)) == "a block fell"
+    assert SeesawBalance().failure(settled(SeesawBalance(), -0.1, 0.33)) == "the target fell on the table"
 
 
 @pytest.mark.parametrize("index", range(2))
