@@ -103,8 +103,8 @@ def test_a_hand_that_follows_it_touches_it_too_soon_or_does_not_reach_it(name):
     assert not play_shortcut(TASK, CATCH, name).solved
 
 
-@pytest.mark.parametrize(("aside", "caught"), [(0.0, True), (0.02, True), (0.045, False)])
-def test_a_hand_may_correct_its_place_by_three_centimetres_after_the_bounce(aside, caught):
+@pytest.mark.parametrize(("aside", "caught"), [(0.0, True), (0.015, True), (0.045, False)])
+def test_a_hand_may_correct_its_place_by_25_millimetres_after_the_bounce(aside, caught):
     """It waits along the path before or behind the place where it then catches the ball."""
 
     def late(world):
