@@ -16,7 +16,7 @@ Decisions, where the paper (App. B, T12) is silent:
   axis. The ball has half of that speed and leaves the table after three to six seconds. A faster ball would leave no
   time for the way to its path.
 * Two strict rules that the paper lacks (`launched_ball`). The hand waits while the ball is within 15 cm, 0.8 to 1.1 s
-  before it arrives, and the first touch is the catch. A hand that followed the ball caught 12 of 12 without them.
+  before it arrives, and the first touch is the catch. A hand that followed the ball caught 10 of 12 without them.
 * Paths are 14 to 45 deg off the way straight across the table. With paths within 20 deg, a hand that followed the ball
   along a line across its way, and closed when it saw it 25 mm before the line, caught 24 of 24 without these rules. Now
   it is 4 to 11 cm beside the place when it must wait: 2 of 60, and 8 of 60 if it follows by half.
