@@ -22,7 +22,7 @@ from ..validate.rollout import run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.targets import write
-from .adversary import PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
+from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
 from .evidence import Hit, TierRate, rates, unsound
 from .experience import Experience, experience
 from .player import Player
@@ -62,6 +62,12 @@ class AttackSettings:
     json: str | None = None
 
     @property
+    def observed(self) -> bool:
+        """Whether observations are searched for hidden parameters: on request, and by default for draws of a task."""
+        asked = [self.tiers] if isinstance(self.tiers, str) else self.tiers
+        return self.pool is None if asked is None else LEAKS in asked
+
+    @property
     def chosen(self) -> tuple[str, ...]:
         """The tiers that are played."""
         asked = [self.tiers] if isinstance(self.tiers, str) else self.tiers
@@ -72,8 +78,8 @@ class AttackSettings:
         check_rules(self.rules)
         at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
         for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
-            if tier not in TIERS:
-                raise UnknownName("tier", tier, TIERS)
+            if tier not in (*TIERS, LEAKS):
+                raise UnknownName("tier", tier, (*TIERS, LEAKS))
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,14 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 
 from .. import compose
+from ..analysis.leaks import Leaks, leaks
 from ..analysis.redraw import task_of
-from ..attack.adversary import TIERS
+from ..attack.adversary import LEAKS, TIERS
 from ..attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
 from ..attack.evidence import spelled
 from ..attack.priors import Prior
@@ -21,17 +23,23 @@ from ..work.targets import try_file, try_folder
 from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
 from .settings import read
 
+LEAK_DRAWS = 200
+"""Number of draws whose observations are searched for hidden parameters."""
+
 
 def command(arguments: Arguments) -> int:
     settings = read("attack", arguments, AttackSettings)
     settings.check()
     if settings.tiers is not None and not settings.tiers:
-        raise BadConfig(f"tiers = []; an attack without tiers finds nothing; give some of {', '.join(TIERS)}")
+        raise BadConfig(f"tiers = []; an attack without tiers finds nothing; give some of {', '.join((*TIERS, LEAKS))}")
     try_file(settings.json)
     try_folder(settings.to)
     task, subjects = _subjects(arguments, settings)
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
+    told = _leaks(task, settings) if settings.observed else None
+    if not settings.chosen:
+        return OK
     with ProgressBar(err, f"attack {task.name}", len(subjects), settings.workers) as progress_bar:
 
         def progress(done: int, hits: int) -> None:
@@ -47,8 +55,19 @@ def command(arguments: Arguments) -> int:
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
-        write_json(settings.json, report.plain())
+        write_json(settings.json, {**report.plain(), "leaks": asdict(told) if told else None})
     return FAILED if report.refuting else BAD_INPUT if report.lost else OK
+
+
+def _leaks(task: Task, settings: AttackSettings) -> Leaks:
+    """Search observations for hidden parameters, and print what they tell."""
+    with ProgressBar(err, f"observe {task.name}", LEAK_DRAWS, settings.workers) as progress_bar:
+        found = leaks(task, settings.split, LEAK_DRAWS, settings.seed, settings.workers, progress_bar.show)
+    what = f"{len(found.hidden)} hidden parameters in {found.draws} draws of {found.split}"
+    say(f"{what}: observations tell {len(found.found)}")
+    for leak in found.found:
+        warn(f"LEAK {leak.stream} tells {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
+    return found
 
 
 def _subjects(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Sequence[Subject]]:

@@ -1,7 +1,9 @@
 """Poses and velocities of all bodies of a scene: robosuite's `object-state`, for state-based policies.
 
-It is privileged, but contains only what perfect vision could measure: poses and velocities of the bodies, and no
-parameter. Velocities are those of a body's origin, because those of the centre of mass would reveal its position.
+It is privileged, but contains only what very good vision could measure: poses and velocities of the bodies, and no
+parameter. Velocities are those of a body's origin, because those of the centre of mass would reveal its position. All
+readings have the resolution of a sensor, `RESOLUTION`: the micrometres by which a body sinks into its support, or the
+hundredths of a degree by which it leans on a stop, would reveal its mass.
 
     <body>_pos  <body>_quat                            in the world [m], xyzw
     <body>_vel_lin  <body>_vel_ang                     of its origin, world axes [m/s], [rad/s]
@@ -48,6 +50,10 @@ POSE_SIZE = sum(map(len, POSE.values()))
 BOUNDS = {"pos": 3.0, "quat": 1.0, "vel_lin": 100.0, "vel_ang": 1000.0}
 """Largest absolute value of each part, to which readings are clipped: far beyond the room [m], and beyond the speeds
 of all bodies here [m/s], [rad/s]."""
+
+RESOLUTION = {"pos": 1e-4, "quat": 4.4e-4, "vel_lin": 1e-3, "vel_ang": 1e-2}
+"""Resolution of each part, in the world: 0.1 mm, 0.05 deg (entries of a quaternion are those of half the angle), 1 mm/s
+and 0.6 deg/s. Readings relative to a hand follow from the rounded ones, so that moving the hand gives no finer ones."""
 
 
 def xyzw(rot: Mat3) -> NDArray[np.float64]:
@@ -118,8 +124,10 @@ class ObjectState:
         model, data = world.model, world.data
         found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in self.ordered]
         ids = np.maximum(found, 0, dtype=int)  # -1 if there is no such body
-        pos, rot = data.xpos[ids], data.xmat[ids].reshape(-1, 3, 3)
-        ang, lin = _velocities(world, pos, ids)
+        pos, rot = rounded(data.xpos[ids], "pos"), _rounded_rots(data.xquat[ids])
+        ang, lin = (
+            rounded(v, kind) for v, kind in zip(_velocities(world, data.xpos[ids], ids), _VELOCITIES, strict=True)
+        )
         frames = [_frame(pos, rot, lin, ang)]
         for arm in world.arms:
             hand, axes, moved = arm.hand, arm.hand_rot, model.site(Names(arm.number).grip_site).bodyid
@@ -136,6 +144,25 @@ class ObjectState:
             kinds = {**POSE, **MOTION} if self.bodies[body] else POSE
             for frame in ("", *(f"to_{Names(number).arm}eef_" for number in range(self.arms))):
                 yield from ((f"{body}_{frame}{kind}", entries) for kind, entries in kinds.items())
+
+
+_VELOCITIES = ("vel_ang", "vel_lin")
+
+
+def rounded(values: NDArray[np.float64], kind: str) -> NDArray[np.float64]:
+    """Values at the resolution of a part."""
+    return np.round(values / RESOLUTION[kind]) * RESOLUTION[kind]
+
+
+def _rounded_rots(quats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orientations at the resolution of quaternions, shape (n, 3, 3), of quaternions wxyz, shape (n, 4)."""
+    rots, row = np.empty((len(quats), 3, 3)), np.empty(9)
+    coarse = rounded(quats, "quat")
+    coarse /= np.linalg.norm(coarse, axis=1, keepdims=True)
+    for rot, quat in zip(rots, coarse, strict=True):
+        mujoco.mju_quat2Mat(row, quat)
+        rot[:] = row.reshape(3, 3)
+    return rots
 
 
 def _frame(

@@ -22,7 +22,7 @@ from ..orientation import Orientation
 from ..robots.panda import JOINTS, MAX_ARMS, Names
 from ..scenario import Scenario
 from ..sim.world import JAW, Arm, World, hands
-from .object_state import NAME, POSE, ObjectState, xyzw
+from .object_state import NAME, POSE, ObjectState, rounded, xyzw
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
@@ -134,7 +134,7 @@ def _body_streams(state: ObjectState) -> dict[str, Stream]:
 
 
 def _seen_position(body: str, orientation: Callable[[], Orientation]) -> Stream:
-    return Stream(POSE["pos"], 3.0, lambda world: orientation().seen_at(world.pos(body)))
+    return Stream(POSE["pos"], 3.0, lambda world: orientation().seen_at(rounded(world.pos(body), "pos")))
 
 
 OWN_POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")

@@ -31,7 +31,7 @@ from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
 from ..validate.identity import check_versions
 from ..validate.playable import scene_errors
-from .object_state import ObjectState, bodies_of
+from .object_state import ObjectState, bodies_of, rounded
 from .observations import turns_pictures
 from .pools import Folders, chosen, rows_of
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
@@ -349,7 +349,7 @@ class RobosuiteEnv(ManipulationEnv):
         def shown(body: str) -> Callable[[Any], NDArray[np.float64]]:
             @sensor(modality="seen")
             def seen(_: Any) -> NDArray[np.float64]:
-                return self.scenario.orientation.seen_at(self.world.pos(body))
+                return self.scenario.orientation.seen_at(rounded(self.world.pos(body), "pos"))
 
             return seen
 

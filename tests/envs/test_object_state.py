@@ -10,7 +10,8 @@ from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE
 
 from scengen import list_tasks, load_task
-from scengen.envs.object_state import ObjectState, bodies_of
+from scengen.envs.object_state import RESOLUTION, ObjectState, bodies_of
+from scengen.geometry import between
 from scengen.params import values, with_values
 from scengen.pool import Pool
 from scengen.samplers.split import ID
@@ -87,13 +88,29 @@ def test_velocities_are_the_change_of_the_poses(flight, name):
 
 
 def test_the_hand_sees_what_stands_where_it_is_seen(flight):
+    """Readings relative to the hand follow from the rounded ones: no motion of the hand gives finer ones."""
     state, world, read, _ = flight
     hand, axes = world.arm.hand, world.arm.hand_rot
-    assert np.allclose(hand + axes @ entries(state, read, "slab_to_robot0_eef_pos"), world.pos("slab"))
-    turned = np.empty(9)
+    seen = entries(state, read, "slab_pos")
+    assert np.allclose(hand + axes @ entries(state, read, "slab_to_robot0_eef_pos"), seen, atol=1e-12)
+    assert 0 < np.abs(seen - world.pos("slab")).max() <= RESOLUTION["pos"] / 2 + 1e-12
+    turned, alone = np.empty(9), np.empty(9)
     mujoco.mju_quat2Mat(turned, np.roll(entries(state, read, "slab_to_robot0_eef_quat"), 1))
-    assert np.allclose(axes @ turned.reshape(3, 3), world.rot("slab"))
-    assert np.allclose(entries(state, read, "slab_pos"), world.pos("slab"))
+    mujoco.mju_quat2Mat(alone, np.roll(entries(state, read, "slab_quat"), 1))
+    assert np.allclose(axes @ turned.reshape(3, 3), alone.reshape(3, 3))
+    assert np.degrees(np.linalg.norm(between(alone.reshape(3, 3), world.rot("slab")))) < 0.06
+
+
+def test_what_is_finer_than_the_resolution_is_not_read(flight):
+    state, world, _, _ = flight
+    world = World.load(next(Pool.open(REFERENCE).rows()).scene_xml)
+    start = world.pos("slab")
+    for shift, seen in ((4e-6, False), (3e-4, True)):
+        body = world.body("slab")
+        world.data.xpos[body] = np.round(start, 4) + shift
+        moved = state.read(world)
+        world.data.xpos[body] = np.round(start, 4)
+        assert (state.read(world) != moved).any() == seen
 
 
 def test_a_body_that_a_scenario_lacks_reads_zero_and_the_others_keep_their_places():
