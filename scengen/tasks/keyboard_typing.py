@@ -17,7 +17,11 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
 * The agent is the right arm, as in every episode of the paper, and acts with 7 numbers. The left arm is part of the
   scene: events move it by a law of memory and poses alone, so that an episode can be saved, restored and repeated. It
   types in its turn when the agent's hand is `MIN_CLEARANCE` beside the keyboard, then goes home to its own side. If the
-  agent comes back while the partner is on its way to a key, the partner turns round; it finishes a press once begun.
+  agent comes back before the letter counts, the partner turns round and waits anew.
+* The partner pauses before each of its turns, for a time that the agent is not told. An agent whose hand stays beside
+  the keyboard for `TURN_LIMIT` in its own turn has let its turn go by, and the episode ends. The paper has neither. The
+  two close turn-taking by the clock, without a look at the partner or at the bold letters: the best fixed wait fits a
+  quarter of the turns, and in training there are two in a word. The partner's motion tells a turn, too.
 * A letter is typed when an arm touches its key, and no other, for `hold` without a break. A shorter touch is allowed.
   Holding a key that is not next, or the other's, or several at once ends the episode, and so does contact of the arms.
   A typed key must be released before it counts again.
@@ -58,7 +62,10 @@ MIN_CLEARANCE = 0.15
 PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.20])  # of the agent's hand, out of the partner's way [m]
 PARTNER_HOME: Vec3 = PARKED_HAND * [1.0, -1.0, 1.0]  # of the partner's hand, out of the agent's way [m]
 TRAVEL_HEIGHT = 0.10  # above the keys, of hands on their way [m]
-TURN_TIMEOUT = 20.0  # after which the oracle stops waiting for a turn [s]
+TURN_LIMIT = 2.5
+"""Longest time that the agent's hand may stay beside the keyboard in its own turn, the partner being out of the way
+[s]; the oracle needs 0.3 to 0.6 s."""
+TURN_TIMEOUT = 40.0  # after which the oracle stops waiting for a turn [s]
 TIME_MARGIN = 0.05  # beyond `hold`, for which shortcuts press a key [s]
 TIP_HALF_WIDTH = 0.013  # of the closed finger tips, along y [m]
 MAX_REACH = 0.70
@@ -72,9 +79,10 @@ COLOURS: tuple[tuple[Rgba, Rgba, Rgba], ...] = (
 """Colours of a cap, of a faint and of a bold letter: the partner's, the agent's."""
 SEVERAL_KEYS = -1  # number that stands in memory for more than one key at once
 MISTAKES = ("", "several keys were held at once", "the letter was not next", "the letter was the other robot's")
-MEMORY = ("typed", "mistake", "key_0", "held_0", "key_1", "held_1")
+MEMORY = ("typed", "mistake", "key_0", "held_0", "key_1", "held_1", "waited")
 """Number of letters typed; number of the mistake; for each arm the key that it touches, counted from 1, or
-`SEVERAL_KEYS`, and the time for which it has touched it without a break [s]."""
+`SEVERAL_KEYS`, and the time for which it has touched it without a break [s]; in the partner's turn the time since the
+agent was last in its way, in the agent's turn the time that it let go by [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +95,9 @@ class KeyboardTyping(Scenario):
     hold: float = param(0.2, "s", 0.05, 1.0, hidden=True)
     """Time that a key must be touched until it counts; the move is called `motion.hold`."""
     pace: float = param(0.22, "m/s", 0.05, 0.30)  # speed of the partner's hand
+    first_pause: float = param(0.0, "s", 0.0, 20.0, hidden=True)  # of the partner, before its first turn
+    second_pause: float = param(0.0, "s", 0.0, 20.0, hidden=True)  # before its second turn
+    third_pause: float = param(0.0, "s", 0.0, 20.0, hidden=True)  # before its third turn; later turns have none
     x: float = param(-0.10, "m", -0.2, 0.1)
     y: float = param(0.0, "m", -0.1, 0.1)
     yaw: float = param(0.0, "deg", -30.0, 30.0)
@@ -126,6 +137,8 @@ class KeyboardTyping(Scenario):
             return mistake
         if world.touched("robot0", "robot1"):
             return "the arms touched each other"
+        if self.late(world):
+            return "the agent let its turn go by"
         return "the keyboard fell off the table" if fallen(world, "keyboard") else None
 
     def events(self, world: World) -> None:
@@ -133,6 +146,7 @@ class KeyboardTyping(Scenario):
         (partner,) = world.partners
         for arm in (world.arm, partner):
             self._watch_keys(world, arm)
+        self._watch_turn(world)
         keyboard = world.body("keyboard")
         for k in range(int(world.memory["typed"])):
             world.move(f"typed_{k}", world.data.xpos[keyboard], world.data.xquat[keyboard])
@@ -163,18 +177,30 @@ class KeyboardTyping(Scenario):
         elif self.owns(k) != (arm.number == 0):
             world.memory["mistake"] = 3.0
         else:
-            world.memory["typed"] = k + 1.0
+            world.memory["typed"], world.memory["waited"] = k + 1.0, 0.0
+
+    def _watch_turn(self, world: World) -> None:
+        """Measure for how long the partner could have typed without a break, or the agent has let its turn go by."""
+        memory, beside = world.memory, self.beside(world, world.arm)
+        if self.partner_next(world):
+            memory["waited"] = memory["waited"] + Loop.PERIOD if beside else 0.0
+        elif beside and self.beside(world, *world.partners):
+            memory["waited"] += Loop.PERIOD
+
+    def late(self, world: World) -> bool:
+        """Whether the agent has stayed beside the keyboard for too long in its own turn; the paper has no such rule."""
+        k = int(world.memory["typed"])
+        return k < len(self.letters) and self.owns(k) and world.memory["waited"] > TURN_LIMIT
 
     def pending(self, world: World) -> bool:
-        """Whether the partner has a letter to type and may go there."""
-        return self._partner_key(world, *world.partners) is not None
+        """Whether the partner has a letter to type, and goes there by itself after a pause."""
+        return self.partner_next(world) and self.beside(world, world.arm)
 
-    def _partner_key(self, world: World, arm: Arm) -> Vec3 | None:
+    def _partner_key(self, world: World) -> Vec3 | None:
         """Position of the key that the partner is going for [m], or None."""
         k = int(world.memory["typed"])
-        if k == len(self.letters) or self.owns(k) or world.memory["mistake"]:
-            return None
-        return self.key(world, k) if self.beside(world, world.arm) or not self._is_up(world, arm) else None
+        goes = self.partner_next(world) and world.memory["waited"] > self.pause(k)
+        return self.key(world, k) if goes else None
 
     def _is_up(self, world: World, arm: Arm) -> bool:
         """Whether a hand is at the height at which hands travel, or at most 20 mm below."""
@@ -186,7 +212,7 @@ class KeyboardTyping(Scenario):
 
     def _partner_action(self, world: World, arm: Arm) -> Action:
         """Action of the partner, a law of where its hand is now: over the key, down until it counts, up, home."""
-        key, hand, up = self._partner_key(world, arm), arm.hand, self._is_up(world, arm)
+        key, hand, up = self._partner_key(world), arm.hand, self._is_up(world, arm)
         spot = PARTNER_HOME if key is None else key
         travel_z, off = self._travel_z(world), math.hypot(*(spot - hand)[:2])
         # It goes down within 4 mm of the key's middle. While down it may be 10 mm off: at 12 it touches the neighbour.
@@ -329,7 +355,8 @@ class KeyboardTyping(Scenario):
             yield require(away <= MAX_REACH, "a key is out of its owner's reach", away=away, reach=MAX_REACH)
 
     def features(self) -> Mapping[str, float]:
-        """Length of the word, the agent's share of it, and what a press needs: way [m], clearance [m], time [s]."""
+        """Length of the word, the agent's share of it, and what a press needs: way [m], clearance [m], time [s];
+        speed of the partner [m/s], its pauses [s], yaw [rad]."""
         keys = [self.keyboard.at(self.letters[k]) for k in self.own]
         return {
             "letters": float(len(self.letters)),
@@ -339,6 +366,7 @@ class KeyboardTyping(Scenario):
             "room_beside_a_finger": self.keyboard.pitch - self.keyboard.cap / 2 - TIP_HALF_WIDTH,
             "time_on_a_key": self.hold,
             "partner_speed": self.pace,
+            "pauses": self.first_pause + self.second_pause + self.third_pause,
             "keyboard_yaw": math.radians(self.yaw),
         }
 
@@ -357,6 +385,17 @@ class KeyboardTyping(Scenario):
     def own(self) -> list[int]:
         """The agent's places."""
         return [k for k in range(len(self.letters)) if self.owns(k)]
+
+    def partner_next(self, world: World) -> bool:
+        """Whether the next letter is the partner's."""
+        k = int(world.memory["typed"])
+        return k < len(self.letters) and not self.owns(k) and not world.memory["mistake"]
+
+    def pause(self, k: int) -> float:
+        """Time for which the partner waits before it types a place of the word [s]: none within a turn."""
+        starts = [j for j in range(k + 1) if not self.owns(j) and (j == 0 or self.owns(j - 1))]
+        pauses = (self.first_pause, self.second_pause, self.third_pause)
+        return pauses[len(starts) - 1] if starts[-1] == k and len(starts) <= len(pauses) else 0.0
 
     @property
     def spot(self) -> Vec3:

@@ -31,6 +31,7 @@ from scengen.tasks.keyboard_typing import (
     MISTAKES,
     PARTNER_HOME,
     TRAINING_WORDS,
+    TURN_LIMIT,
     UNSEEN_WORDS,
     WORDS,
     KeyboardTyping,
@@ -177,6 +178,50 @@ def test_the_partner_waits_as_long_as_the_agent_is_in_its_way(world):
     (partner,) = world.partners
     assert NOMINAL.beside(world, partner) and not NOMINAL.beside(world, world.arm) and not NOMINAL.pending(world)
     assert np.linalg.norm(partner.hand - PARTNER_HOME) < 0.01 and world.memory["typed"] == 0
+
+
+def test_each_turn_of_the_partner_has_its_pause_and_letters_within_a_turn_have_none():
+    """T, L and E are the agent's in TROUBLE: the partner's turns are R O U, B, and none."""
+    scenario = KeyboardTyping(word=WORDS.index("TROUBLE"), mine=0b1010001, first_pause=3.0, second_pause=5.0)
+    assert scenario.letters == "TROUBLE"
+    assert [scenario.pause(k) for k in (1, 2, 3, 5)] == [3.0, 0.0, 0.0, 5.0]
+
+
+def beside_until(episode, world, stop, seconds=8.0):
+    """Go beside the keyboard and stay there; returns the time that this took when `stop` was true [s]."""
+    for action in episode.scenario.make_room(world):
+        if episode.scenario.beside(world, world.arm):
+            break
+        episode.step(world.filter(action))
+    begin = world.time
+    while not stop() and episode.outcome is None and world.time < begin + seconds:
+        episode.step(world.filter(world.arm.idle))
+    return world.time - begin
+
+
+def test_the_partner_pauses_and_waits_anew_when_the_agent_comes_back():
+    scenario = replace(NOMINAL, first_pause=3.0)
+    world = load(TASK, scenario)
+    episode, (partner,) = Episode(scenario, world), world.partners
+    moved = lambda: np.linalg.norm(partner.hand - PARTNER_HOME) > 0.02  # noqa: E731
+    for _ in range(300):  # it goes home
+        episode.step(world.filter(world.arm.idle))
+    assert beside_until(episode, world, moved, seconds=2.5) == pytest.approx(2.5, abs=0.02) and not moved()
+    for action in scenario.press(world, 1, seconds=0.0):
+        episode.step(world.filter(action))
+        if not scenario.beside(world, world.arm):
+            break
+    episode.step(world.filter(world.arm.idle))
+    assert world.memory["waited"] == 0.0 and not moved()
+    assert 2.5 < beside_until(episode, world, moved) < 3.5 and moved()
+
+
+def test_a_turn_that_the_agent_lets_go_by_ends_the_episode():
+    scenario = replace(NOMINAL, mine=0b00011)
+    world = load(TASK, scenario)
+    episode = Episode(scenario, world)
+    assert beside_until(episode, world, lambda: False) == pytest.approx(TURN_LIMIT, abs=1.0)
+    assert episode.outcome == "failure" and scenario.failure(world) == "the agent let its turn go by"
 
 
 @dataclass(frozen=True, kw_only=True)
