@@ -350,7 +350,7 @@ def test_robosuite_makes_it_with_its_usual_arguments(row):
     observations = env.reset()
     assert {"robot0_eef_pos", "robot0_joint_pos", "robot0_proprio-state", "object-state"} <= observations.keys()
     np.testing.assert_allclose(observations["slab_pos"], env.world.pos("slab"), atol=RESOLUTION["pos"] / 2 + 1e-9)
-    np.testing.assert_allclose(observations["slab_quat"], np.roll(env.world.data.body("slab").xquat, -1), atol=1e-12)
+    np.testing.assert_allclose(observations["slab_quat"], np.roll(env.world.data.body("slab").xquat, -1), atol=3e-4)
     assert np.abs(env.world.data.qpos[env.robots[0]._ref_joint_pos_indexes] - env.robots[0].init_qpos).max() > 1e-3
     assert env.action_dim == 7
     assert [env.step(IDLE)[2] for _ in range(3)] == [False, False, True]
