@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +23,8 @@ from scengen.sim.world import World
 from scengen.validate.rollout import replay, run
 
 BASE = Path(__file__).parent / "checker" / "base"
-POOLS = sorted(path.parent for path in BASE.glob("*_id/manifest.json"))
+POOLS = sorted(path.parent for path in BASE.glob("*/manifest.json") if re.search(r"_(id|paper)$", path.parent.name))
+"""A pool of the training split of every task but one, and of each OOD condition of the paper."""
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,18 @@ TRAINING = {
 }
 """A pool of the training split of every task but the first, by its name."""
 
+PAPER = {
+    "rack_paper": ("sheltered_grasp", "opposite_side"),
+    "pendulum_paper": ("pendulum_grasp", "plane_45"),
+    "single_paper": ("domino_single", "diagonal"),
+    "tool_paper": ("tool_retrieve", "mirrored_hook"),
+    "lids_paper": ("occluder_push", "stacked_lids"),
+    "slip_paper": ("slip_recovery", "two_slips"),
+    "balance_paper": ("balance_medium", "turned"),
+    "typing_paper": ("keyboard_typing", "unseen_words"),
+}
+"""A pool of each OOD condition of the paper (App. I)."""
+
 POOLS: dict[str, tuple[str, ...]] = {
     # at the known settings
     "single_quick": ("task=domino_single", "n=2"),
@@ -88,6 +100,7 @@ POOLS: dict[str, tuple[str, ...]] = {
     "single_kept": ("task=domino_single", "split=edge", "n=1", "keep=unknown,refuted", "certify=full", EDGE),
     # the other tasks
     **{name: (f"task={task}", "n=1", *QUICKLY) for name, task in TRAINING.items()},
+    **{name: (f"task={task}", f"split={split}", "n=1", *QUICKLY) for name, (task, split) in PAPER.items()},
     "select_composed": ("task=domino_select", "split=diagonal+narrow_lanes@2", "n=1", *QUICKLY),
     "galileo_severity": ("task=galileo_ramp_drop", "split=high_patch@2", "n=1", *QUICKLY),
     "cage_severity": ("task=ball_cage_escape", "split=low_stool@1", "n=1", *QUICKLY),
@@ -98,7 +111,7 @@ POOLS: dict[str, tuple[str, ...]] = {
 """Arguments of `scengen generate`, by the name of the pool."""
 
 
-KEPT = ("single_quick", "single_severity", *TRAINING)
+KEPT = ("single_quick", "single_severity", *TRAINING, *PAPER)
 """Those in the repository."""
 
 
@@ -136,6 +149,6 @@ def expired(folder: Path) -> bool:
 
 
 if __name__ == "__main__":
-    for name in KEPT:
+    for name in sys.argv[1:] or KEPT:
         make(name, BASE / name)
         print(f"{name}: {sum(path.stat().st_size for path in (BASE / name).iterdir()) // 1000} kB", flush=True)
