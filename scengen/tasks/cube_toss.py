@@ -56,7 +56,7 @@ from ..physics import flight
 from ..predicates import seated
 from ..robots import jaw
 from ..robots.panda import BASE, REACH
-from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.grip import take
 from ..skills.jaw import release
@@ -152,9 +152,9 @@ class CubeToss(Scenario):
         return lies and math.sqrt(slips @ slips) < REST_SPEED
 
     def failure(self, world: World) -> str | None:
-        if self.struck_rim(world):
-            return "the cube struck the rim of the tray"
-        return "the cube fell on the floor" if world.touching("cube", "world") else None
+        if world.touching("cube", "world"):
+            return "the cube fell on the floor"
+        return Strict("the cube struck the rim of the tray") if self.struck_rim(world) else None
 
     def struck_rim(self, world: World) -> bool:
         """Whether the cube has touched the rim of the tray; the paper has no such rule."""

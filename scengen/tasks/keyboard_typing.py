@@ -45,7 +45,7 @@ from ..geometry import UP, Vec3, about_z, between, quat
 from ..params import param
 from ..predicates import fallen
 from ..robots import panda
-from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, require
+from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, require
 from ..sim.memory import remember
 from ..sim.world import Arm, World
 from ..skills import motion
@@ -135,11 +135,11 @@ class KeyboardTyping(Scenario):
     def failure(self, world: World) -> str | None:
         if mistake := MISTAKES[int(world.memory["mistake"])]:
             return mistake
+        if fallen(world, "keyboard"):
+            return "the keyboard fell off the table"
         if world.touched("robot0", "robot1"):
-            return "the arms touched each other"
-        if self.late(world):
-            return "the agent let its turn go by"
-        return "the keyboard fell off the table" if fallen(world, "keyboard") else None
+            return Strict("the arms touched each other")
+        return Strict("the agent let its turn go by") if self.late(world) else None
 
     def events(self, world: World) -> None:
         """Count what is typed, show it, and move the partner."""

@@ -1,4 +1,4 @@
-"""A rod stays on the ridge if its centre of mass is over it; the place is hidden, and the wrist can measure it."""
+"""A rod stays upright on the ridge if its centre of mass is over it; the side of lead is seen."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,23 +18,25 @@ from controls import (
 )
 
 from scengen import load_task
-from scengen.assets.prop import TABLE_TOP
+from scengen.assets.inlaid_rod import InlaidRod
 from scengen.assets.ridge import Ridge
-from scengen.assets.rod import Rod
-from scengen.attack.priors import fit
+from scengen.geometry import UP, about_z
 from scengen.params import parameters
-from scengen.sim import scene_text
-from scengen.sim.world import IDLE, World
-from scengen.tasks.balance import MAX_TILT, Balance
+from scengen.predicates import rests_on
+from scengen.sim.world import IDLE
+from scengen.skills.jaw import grasp, release
+from scengen.tasks.balance import MAX_FALL_SPEED, MAX_TILT, RELEASE_TIME, RIDGE, UprightRod
 
 MEDIUM, HARD = load_task("balance_medium"), load_task("balance_hard")
 BOTH = pytest.mark.parametrize("task", [MEDIUM, HARD], ids=lambda task: task.name)
-ROD = Balance()
+ROD = UprightRod()
+NARROW = UprightRod(ridge=Ridge(width=0.008, height=0.05))
+LOPSIDED = UprightRod(rod=InlaidRod(com=0.0085))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Laid(Balance):
-    """The rod lies on the ridge from the start, with its centre of mass off the middle of it."""
+class Stood(UprightRod):
+    """The rod stands on the ridge from the start, with its centre of mass off the middle of it."""
 
     OFF = 0.0
 
@@ -43,12 +45,12 @@ class Laid(Balance):
         return self.top + (self.OFF - self.rod.com) * self.normal
 
 
-def laid(off, **changes):
-    """A scenario whose rod lies across the ridge from the start, `off` balance [m]."""
-    return type("Laid", (Laid,), {"OFF": off})(**changes)
+def stood(off, **changes):
+    """A scenario whose rod stands on the ridge from the start, `off` its middle [m]."""
+    return type("Stood", (Stood,), {"OFF": off})(**changes)
 
 
-def left_alone(scenario, seconds=1.5):
+def left_alone(scenario, seconds=2.0):
     """The world after some time without actions."""
     world = load(MEDIUM, scenario)
     for _ in range(round(100 * seconds)):
@@ -59,13 +61,12 @@ def left_alone(scenario, seconds=1.5):
 # --- the law of the task ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("share", "balanced"), [(0.0, True), (-0.9, True), (0.9, True), (-1.1, False), (1.1, False)])
+@pytest.mark.parametrize(("share", "balanced"), [(0.0, True), (-0.85, True), (0.85, True), (-1.1, False), (1.1, False)])
+@pytest.mark.parametrize("com", [0.0, 0.008])
 @BOTH
-def test_the_goal_holds_if_the_centre_of_mass_is_over_the_ridge_and_beyond_its_edge_the_rod_is_lost(
-    task, share, balanced
-):
-    ridge = task.draw("id", 0, 0).scenario.ridge
-    scenario = laid(share * ridge.width / 2, ridge=ridge)
+def test_the_rod_stays_up_if_its_centre_of_mass_is_over_the_ridge_and_is_lost_beyond(task, com, share, balanced):
+    ridge = replace(task.draw("id", 0, 0).scenario.ridge, length=0.12)
+    scenario = stood(share * ridge.width / 2, ridge=ridge, rod=InlaidRod(com=com))
     world = left_alone(scenario)
     assert scenario.success(world) == balanced
     assert balanced or scenario.failure(world) == "the rod was let go and tipped"
@@ -76,112 +77,101 @@ def test_a_ridge_is_as_wide_as_the_paper_says():
     assert {HARD.draw("id", 0, i).scenario.ridge.width for i in range(5)} == {0.008}
 
 
-@pytest.mark.parametrize(("turned", "counts"), [(25.0, True), (35.0, False), (90.0, False)])
-def test_a_rod_counts_only_if_it_crosses_the_ridge(turned, counts):
-    scenario = laid(0.0, rod_yaw=turned, rod=Rod(com=0.0))
-    assert scenario.success(left_alone(scenario)) == counts
-
-
-@pytest.mark.parametrize(("com", "mass"), [(0.085, 0.10), (0.04, 0.15), (-0.085, 0.15)])
-def test_the_oracle_feels_the_centre_of_mass_to_a_millimetre_and_reads_it_nowhere(com, mass, monkeypatch):
-    """With parameters of another rod, it does the same to the bit."""
-    felt, lay = [], Balance.lay
-
-    def watched(self, world, along, yaw=0.0):
-        felt.append(along)
-        yield from lay(self, world, along, yaw)
-
-    monkeypatch.setattr(Balance, "lay", watched)
-    scenario = replace(ROD, rod=Rod(com=com, mass=mass))
-    misled = replace(scenario, rod=Rod(com=-0.03, mass=0.12))
-    rollout = play(HARD, scenario, misled.oracle)
-    assert rollout.solved and felt == pytest.approx([com], abs=0.001)
-    assert np.array_equal(rollout.actions, play(HARD, scenario, scenario.oracle).actions)
-
-
-# --- what is hidden ---------------------------------------------------------------------
-
-
-def test_scenes_that_differ_in_what_is_hidden_only_are_the_same_to_the_eye():
-    """Only masses and what depends on them may differ in the compiled model: no size, colour, place, name or order."""
-    rods = Rod(com=0.08, mass=0.10), Rod(com=-0.03, mass=0.15)
-    worlds = [World.load(scene_text.emit(replace(ROD, rod=r).build())[0], visual=True) for r in rods]
-    a, b = (world.model for world in worlds)
-    assert a.names == b.names and not (a.cam_mode.any() or a.light_mode.any()), "no camera follows a centre of mass"
-    arrays = {name: (getattr(a, name), getattr(b, name)) for name in dir(a)}
-    arrays = {name: both for name, both in arrays.items() if isinstance(both[0], np.ndarray)}
-    differ = {n for n, (x, y) in arrays.items() if not np.array_equal(x, y, equal_nan=x.dtype.kind == "f")}
-    weights = {"mass", "inertia", "ipos", "subtreemass", "invweight0", "M0", "poscom0"}
-    bounds = {"bvh_aabb", "dof_length"}  # boxes and lengths for fast collisions, seen from the centre of mass
-    assert {"body_mass", "body_ipos"} <= differ
-    assert {name.partition("_")[2] for name in differ - bounds} <= weights, differ
-    assert np.array_equal(worlds[0].data.qpos, worlds[1].data.qpos)
-
-
 @BOTH
-def test_what_the_rod_weighs_and_where_is_declared_hidden_and_independent_of_what_is_seen(task):
-    assert {p.name for p in parameters(ROD) if p.hidden} == {"rod.mass", "rod.com"}
-    drawn = [task.draw("id", 0, i).scenario for i in range(400)]
-    hidden = np.array([[s.rod.com, s.rod.mass] for s in drawn])
-    seen = np.array([[s.rod_x, s.rod_y, s.rod_yaw, s.ridge_x, s.ridge_y, s.ridge_yaw, s.ridge.height] for s in drawn])
-    related = np.corrcoef(np.column_stack([hidden, seen]).T)[:2, 2:]
-    assert np.abs(related).max() < 4 / math.sqrt(len(drawn))
+def test_the_middle_of_the_foot_serves_in_training_and_not_off_centre(task):
+    for index in range(20):
+        training, shifted = (task.draw(split, 0, index).scenario for split in ("id", "off_centre"))
+        assert abs(training.rod.com) < training.ridge.width / 2 < abs(shifted.rod.com)
+        assert "by_the_middle_of_the_foot" not in training.shortcuts()
+        assert "by_the_middle_of_the_foot" in shifted.shortcuts()
+    assert play(task, task.draw("id", 0, 0).scenario, task.draw("id", 0, 0).scenario._by_the_foot).solved
 
 
-@BOTH
-def test_no_fixed_place_along_the_rod_balances_more_than_a_tenth_of_training(task):
-    training, fresh = ([task.draw("id", seed, i).scenario for i in range(250)] for seed in (1, 2))
-    (prior,) = fit(training, fresh=fresh)
-    assert 0.02 < prior.fresh <= 0.10
+def test_nothing_is_hidden():
+    assert not any(p.hidden for p in parameters(ROD))
 
 
 # --- ways around ------------------------------------------------------------------------
 
 
-def test_a_rod_that_tipped_could_be_picked_up_again_and_therefore_it_is_lost():
-    """Repeated attempts would succeed: only the rule makes a failed attempt end the episode."""
-    scenario = replace(ROD, rod=Rod(com=0.05))
-    assert play_shortcut(MEDIUM, scenario, "by_the_middle").reason == "the rod was let go and tipped"
-    patient = unguarded(Balance)(rod=scenario.rod)
-
-    def again(world):
-        yield from patient._lay(world, 0.0)
-        yield from patient._lay(world, patient.rod.com)
-
-    assert play(MEDIUM, patient, again).solved
-    assert not play(MEDIUM, scenario, again).solved
+def test_a_foot_centred_on_the_ridge_does_not_serve_a_lopsided_rod_unless_the_lead_looks_along_the_ridge():
+    assert play_shortcut(MEDIUM, LOPSIDED, "by_the_middle_of_the_foot").reason == "the rod was let go and tipped"
+    turned = UprightRod(rod=LOPSIDED.rod, rod_yaw=85.0)
+    assert not turned.lopsided and play(MEDIUM, turned, turned._by_the_foot).solved
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lenient(Balance):
-    """The goal is a level rod on the ridge and nothing else: it may be held, and lie along the ridge."""
+class Lenient(UprightRod):
+    """The goal is an upright rod that touches the ridge, and nothing else."""
 
     def success(self, world):
-        return world.tilt("rod") <= MAX_TILT and world.touching("rod", "stand/ridge")
+        return world.tilt("rod") <= MAX_TILT and world.touching("rod", RIDGE)
 
 
-@pytest.mark.parametrize("name", ["hold_it_there", "along_the_ridge"])
-def test_held_or_laid_along_the_ridge_it_is_level_and_does_not_count(name):
+@pytest.mark.parametrize("name", ["hold_it_there", "stand_it_on_the_plate"])
+def test_held_or_on_the_plate_it_is_upright_at_the_ridge_and_does_not_count(name):
     assert play_shortcut(MEDIUM, Lenient(), name).solved
     assert not play_shortcut(MEDIUM, ROD, name).solved
 
 
-def test_the_torque_alone_misleads_where_the_rod_is_not_a_common_one():
-    scenario = replace(ROD, rod=Rod(com=0.085, mass=0.10))
-    assert play_shortcut(HARD, scenario, "by_the_torque_alone").reason == "the rod was let go and tipped"
-    assert "by_the_torque_alone" not in replace(ROD, rod=Rod(com=0.085, mass=0.125)).shortcuts()
+def test_a_rod_that_is_dropped_is_lost_though_it_may_stay_up():
+    free = unguarded(UprightRod)()
+    assert play(MEDIUM, free, lambda world: ROD._drop(world)).solved
+    assert play_shortcut(MEDIUM, ROD, "drop_it_from_above").reason == "the rod was dropped"
+    assert MAX_FALL_SPEED**2 / (2 * 9.81) > 0.006
 
 
-def test_without_ridge_or_with_the_slug_elsewhere_the_witness_balances_nothing():
-    ends = ablated(MEDIUM, ROD)
-    assert set(ends) == {"no_ridge", "slug_elsewhere"} and not any(end.solved for end, _ in ends.values())
-    assert ends["slug_elsewhere"][0].reason == "the rod was let go and tipped"
+def again(world):
+    """Open the jaw on the ridge, close it, and open it once more."""
+    yield from ROD.lift(world)
+    yield from ROD.bring(world, ROD.rod.com)
+    yield from release(world.arm, 0.3)
+    yield from grasp(world.arm)
+    yield from ROD.leave(world)
 
 
-@pytest.mark.parametrize("split", ["turned", "high_ridge"])
-def test_memorised_actions_are_lost_where_rod_and_ridge_are_others(split):
-    trained, other = (MEDIUM.draw(which, 0, 1).scenario for which in ("id", split))
-    assert not replayed(MEDIUM, trained, other).solved
+def test_a_rod_that_stood_on_the_ridge_may_not_be_touched_again():
+    assert play(MEDIUM, unguarded(UprightRod)(), again).solved
+    assert play(MEDIUM, ROD, again).reason == "the rod was touched again on the ridge"
+    assert RELEASE_TIME < math.sqrt(2 * ROD.rod.height / (3 * 9.81)), "less than the time constant of its fall"
+
+
+def test_let_go_in_motion_it_falls():
+    assert play_shortcut(MEDIUM, ROD, "let_go_in_motion").reason == "the rod was let go and tipped"
+
+
+def test_without_ridge_or_with_the_lead_on_the_other_side_the_witness_balances_nothing():
+    ends = ablated(MEDIUM, LOPSIDED)
+    assert set(ends) == {"no_ridge", "lead_on_the_other_side"} and not any(end.solved for end, _ in ends.values())
+    assert set(ROD.ablations()) == {"no_ridge"}
+
+
+@pytest.mark.parametrize("split", ["turned", "off_centre", "long_rod", "short_rod", "high_ridge"])
+@BOTH
+def test_memorised_actions_are_lost_where_rod_and_ridge_are_others(task, split):
+    trained, other = (task.draw(which, 0, 1).scenario for which in ("id", split))
+    assert not replayed(task, trained, other).solved
+
+
+# --- the oracle ---------------------------------------------------------------------------
+
+
+def test_the_oracle_puts_the_centre_of_mass_over_the_ridge():
+    world = load(MEDIUM, LOPSIDED)
+    assert play(MEDIUM, LOPSIDED, LOPSIDED.oracle, world).solved
+    assert abs((world.com("rod") - LOPSIDED.top) @ LOPSIDED.normal) < 0.002
+    assert abs((world.pos("rod") - LOPSIDED.top) @ LOPSIDED.normal) > 0.006
+    assert rests_on(world, "rod", RIDGE)
+
+
+@pytest.mark.parametrize("relative", [-80.0, -50.0, -40.0, 0.0, 40.0, 50.0, 80.0])
+def test_the_rod_is_turned_by_less_than_an_eighth(relative):
+    scenario = UprightRod(rod_yaw=0.4 * relative, ridge_yaw=-0.6 * relative)
+    world = load(MEDIUM, scenario)
+    rod, aligned = world.rot("rod"), scenario.aligned(world)
+    assert np.allclose(aligned[:, 2], UP) and rod[:, 0] @ aligned[:, 0] >= math.cos(math.pi / 4) - 1e-9
+    along = about_z(math.radians(scenario.ridge_yaw))[:, 0]
+    assert max(abs(along @ aligned[:, k]) for k in (0, 1)) == pytest.approx(1.0)
 
 
 # --- scenes that must not be certified --------------------------------------------------
@@ -190,34 +180,23 @@ def test_memorised_actions_are_lost_where_rod_and_ridge_are_others(split):
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     each_refuted_for_its_own_reason(
         [
-            replace(ROD, rod=Rod(com=0.12)),
-            replace(ROD, rod=Rod(com=0.01)),
-            replace(ROD, ridge=Ridge(height=0.04)),
-            replace(ROD, rod=Rod(com=0.09, mass=0.3)),
-            replace(ROD, rod_y=0.3),
-            replace(ROD, rod_x=-0.02),
-            replace(ROD, ridge_x=0.3, ridge_y=0.3),
+            replace(ROD, rod=InlaidRod(com=0.012)),
+            replace(ROD, rod_y=0.395),
+            replace(ROD, rod=InlaidRod(com=0.005)),
+            replace(ROD, rod=InlaidRod(width=0.014), ridge=Ridge(width=0.02)),
+            replace(ROD, rod_x=0.0, rod_y=-0.06),
+            replace(ROD, rod=InlaidRod(friction=0.05, height=0.40, com=0.0095)),
+            replace(ROD, ridge_x=0.29, ridge_y=-0.29, rod=InlaidRod(height=0.40)),
         ]
     )
 
 
-def test_a_rod_that_balances_on_its_middle_would_be_solved_without_feeling():
-    easy = unchecked(Balance)(rod=Rod(com=0.002))
-    not_certified(MEDIUM, easy, "shortcuts", "by_the_middle")
+def test_a_lopsided_rod_of_training_would_be_solved_by_its_foot():
+    easy = unchecked(type("Blind", (UprightRod,), {"lopsided": True}))(rod=InlaidRod(com=0.002))
+    not_certified(MEDIUM, easy, "shortcuts", "by_the_middle_of_the_foot")
 
 
-def test_a_rod_that_is_too_heavy_for_the_grip_hangs_and_is_refuted():
-    """Where the constraint says that the pads hold it they do; with twice the torque they do not."""
-    tilts = []
-    for mass in (0.15, 0.35):
-        scenario = replace(ROD, rod=Rod(com=0.09, mass=mass))
-        world = load(MEDIUM, scenario)
-        for action in scenario.lift(world):
-            world.step(action)
-        tilts.append(world.tilt("rod"))
-        assert (scenario.infeasible() is None) == (mass < 0.2)
-    assert tilts[0] < math.radians(3.0) < MAX_TILT < tilts[1]
-
-
-def test_the_rod_starts_on_the_table():
-    assert load(MEDIUM, ROD).pos("rod")[2] == pytest.approx(TABLE_TOP)
+def test_the_rod_starts_upright_on_the_table():
+    world = left_alone(LOPSIDED)
+    assert rests_on(world, "rod", "table") or world.touching_bodies("rod") == {"table"}
+    assert world.tilt("rod") < 1e-3

@@ -1,5 +1,6 @@
 """A cube flies by the law from the moment it is let go; only thrown does it come into the tray."""
 
+import copy
 import math
 from dataclasses import replace
 
@@ -127,22 +128,30 @@ def test_a_flight_goes_on_bit_by_bit_from_a_saved_state(scenario):
 
 
 def test_the_tray_rides_evenly_and_keeps_its_angular_momentum_when_it_takes_the_cube():
-    """Its rail has no friction, and a cube from above does not push it along. The sum is kept within 3 to 8 % in eight
-    draws: the cube strikes the walls of the deep tray at 4 m/s."""
+    """Its rail has no friction, and a cube from above does not push it along. At a time step of 0.1 ms the sum is kept
+    within 1.5 %. At 2 ms, in which a cube of 4 m/s moves by 8 mm, its impact on a wall changes the sum by up to 8 %."""
     world, rate = thrown(RIDE), math.copysign(math.radians(RIDE.rate), RIDE.bearing)
-    inertia, mass = world.model.dof_M0[world.model.joint(RAIL).dofadr[0]], RIDE.cube.mass
+    assert world.hinge(RAIL) == pytest.approx((rate * (world.time - RIDE.launch), rate), rel=0.01)
+    model, data = copy.deepcopy(world.model), mujoco.MjData(world.model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = world.data.qpos, world.data.qvel, world.data.ctrl
+    model.opt.timestep = 0.0001
+    bodies = (world.body("cube"), world.body("tray"))
 
     def momentum():
-        mujoco.mj_forward(world.model, world.data)
-        arm, velocity = world.com("cube") - ROBOT_AXIS, world.velocity("cube")[3:]
-        return inertia * world.hinge(RAIL)[1] + mass * float(np.cross(arm, velocity)[2])
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        arms = [data.subtree_com[body] - ROBOT_AXIS for body in bodies]
+        orbits = [np.cross(arm, data.subtree_linvel[body])[2] for arm, body in zip(arms, bodies, strict=True)]
+        spins = [data.subtree_angmom[body][2] for body in bodies]
+        return float(np.dot(model.body_subtreemass[list(bodies)], orbits) + sum(spins))
 
-    assert world.hinge(RAIL) == pytest.approx((rate * (world.time - RIDE.launch), rate), rel=0.01)
     before = momentum()
+    for _ in range(8000):
+        mujoco.mj_step(model, data)
+    assert momentum() == pytest.approx(before, rel=0.015)
     for _ in range(150):
         world.step(world.idle)
     assert RIDE.success(world)
-    assert momentum() == pytest.approx(before, rel=0.08)
 
 
 def test_where_the_tray_is_when_it_is_thrown_it_falls_behind_it():
