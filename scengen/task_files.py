@@ -107,9 +107,9 @@ class About:
     name: str
     """Name of the task."""
     code: str
-    """Number in the paper, such as T17."""
+    """Number in the paper, such as T17; X1 and so on for a task of our own."""
     category: str
-    """Category, P1 to P7 or M."""
+    """Category: P1 to P7 or M as in the paper, X for a task of our own."""
     instruction: str
     """Instruction for a policy."""
     embodiment: str

@@ -37,7 +37,7 @@ Decisions that hold for all tasks:
 
 def page() -> str:
     """The whole page."""
-    tasks = sorted(map(load_task, list_tasks()), key=lambda task: (task.category == "M", task.category, task.code))
+    tasks = sorted(map(load_task, list_tasks()), key=lambda task: (task.category[:1] != "P", task.category, task.code))
     seen: set[str] = set()
     parts = []
     for task in tasks:

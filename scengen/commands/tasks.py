@@ -26,7 +26,7 @@ def command(arguments: Arguments) -> int:
         raise UnknownName("choice of axes", settings.axes, [PAPER])
     search = search_path(arguments)
     listed = [about(each, search) for each in ([name] if name else task_files.tasks(search))]
-    listed.sort(key=lambda task: (task.category == "M", task.category, task.code))  # as in the paper
+    listed.sort(key=lambda task: (task.category[:1] != "P", task.category, task.code))  # the paper's, then ours
     if name is None and not settings.axes:
         out.print(tasks_table(listed, certified()))
         return OK

@@ -8,7 +8,7 @@
 
 Bottleneck: the ridge, 12 or 8 mm wide, is narrower than the rod. The rod stays up only if its centre of mass is over
 the ridge when it is released, nearly without tilt and speed. A rod 0.2 m high tips from 3.4 deg on 12 mm, from 2.3 deg
-on 8 mm.
+on 8 mm. Contacts yield by 0.25 mm, so that a rod that is released at rest stays up to 4 and 2 mm off the middle.
 
 Decisions where the paper (App. B, T31 and T32) is silent:
 
@@ -139,7 +139,6 @@ class UprightRod(Scenario):
         """
         yield from self.bring(world, across)
         yield from push(world.arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
-        yield from hold(world.arm, 0.3)
         yield from self.leave(world)
 
     def leave(self, world: World) -> Plan:
@@ -253,8 +252,6 @@ class UprightRod(Scenario):
         yield require(rod.possible, "no inlay displaces the centre of mass so much", com=rod.com, width=rod.width)
         yield require(rod.width < OPEN_GAP - 0.01, "the jaw does not open wide enough", width=rod.width, gap=OPEN_GAP)
         off, half = abs(rod.com), ridge.width / 2
-        clear = self.lopsided or off <= half - 2 * HOLD_MARGIN
-        yield require(clear, "a rod that is set down by its foot may stand or fall", off=off, half=half)
         edge = min(half, rod.width / 2 - off)
         yield require(edge >= HOLD_MARGIN, "the centre of mass has no support", edge=edge, needed=HOLD_MARGIN)
         yield require(rod.width > ridge.width, "the rod is narrower than the ridge", rod=rod.width, ridge=ridge.width)

@@ -90,10 +90,10 @@ def test_all_tasks_or_a_category_are_a_sweep():
 
 def test_the_tasks_stand_by_category(capsys):
     _, out, _ = told(capsys, "tasks")
-    codes = [word for line in out.splitlines() for word in line.split() if word[:1] in "TM" and word[1:].isdigit()]
+    codes = [word for line in out.splitlines() for word in line.split() if word[:1] in "TMX" and word[1:].isdigit()]
     categories = {load_task(name).code: task_files.category(name) for name in list_tasks()}
     order = [categories[code] for code in codes]
-    assert order == sorted(order, key=lambda c: (c == "M", c))
+    assert order == sorted(order, key=lambda c: (c[:1] != "P", c))
     assert len(codes) == len(categories)
 
 

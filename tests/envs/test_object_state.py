@@ -67,7 +67,7 @@ def test_what_is_not_hidden_shows():
 
 def test_a_centre_of_mass_that_is_hidden_is_in_no_velocity():
     """The velocity of a body's origin, and not that of its centre of mass."""
-    task = load_task("balance_hard")
+    task = load_task("rod_across")
     state, world = state_of(task), world_of(task.draw(ID, 0, 0).scenario)
     with world.events():
         world.launch("rod", [0.1, 0.2, 0.3], [4.0, 5.0, 6.0])

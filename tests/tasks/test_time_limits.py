@@ -16,7 +16,7 @@ LIMITS = {
 
 
 def test_the_paper_gives_a_mean_for_every_task():
-    assert set(list_tasks()) == set(LIMITS)
+    assert {task for task in list_tasks() if task_files.category(task) != "X"} == set(LIMITS)
 
 
 @pytest.mark.parametrize("task", LIMITS)

@@ -1,0 +1,92 @@
+"""T31: ways to a rod on the ridge without setting it down in its place."""
+
+from hand import Hand
+
+from scengen.geometry import UP
+from scengen.params import values, with_values
+from scengen.scenario import Plan, Scenario
+from scengen.sim.world import ROBOT, World
+from scengen.skills.jaw import grasp, pick, release
+from scengen.skills.motion import OPEN, Pace, go_to, hold, push, retreat
+from scengen.tasks.balance import GRIP_DEPTH, LIFT_HEIGHT, MAX_TILT, RIDGE, UprightRod
+
+
+class Leaned(UprightRod):
+    """The task if a rod counts that the robot touches, as often as it likes."""
+
+    def failure(self, world: World) -> str | None:
+        return None
+
+    def success(self, world: World) -> bool:
+        return world.tilt("rod") <= MAX_TILT and world.touching_bodies("rod") - {ROBOT} == {RIDGE}
+
+
+class AnyTry(UprightRod):
+    """The task without its rules on falls and second tries."""
+
+    def failure(self, world: World) -> str | None:
+        return None
+
+
+def leaned(scenario: Scenario) -> Scenario:
+    return with_values(Leaned(), values(scenario))
+
+
+def any_try(scenario: Scenario) -> Scenario:
+    return with_values(AnyTry(), values(scenario))
+
+
+def hold_its_end(scenario: Scenario, world: World) -> Plan:
+    """Stand the rod on the ridge and keep hold of its end."""
+    assert isinstance(scenario, UprightRod)
+    yield from scenario._hold(world)
+
+
+def lean_on_a_finger(scenario: Scenario, world: World) -> Plan:
+    """Grip the rod across the ridge, put its centre of mass beside the ridge, open the jaw a little: it leans there."""
+    assert isinstance(scenario, UprightRod)
+    arm, rod = world.arm, scenario.rod
+    grip = world.pos("rod") + (rod.height - GRIP_DEPTH) * UP
+    yield from pick(arm, grip, world.rot("rod")[:, 1], above=0.06, lift=LIFT_HEIGHT)
+    yield from scenario.bring(world, rod.com - scenario.ridge.width / 2 - 0.002)
+    yield from push(arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
+    yield from hold(arm, 0.05, OPEN)
+    yield from hold(arm, 3.0, 0.0)
+
+
+def open_a_little_and_catch(scenario: Scenario, world: World) -> Plan:
+    """Open the jaw with the foot on a guess, see the rod tip, catch it, try the next guess."""
+    assert isinstance(scenario, UprightRod)
+    arm, tried = world.arm, scenario.ridge.width / 2 + 0.0015
+    yield from scenario.lift(world)
+    yield from scenario.bring(world, tried)
+    for step in (0.0, -tried / 2, -tried / 2, -tried / 2):
+        yield from retreat(arm, 0.006, Pace(0.05, 0.002))
+        across = world.rot("rod")[:, 1]
+        yield from go_to(arm, arm.hand - step * across, pace=Pace(0.03, 0.0015))
+        yield from push(arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
+        yield from release(arm, 0.12)
+        seen = [world.tilt("rod") > 0.02]
+        for action in hold(arm, 0.12, OPEN):
+            yield action
+            seen.append(world.tilt("rod") > 0.02)
+            if seen[-1]:
+                break
+        if not any(seen):
+            break
+        yield from grasp(arm)
+    yield from scenario.leave(world)
+
+
+def drop_from_above(scenario: Scenario, world: World) -> Plan:
+    """Align the rod over the ridge and let it fall."""
+    assert isinstance(scenario, UprightRod)
+    yield from scenario._drop(world)
+
+
+HANDS = {
+    "hold_its_end": Hand(hold_its_end, leaned),
+    "lean_on_a_finger": Hand(lean_on_a_finger, leaned),
+    "open_a_little_and_catch": Hand(open_a_little_and_catch, any_try),
+    "drop_from_above": Hand(drop_from_above, any_try),
+}
