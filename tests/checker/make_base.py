@@ -45,6 +45,7 @@ TRAINING = {
     "sort_id": "mass_sort",
     "balance_id": "balance_medium",
     "balance_hard_id": "balance_hard",
+    "across_id": "rod_across",
     "edge_id": "edge_slide",
     "box_by_cup_id": "cracker_box_suction",
     "box_by_jaw_id": "cracker_box_jaw",

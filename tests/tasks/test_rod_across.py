@@ -119,7 +119,7 @@ def test_what_the_rod_weighs_and_where_is_declared_hidden_and_independent_of_wha
 
 
 def test_no_fixed_place_along_the_rod_balances_more_than_a_tenth_of_training():
-    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(250)] for seed in (1, 2))
+    training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(1000)] for seed in (1, 2))
     (prior,) = fit(training, fresh=fresh)
     assert 0.02 < prior.fresh <= 0.10
 
