@@ -122,7 +122,8 @@ class Hit:
             return cls(**about, actions=actions)
         except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
             why = cut(" ".join(str(error).split()))
-            raise BadConfig(f"{path} is not a hit of scengen attack, or is damaged: {why}") from None
+            told = f"{path} is not a hit of scengen attack, or is damaged: {why}"
+            raise BadConfig(f"{told}; give one that scengen attack has stored") from None
 
 
 def _plain_hit(about: Any) -> dict[str, Any]:
