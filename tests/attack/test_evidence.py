@@ -123,16 +123,16 @@ def test_what_a_hit_says_is_checked_before_it_is_used(attacked_pool, tmp_path, c
 
 
 @pytest.mark.parametrize("command", ["verify hits={hit}", "film hit={hit} to={to}"])
-def test_a_hit_that_is_missing_is_one_line(tmp_path, capsys):
-    assert cli.run(["verify", f"hits={tmp_path / 'none.npz'}"]) == 2
-    assert "it is missing; give one that scengen attack has stored" in capsys.readouterr().err
-
-
 def test_a_pipe_is_no_hit(tmp_path, capsys, command):
     os.mkfifo(tmp_path / "hit.npz")
     argv = command.format(hit=tmp_path / "hit.npz", to=tmp_path / "strip.png").split()
     assert cli.run(argv) == 2
     assert "is not a plain file" in capsys.readouterr().err
+
+
+def test_a_hit_that_is_missing_is_one_line(tmp_path, capsys):
+    assert cli.run(["verify", f"hits={tmp_path / 'none.npz'}"]) == 2
+    assert "it is missing; give one that scengen attack has stored" in capsys.readouterr().err
 
 
 def test_a_scenario_that_ends_its_process_is_unknown_and_named(tmp_path, capsys, monkeypatch):
