@@ -204,7 +204,7 @@ class UprightRod(Scenario):
         yield from self.bring(world, self.rod.com)
         arm, across = world.arm, self.normal
         yield from go_to(arm, arm.hand - 0.05 * across)
-        yield from push(arm, SLIDE_SPEED * across, until=lambda: (world.com("rod") - self.top) @ across > -0.012)
+        yield from push(arm, SLIDE_SPEED * across, until=lambda: bool((world.com("rod") - self.top) @ across > -0.012))
         end = world.time + 0.25
         yield from push(arm, SLIDE_SPEED * across, until=lambda: world.time > end, grip=OPEN)
         yield from retreat(arm, 0.08)
