@@ -34,12 +34,12 @@ Arguments = Sequence[str]
 
 def say(text: str) -> None:
     """Print a line literally: no markup, colours or control characters."""
-    out.print(printable(text))
+    out.print(printable(text), soft_wrap=True)
 
 
 def warn(text: str, style: str = "red") -> None:
     """Print a line on standard error literally."""
-    err.print(printable(text), style=style)
+    err.print(printable(text), style=style, soft_wrap=True)
 
 
 def remark(text: str) -> None:

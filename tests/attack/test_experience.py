@@ -59,7 +59,7 @@ def test_a_path_is_turned_about_a_point_and_moved_with_it(memories):
 def test_the_best_memory_is_measured_on_the_attacked_scenarios(subjects, memories):
     known = Experience((memories[PARTS],))
     for number, subject in enumerate(subjects):
-        (filtered, raw) = AttackJob(tuple(subjects), 4, 0, (MEMORY,), (), known)(number).rates
+        (filtered, raw) = AttackJob(tuple(subjects), 4, 0, (MEMORY,), (), known=known)(number).rates
         assert (filtered.tier, raw.tier, raw.rollouts) == ("memory_1", "memory_1", 1)
         assert bool(raw.hits) == solved(subject, memories[PARTS])
 

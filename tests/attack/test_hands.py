@@ -31,12 +31,12 @@ def outcome(task, name, index, mended):
 
 
 @pytest.mark.parametrize(("task", "name"), CASES)
-def test_a_cheat_is_closed_and_was_one(task, name):
-    assert any(outcome(task, name, index, mended=False) == "success" for index in range(3))
+def test_a_cheat_is_closed(task, name):
     assert outcome(task, name, 0, mended=True) != "success"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("task", "name"), CASES)
-def test_a_cheat_stays_closed_on_twelve_draws(task, name):
+def test_a_cheat_was_one_and_stays_closed_on_twelve_draws(task, name):
+    assert any(outcome(task, name, index, mended=False) == "success" for index in range(3))
     assert "success" not in [outcome(task, name, index, mended=True) for index in range(12)]
