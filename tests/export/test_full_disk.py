@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 COMMANDS = {
     "record robomimic": ("record to={to}.hdf5 format=robomimic n=1", 100),
     "record lerobot": ("record to={to} cameras=none n=1", 20),
-    "record lerobot with cameras": ("record to={to} n=1 width=160 height=120", 60),
+    "record lerobot with cameras": ("record to={to} n=1 width=160 height=120 cameras=[rgb_exo_right_cam]", 20),
     "export": ("export to={to}", 30),
     "export without robot": ("export to={to} robot=false", 2),
     "publish": ("publish to={to}", 20),
