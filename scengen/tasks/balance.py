@@ -33,22 +33,20 @@ import mujoco
 import numpy as np
 
 from ..assets.inlaid_rod import InlaidRod
-from ..assets.prop import TABLE_TOP, place, table
-from ..assets.ridge import PLATE_MARGIN, Ridge
+from ..assets.ridge import Ridge
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, heading
+from ..geometry import UP, Mat3, about_z, gap
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
-from ..robots.jaw import OPEN_GAP, PALM_ACROSS, PALM_ALONG, pinch
-from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..robots.jaw import OPEN_GAP, pinch
+from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, pick, release
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to
+from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
-MAX_TILT = math.radians(10.0)
-"""Largest tilt of the rod [rad] (paper, App. B)."""
 RELEASE_TIME = 0.1
 """Time without the robot after which a rod on the ridge has been released [s]. Fingers that open rattle for less."""
 MAX_FALL_SPEED = 0.35
@@ -61,11 +59,10 @@ GRIP_DEPTH = 0.025  # distance of the grip below the rod's upper end [m]; the pa
 LIFT_HEIGHT = 0.10  # height to which the rod is lifted [m]
 DROP_HEIGHT = 0.06  # height over the ridge from which a shortcut drops the rod [m]
 SLIDE_SPEED = 0.15  # speed across the ridge at which a shortcut releases the rod [m/s]
-RIDGE = "stand/ridge"
 
 
 @dataclass(frozen=True, kw_only=True)
-class UprightRod(Scenario):
+class UprightRod(RodAndRidge[InlaidRod]):
     """A rod that stands on the table, and a ridge."""
 
     HOLD = 1.0
@@ -82,9 +79,7 @@ class UprightRod(Scenario):
     # --- scene ----------------------------------------------------------------------------
 
     def build(self) -> mujoco.MjSpec:
-        scene = table()
-        place(scene, self.ridge, "stand", self.foot, math.radians(self.ridge_yaw), free=False)
-        place(scene, self.rod, "rod", self.start, math.radians(self.rod_yaw))
+        scene = super().build()
         remember(scene, "alone")
         return scene
 
@@ -273,41 +268,3 @@ class UprightRod(Scenario):
             "grip_height": self.rod.height - GRIP_DEPTH,
             "section": self.rod.width,
         }
-
-    # --- geometry -------------------------------------------------------------------------
-
-    @property
-    def start(self) -> Vec3:
-        """Middle of the rod's foot at the start [m]."""
-        return np.array([self.rod_x, self.rod_y, TABLE_TOP])
-
-    @property
-    def foot(self) -> Vec3:
-        """Point under the middle of the ridge [m]."""
-        return np.array([self.ridge_x, self.ridge_y, TABLE_TOP])
-
-    @property
-    def top(self) -> Vec3:
-        """Middle of the ridge's upper face [m]."""
-        return self.foot + self.ridge.height * UP
-
-    @property
-    def normal(self) -> Vec3:
-        """Level unit vector across the ridge."""
-        return heading(self.ridge_yaw + 90.0)
-
-    @property
-    def outline(self) -> Outline:
-        """Outline of the rod's foot [m]."""
-        return corners(self.start, math.radians(self.rod_yaw), self.rod.size)
-
-    @property
-    def hand_over_rod(self) -> Outline:
-        """Outline of the palm over the rod, before it is lifted [m]."""
-        return corners(self.start, math.radians(self.rod_yaw), [2 * PALM_ALONG, 2 * PALM_ACROSS])
-
-    @property
-    def stand_outline(self) -> Outline:
-        """Outline of the plate under the ridge [m]."""
-        size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]
-        return corners(self.foot, math.radians(self.ridge_yaw), size)

@@ -25,33 +25,30 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from ..assets.prop import TABLE_TOP, place, table
-from ..assets.ridge import PLATE_MARGIN, Ridge
+from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
-from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, shortest
+from ..geometry import UP, about_z, gap, shortest
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
-from ..robots.jaw import PAD, PALM_ACROSS, PALM_ALONG, pinch
+from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
+from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
-MAX_TILT = math.radians(10.0)
-"""Largest tilt of the rod [rad]: as in the paper's tasks with a rod (App. B, T31 and T32)."""
 CROSSING_TOLERANCE = math.radians(30.0)  # largest angle between the rod and the level normal of the ridge [rad]
 MISS_MARGIN = 0.006
 """Least distance beyond the ridge's edge of the centre of mass of a rod that is laid by its middle [m]."""
 LIFT_HEIGHT = 0.10  # height to which the rod is lifted to be weighed [m]
 CARRY_HEIGHT = 0.015  # height over the ridge at which the rod is aligned [m]
 EXPECTED_MASS = 0.125  # mass that a guess assumes without having weighed the rod [kg]: the middle of training
-RIDGE = "stand/ridge"
 
 
 @dataclass(frozen=True, kw_only=True)
-class RodAcross(Scenario):
+class RodAcross(RodAndRidge[Rod]):
     """A rod with a hidden centre of mass on the table, and a ridge."""
 
     HOLD = 1.0
@@ -64,14 +61,6 @@ class RodAcross(Scenario):
     ridge_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)  # yaw of the ridge; at 0 it runs along x
     rod: Rod = Rod(com=0.05)
     ridge: Ridge = Ridge()
-
-    # --- scene ----------------------------------------------------------------------------
-
-    def build(self) -> mujoco.MjSpec:
-        scene = table()
-        place(scene, self.ridge, "stand", self.foot, math.radians(self.ridge_yaw), free=False)
-        place(scene, self.rod, "rod", self.start, math.radians(self.rod_yaw))
-        return scene
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -196,8 +185,8 @@ class RodAcross(Scenario):
         torque = rod.mass * GRAVITY * abs(rod.com)
         hold = pinch(rod.width) * rod.friction * PAD / 2
         yield require(torque <= hold, "the rod turns in the grip", torque=torque, grip=hold)
-        yield on_table("the rod or the stand", [*self.outline, *self.stand])
-        air = gap(self.hand_over_rod, self.stand)
+        yield on_table("the rod or the stand", [*self.outline, *self.stand_outline])
+        air = gap(self.hand_over_rod, self.stand_outline)
         yield require(air >= 0.0, "the hand has no room beside the stand", air=air)
         yield within_reach("the rod", self.start + LIFT_HEIGHT * UP)
         far = self.top + CARRY_HEIGHT * UP + abs(rod.com) * np.array([[1.0], [-1.0]]) * self.normal
@@ -211,41 +200,3 @@ class RodAcross(Scenario):
             "weight": self.rod.mass,
             "height": self.ridge.height,
         }
-
-    # --- geometry -------------------------------------------------------------------------
-
-    @property
-    def start(self) -> Vec3:
-        """Point under the middle of the rod [m]."""
-        return np.array([self.rod_x, self.rod_y, TABLE_TOP])
-
-    @property
-    def foot(self) -> Vec3:
-        """Point under the middle of the ridge [m]."""
-        return np.array([self.ridge_x, self.ridge_y, TABLE_TOP])
-
-    @property
-    def top(self) -> Vec3:
-        """Middle of the ridge's upper face [m]."""
-        return self.foot + self.ridge.height * UP
-
-    @property
-    def normal(self) -> Vec3:
-        """Level unit vector across the ridge."""
-        return heading(self.ridge_yaw + 90.0)
-
-    @property
-    def outline(self) -> Outline:
-        """Outline of the rod [m]."""
-        return corners(self.start, math.radians(self.rod_yaw), self.rod.size)
-
-    @property
-    def hand_over_rod(self) -> Outline:
-        """Outline of the palm over the rod, before it is lifted [m]."""
-        return corners(self.start, math.radians(self.rod_yaw), [2 * PALM_ALONG, 2 * PALM_ACROSS])
-
-    @property
-    def stand(self) -> Outline:
-        """Outline of the plate under the ridge [m]."""
-        size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]
-        return corners(self.foot, math.radians(self.ridge_yaw), size)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from controls import (
     unchecked,
     unguarded,
 )
+from rods import left_alone, on_ridge
 
 from scengen import load_task
 from scengen.assets.inlaid_rod import InlaidRod
@@ -23,7 +25,6 @@ from scengen.assets.ridge import Ridge
 from scengen.geometry import UP, about_z
 from scengen.params import parameters
 from scengen.predicates import rests_on
-from scengen.sim.world import IDLE
 from scengen.skills.jaw import grasp, release
 from scengen.tasks.balance import MAX_FALL_SPEED, MAX_TILT, RELEASE_TIME, RIDGE, UprightRod
 
@@ -32,30 +33,7 @@ BOTH = pytest.mark.parametrize("task", [MEDIUM, HARD], ids=lambda task: task.nam
 ROD = UprightRod()
 NARROW = UprightRod(ridge=Ridge(width=0.008, height=0.05))
 LOPSIDED = UprightRod(rod=InlaidRod(com=0.0085))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stood(UprightRod):
-    """The rod stands on the ridge from the start, with its centre of mass off the middle of it."""
-
-    OFF = 0.0
-
-    @property
-    def start(self):
-        return self.top + (self.OFF - self.rod.com) * self.normal
-
-
-def stood(off, **changes):
-    """A scenario whose rod stands on the ridge from the start, `off` its middle [m]."""
-    return type("Stood", (Stood,), {"OFF": off})(**changes)
-
-
-def left_alone(scenario, seconds=2.0):
-    """The world after some time without actions."""
-    world = load(MEDIUM, scenario)
-    for _ in range(round(100 * seconds)):
-        world.step(IDLE)
-    return world
+stood = partial(on_ridge, UprightRod)
 
 
 # --- the law of the task ----------------------------------------------------------------
@@ -67,7 +45,7 @@ def left_alone(scenario, seconds=2.0):
 def test_the_rod_stays_up_if_its_centre_of_mass_is_over_the_ridge_and_is_lost_beyond(task, com, share, balanced):
     ridge = replace(task.draw("id", 0, 0).scenario.ridge, length=0.12)
     scenario = stood(share * ridge.width / 2, ridge=ridge, rod=InlaidRod(com=com))
-    world = left_alone(scenario)
+    world = left_alone(MEDIUM, scenario, 2.0)
     assert scenario.success(world) == balanced
     assert balanced or scenario.failure(world) == "the rod was let go and tipped"
 
@@ -195,6 +173,6 @@ def test_a_lopsided_rod_of_training_would_be_solved_by_its_foot():
 
 
 def test_the_rod_starts_upright_on_the_table():
-    world = left_alone(LOPSIDED)
+    world = left_alone(MEDIUM, LOPSIDED, 2.0)
     assert rests_on(world, "rod", "table") or world.touching_bodies("rod") == {"table"}
     assert world.tilt("rod") < 1e-3

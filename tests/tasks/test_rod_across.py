@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from controls import (
     unchecked,
     unguarded,
 )
+from rods import left_alone, on_ridge
 
 from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
@@ -24,35 +26,12 @@ from scengen.assets.rod import Rod
 from scengen.attack.priors import fit
 from scengen.params import parameters
 from scengen.sim import scene_text
-from scengen.sim.world import IDLE, World
+from scengen.sim.world import World
 from scengen.tasks.rod_across import MAX_TILT, RodAcross
 
 TASK = load_task("rod_across")
 ROD = RodAcross()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Laid(RodAcross):
-    """The rod lies on the ridge from the start, with its centre of mass off the middle of it."""
-
-    OFF = 0.0
-
-    @property
-    def start(self):
-        return self.top + (self.OFF - self.rod.com) * self.normal
-
-
-def laid(off, **changes):
-    """A scenario whose rod lies across the ridge from the start, `off` balance [m]."""
-    return type("Laid", (Laid,), {"OFF": off})(**changes)
-
-
-def left_alone(scenario, seconds=1.5):
-    """The world after some time without actions."""
-    world = load(TASK, scenario)
-    for _ in range(round(100 * seconds)):
-        world.step(IDLE)
-    return world
+laid = partial(on_ridge, RodAcross)
 
 
 # --- the law of the task ----------------------------------------------------------------
@@ -62,7 +41,7 @@ def left_alone(scenario, seconds=1.5):
 def test_the_goal_holds_if_the_centre_of_mass_is_over_the_ridge_and_beyond_its_edge_the_rod_is_lost(share, balanced):
     ridge = TASK.draw("id", 0, 0).scenario.ridge
     scenario = laid(share * ridge.width / 2, ridge=ridge)
-    world = left_alone(scenario)
+    world = left_alone(TASK, scenario, 1.5)
     assert scenario.success(world) == balanced
     assert balanced or scenario.failure(world) == "the rod was let go and tipped"
 
@@ -70,7 +49,7 @@ def test_the_goal_holds_if_the_centre_of_mass_is_over_the_ridge_and_beyond_its_e
 @pytest.mark.parametrize(("turned", "counts"), [(25.0, True), (35.0, False), (90.0, False)])
 def test_a_rod_counts_only_if_it_crosses_the_ridge(turned, counts):
     scenario = laid(0.0, rod_yaw=turned, rod=Rod(com=0.0))
-    assert scenario.success(left_alone(scenario)) == counts
+    assert scenario.success(left_alone(TASK, scenario, 1.5)) == counts
 
 
 @pytest.mark.parametrize(("com", "mass"), [(0.085, 0.10), (0.04, 0.15), (-0.085, 0.15)])

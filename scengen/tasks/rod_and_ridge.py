@@ -1,0 +1,77 @@
+"""What the tasks with a rod and a ridge share (T31, T32 and X1): the scene, and where things stand in it."""
+
+import math
+from typing import Generic, TypeVar
+
+import mujoco
+import numpy as np
+
+from ..assets.inlaid_rod import InlaidRod
+from ..assets.prop import TABLE_TOP, place, table
+from ..assets.ridge import PLATE_MARGIN, Ridge
+from ..assets.rod import Rod
+from ..geometry import UP, Outline, Vec3, corners, heading
+from ..robots.jaw import PALM_ACROSS, PALM_ALONG
+from ..scenario import Scenario
+
+MAX_TILT = math.radians(10.0)
+"""Largest tilt of the rod, from the vertical or from the level [rad] (paper, App. B, T31 and T32)."""
+RIDGE = "stand/ridge"
+"""Name of the body of the ridge."""
+
+RodT = TypeVar("RodT", bound=Rod | InlaidRod)
+
+
+class RodAndRidge(Scenario, Generic[RodT]):
+    """A rod on the table, and a ridge on a plate. Subclasses are dataclasses with these parameters."""
+
+    rod_x: float
+    rod_y: float
+    rod_yaw: float
+    ridge_x: float
+    ridge_y: float
+    ridge_yaw: float
+    rod: RodT
+    ridge: Ridge
+
+    def build(self) -> mujoco.MjSpec:
+        scene = table()
+        place(scene, self.ridge, "stand", self.foot, math.radians(self.ridge_yaw), free=False)
+        place(scene, self.rod, "rod", self.start, math.radians(self.rod_yaw))
+        return scene
+
+    @property
+    def start(self) -> Vec3:
+        """Point of the table under the middle of the rod at the start [m]."""
+        return np.array([self.rod_x, self.rod_y, TABLE_TOP])
+
+    @property
+    def foot(self) -> Vec3:
+        """Point under the middle of the ridge [m]."""
+        return np.array([self.ridge_x, self.ridge_y, TABLE_TOP])
+
+    @property
+    def top(self) -> Vec3:
+        """Middle of the ridge's upper face [m]."""
+        return self.foot + self.ridge.height * UP
+
+    @property
+    def normal(self) -> Vec3:
+        """Level unit vector across the ridge."""
+        return heading(self.ridge_yaw + 90.0)
+
+    @property
+    def outline(self) -> Outline:
+        """Outline of the rod on the table [m]."""
+        return corners(self.start, math.radians(self.rod_yaw), self.rod.size)
+
+    @property
+    def hand_over_rod(self) -> Outline:
+        """Outline of the palm over the rod, before it is lifted [m]."""
+        return corners(self.start, math.radians(self.rod_yaw), [2 * PALM_ALONG, 2 * PALM_ACROSS])
+
+    @property
+    def stand_outline(self) -> Outline:
+        """Outline of the plate under the ridge [m]."""
+        size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]
+        return corners(self.foot, math.radians(self.ridge_yaw), size)
