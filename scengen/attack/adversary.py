@@ -11,7 +11,7 @@ from . import draws
 from .clock import CLOCK, timed
 from .evidence import CausalContacts, Hit, TierRate, hit, rates
 from .macros import Macro
-from .memories import MEMORY, TRIES, remembered
+from .memories import MEMORY, remembered
 from .player import Attempt, Node, Played, Player
 from .priors import GUESSES, Prior, guesses
 from .retries import RETRY, retries
@@ -48,7 +48,7 @@ LEAKS = "leaks"
 RATED = (
     *(tier for tier in TIERS if tier not in (PRIOR, MEMORY)),
     *(f"{PRIOR}_{count}" for count in GUESSES),
-    *(f"{MEMORY}_{count}" for count in TRIES),
+    *(f"{MEMORY}_{count}" for count in GUESSES),
 )
 """Names under which hits are counted: tiers, and tiers with the number of answers or memories in an episode."""
 MAX_FATAL = 2

@@ -24,7 +24,7 @@ from ..work.parallel import Limits, Workers, each
 from ..work.targets import write
 from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
 from .evidence import Hit, TierRate, rates, unsound
-from .experience import Experience, experience
+from .experience import Experience, experience, feasible
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
@@ -62,22 +62,25 @@ class AttackSettings:
     json: str | None = None
 
     @property
+    def asked(self) -> Sequence[str] | None:
+        """The requested tiers; None for the default."""
+        return [self.tiers] if isinstance(self.tiers, str) else self.tiers
+
+    @property
     def observed(self) -> bool:
         """Whether observations are searched for hidden parameters: on request, and by default for draws of a task."""
-        asked = [self.tiers] if isinstance(self.tiers, str) else self.tiers
-        return self.pool is None if asked is None else LEAKS in asked
+        return self.pool is None if self.asked is None else LEAKS in self.asked
 
     @property
     def chosen(self) -> tuple[str, ...]:
         """The tiers that are played."""
-        asked = [self.tiers] if isinstance(self.tiers, str) else self.tiers
-        return tuple(tier for tier in TIERS if asked is None or tier in asked)
+        return tuple(tier for tier in TIERS if self.asked is None or tier in self.asked)
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         check_rules(self.rules)
         at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
-        for tier in [self.tiers] if isinstance(self.tiers, str) else self.tiers or []:
+        for tier in self.asked or []:
             if tier not in (*TIERS, LEAKS):
                 raise UnknownName("tier", tier, (*TIERS, LEAKS))
 
@@ -302,10 +305,10 @@ def fitted(task: Task, settings: AttackSettings) -> list[Prior]:
         return []
     static = has_statics(answer)
     count = STATICS_DRAWS if static else ROLLOUT_DRAWS
-    training = list(_draws(task, settings.split, settings.seed + FITTING_SEED, count))
+    training = list(feasible(task, settings.split, settings.seed + FITTING_SEED, count))
     if not training:
         return []
-    fresh = list(_draws(task, settings.split, settings.seed + FRESH_SEED, count)) if static else []
+    fresh = list(feasible(task, settings.split, settings.seed + FRESH_SEED, count)) if static else []
     return fit(training, by_statics if static else _by_rollouts(task), fresh)
 
 
@@ -323,14 +326,6 @@ def _by_rollouts(task: Task) -> AnswerJudge:
         return right
 
     return judge
-
-
-def _draws(task: Task, split: str, seed: int, count: int) -> Iterator[Scenario]:
-    for index in range(count):
-        try:
-            yield task.draw(split, seed, index).scenario
-        except Infeasible:
-            continue
 
 
 def _record(result: AttackResult) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """What a policy may know of a task from training: solutions by heart, and how long waits last."""
 
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 
 from ..control.loop import Loop
 from ..errors import Infeasible
+from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
@@ -41,7 +43,10 @@ def experience(task: Task, seed: int, tiers: Collection[str]) -> Experience:
         for number, (scenario, world, found) in enumerate(solved[:SOLUTIONS]):
             memories += candidates(scenario, world, found, number)
         others = [scenario for scenario, *_ in solved[SOLUTIONS:]]
-        judges = [*others, *islice(_drawn(task, seed + 1), FIRST_JUDGES + FURTHER_JUDGES - len(others))]
+        judges = [
+            *others,
+            *islice(feasible(task, ID, seed + 1, MAX_DRAWS), FIRST_JUDGES + FURTHER_JUDGES - len(others)),
+        ]
         memories = fit(task, memories, judges)
     return Experience(tuple(memories), tuple(_durations(found) for *_, found in solved))
 
@@ -53,16 +58,15 @@ def _durations(found: Trace) -> tuple[float, ...]:
 
 def _solved(task: Task, seed: int) -> Iterator[tuple[Scenario, World, Trace]]:
     """Training scenarios that the oracle solves, with their worlds and traces."""
-    for scenario in _drawn(task, seed):
+    for scenario in feasible(task, ID, seed, MAX_DRAWS):
         world = world_of(scenario, task.embodiment)
         rollout = run(scenario, world, scenario.oracle, task.horizon)
         if rollout.solved and (found := trace(scenario, world, rollout.actions)):
             yield scenario, world, found
 
 
-def _drawn(task: Task, seed: int) -> Iterator[Scenario]:
-    for index in range(MAX_DRAWS):
-        try:
-            yield task.draw("id", seed, index).scenario
-        except Infeasible:
-            continue
+def feasible(task: Task, split: str, seed: int, count: int) -> Iterator[Scenario]:
+    """The feasible scenarios of the first `count` indices of a split."""
+    for index in range(count):
+        with suppress(Infeasible):
+            yield task.draw(split, seed, index).scenario

@@ -4,13 +4,12 @@ A policy that knows one demonstration by heart and sees where a body is acts lik
 draws of another seed. There, the best ones are chosen; the attack measures them on the scenarios that it is about.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..geometry import Mat3, Vec3, about_z
+from ..geometry import Mat3, Vec3, about_z, polar
 from ..robots import panda
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
@@ -20,7 +19,8 @@ from ..validate.rollout import run
 from .macros import Macro
 from .phases import Trace
 from .player import Attempt, Player
-from .solution_memory import HandPath, PathPart, SolutionMemory, remember
+from .priors import GUESSES
+from .solution_memory import HandPath, PathPart, SolutionMemory, remember, upright
 
 MEMORY = "memory"
 """Tier of memories."""
@@ -40,8 +40,6 @@ FURTHER_JUDGES = 4
 """Number of further draws on which the best candidates are played."""
 FINALISTS = 4
 """Number of candidates that are played on the further draws."""
-TRIES = (1, 2, 3)
-"""Numbers of memories that are played one after the other in an episode."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +64,11 @@ class Memory:
             return self.solution.follow(world)
         here = world.pos(self.body)
         if self.way == BEARING:
-            turn = about_z(_bearing(here) - _bearing(self.pos))
+            turn = about_z(polar(here - panda.BASE)[0] - polar(self.pos - panda.BASE)[0])
             return carried(self.solution, turn, panda.BASE, panda.BASE).follow(world)
         turn = np.eye(3)
         if self.way == POSE:
-            turned = world.rot(self.body) @ self.rot.T
-            turn = about_z(math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1]))
+            turn = upright(world.rot(self.body) @ self.rot.T)
         return carried(self.solution, turn, self.pos, here).follow(world)
 
 
@@ -132,10 +129,5 @@ def fit(task: Task, found: Sequence[Memory], draws: Sequence[Scenario]) -> list[
 def remembered(player: Player) -> Iterator[Attempt]:
     """The best memory, and the best two and three one after the other in one episode."""
     names = list(player.memories)
-    for count in (n for n in TRIES if n <= len(names)):
+    for count in (n for n in GUESSES if n <= len(names)):
         yield Attempt(f"{MEMORY}_{count}", tuple(Macro("memory", name) for name in names[:count]))
-
-
-def _bearing(at: Vec3) -> float:
-    """Direction of a place from the robot's first axis [rad]."""
-    return math.atan2(at[1] - panda.BASE[1], at[0] - panda.BASE[0])

@@ -13,7 +13,7 @@ from .macros import Macro
 from .player import Attempt
 
 GUESSES = (1, 2, 3)
-"""Numbers of fixed answers that are given one after the other in an episode."""
+"""Numbers of fixed answers, or of memories, that are tried one after the other in an episode."""
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ class HandPath:
         for part, end in zip(self.parts, ends, strict=True):
             turn, origin = np.eye(3), part.pos
             if part.body in here:
-                turn, origin = _upright(world.rot(part.body) @ part.rot.T), world.pos(part.body)
+                turn, origin = upright(world.rot(part.body) @ part.rot.T), world.pos(part.body)
             aims = origin + (self.hands[part.first : end] - part.pos) @ turn.T
             rots = turn @ self.rots[part.first : end]
             try:
@@ -181,7 +181,7 @@ def _targets(touched: list[str | None]) -> list[str | None]:
     return found[::-1]
 
 
-def _upright(turn: Mat3) -> Mat3:
+def upright(turn: Mat3) -> Mat3:
     """The rotation about the vertical that is nearest to a rotation, so that the hand is never turned upside down."""
     return about_z(math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))
 

@@ -34,12 +34,15 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(f"tiers = []; an attack without tiers finds nothing; give some of {', '.join((*TIERS, LEAKS))}")
     try_file(settings.json)
     try_folder(settings.to)
-    task, subjects = _subjects(arguments, settings)
+    task, pool = _task(arguments, settings)
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
-    told = _leaks(task, settings) if settings.observed else None
+    plain = asdict(_leaks(task, settings)) if settings.observed else None
     if not settings.chosen:
+        if settings.json:
+            write_json(settings.json, {"task": task.name, "leaks": plain})
         return OK
+    subjects = _subjects(task, pool, settings)
     with ProgressBar(err, f"attack {task.name}", len(subjects), settings.workers) as progress_bar:
 
         def progress(done: int, hits: int) -> None:
@@ -55,7 +58,7 @@ def command(arguments: Arguments) -> int:
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
-        write_json(settings.json, {**report.plain(), "leaks": asdict(told) if told else None})
+        write_json(settings.json, {**report.plain(), "leaks": plain})
     return FAILED if report.refuting else BAD_INPUT if report.lost else OK
 
 
@@ -70,23 +73,32 @@ def _leaks(task: Task, settings: AttackSettings) -> Leaks:
     return found
 
 
-def _subjects(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Sequence[Subject]]:
-    """The task and its scenarios to attack.
+def _task(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Pool | None]:
+    """The task to attack, and the pool that it was given by, if any.
 
     Raises:
-        ScengenError: neither a task nor a pool was given, or both, or there is no scenario to attack.
+        ScengenError: neither a task nor a pool was given, or both.
     """
     name, others = compose.chosen_task("attack", arguments), [a for a in arguments if a.startswith("task.")]
     if (name is None) == (settings.pool is None):
         raise BadConfig("attack needs either task=NAME or pool=FOLDER; see scengen attack --help")
     if name is not None:
-        task = compose.load_task(name, [*search_path(arguments), *others])
-        return task, drawn(task, settings.split, settings.n, settings.seed)
+        return compose.load_task(name, [*search_path(arguments), *others]), None
     pool = Pool.open(str(settings.pool)).check()
-    task = task_of(pool, search_path(arguments))
+    return task_of(pool, search_path(arguments)), pool
+
+
+def _subjects(task: Task, pool: Pool | None, settings: AttackSettings) -> Sequence[Subject]:
+    """The scenarios to attack: draws of the task, or the first ones of the pool.
+
+    Raises:
+        ScengenError: there is no scenario to attack.
+    """
+    if pool is None:
+        return drawn(task, settings.split, settings.n, settings.seed)
     if not (subjects := certified(task, islice(pool.rows(), settings.n))):
         raise BadConfig(f"{pool.folder} holds no scenario to attack; choose another pool")
-    return task, subjects
+    return subjects
 
 
 def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:

@@ -125,9 +125,8 @@ class ObjectState:
         found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in self.ordered]
         ids = np.maximum(found, 0, dtype=int)  # -1 if there is no such body
         pos, rot = rounded(data.xpos[ids], "pos"), _rounded_rots(data.xquat[ids])
-        ang, lin = (
-            rounded(v, kind) for v, kind in zip(_velocities(world, data.xpos[ids], ids), _VELOCITIES, strict=True)
-        )
+        ang, lin = _velocities(world, data.xpos[ids], ids)
+        ang, lin = rounded(ang, "vel_ang"), rounded(lin, "vel_lin")
         frames = [_frame(pos, rot, lin, ang)]
         for arm in world.arms:
             hand, axes, moved = arm.hand, arm.hand_rot, model.site(Names(arm.number).grip_site).bodyid
@@ -144,9 +143,6 @@ class ObjectState:
             kinds = {**POSE, **MOTION} if self.bodies[body] else POSE
             for frame in ("", *(f"to_{Names(number).arm}eef_" for number in range(self.arms))):
                 yield from ((f"{body}_{frame}{kind}", entries) for kind, entries in kinds.items())
-
-
-_VELOCITIES = ("vel_ang", "vel_lin")
 
 
 def rounded(values: NDArray[np.float64], kind: str) -> NDArray[np.float64]:

@@ -36,10 +36,11 @@ def export(row: PoolRow, folder: Path, robot: bool) -> None:
     target = folder / row.id
     scene_text.check(row.scene_xml)
     with scene_errors(f" of {row.name}"):
-        compose(row.scene_xml, row.embodiment, visual=True).compile()
+        spec = compose(row.scene_xml, row.embodiment, visual=True)
+        spec.compile()
     written: list[Path] = []
     try:
-        for path, content in _files(row, target, robot):
+        for path, content in _files(row, target, spec if robot else None):
             if path.parent == target or not path.exists():  # scenarios share the meshes
                 write(path, content)
                 written.append(path)
@@ -52,11 +53,14 @@ def export(row: PoolRow, folder: Path, robot: bool) -> None:
         raise
 
 
-def _files(row: PoolRow, target: Path, robot: bool) -> Iterator[tuple[Path, str | bytes]]:
-    """Files of a scenario, and their contents: the scenes last."""
+def _files(row: PoolRow, target: Path, spec: mujoco.MjSpec | None) -> Iterator[tuple[Path, str | bytes]]:
+    """Files of a scenario, and their contents: the scenes last.
+
+    Args:
+        spec: the scene with its robot; None for the scene alone.
+    """
     alone = _written(ET.fromstring(row.scene_xml))
-    if robot:
-        spec = compose(row.scene_xml, row.embodiment, visual=True)
+    if spec is not None:
         _add_home(spec)
         root = ET.fromstring(spec.to_xml())
         for mesh in root.iterfind("asset/mesh[@file]"):

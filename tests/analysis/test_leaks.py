@@ -1,5 +1,7 @@
 """Observations that tell a hidden parameter are found, and those that do not are not accused."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -46,10 +48,12 @@ def test_what_very_fine_poses_tell_is_not_in_object_state(monkeypatch, task, par
     assert told[parameter].explained > 0.5
 
 
-def test_the_command_prints_leaks(monkeypatch, capsys):
+def test_the_command_prints_leaks(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(object_state, "RESOLUTION", dict.fromkeys(object_state.RESOLUTION, 1e-12))
     monkeypatch.setattr("scengen.commands.attack.LEAK_DRAWS", 60)
-    assert cli.run(["attack", "task=seesaw_balance", "n=1", "tiers=[leaks]"]) == 0
+    target = tmp_path / "report.json"
+    assert cli.run(["attack", "task=seesaw_balance", "n=1", "tiers=[leaks]", f"json={target}"]) == 0
+    assert "target.mass" in [leak["parameter"] for leak in json.loads(target.read_text())["leaks"]["found"]]
     told = capsys.readouterr()
     assert "hidden parameters in 60 draws of id: observations tell" in told.out
     assert "LEAK" in told.err and "tells target.mass: explained variance" in told.err

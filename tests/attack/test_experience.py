@@ -65,7 +65,7 @@ def test_the_best_memory_is_measured_on_the_attacked_scenarios(subjects, memorie
 
 
 def test_tiers_that_know_nothing_from_training_make_no_draws(monkeypatch):
-    monkeypatch.setattr("scengen.attack.experience._drawn", lambda *_: pytest.fail("draws were made"))
+    monkeypatch.setattr("scengen.attack.experience.feasible", lambda *_: pytest.fail("draws were made"))
     assert experience(TASK, 1, ("random", "servo")) == Experience()
 
 
