@@ -6,7 +6,7 @@ attacked have no line.
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,25 +27,33 @@ each task, with every plan both through the teleoperation filter and raw. The ad
 witness, and the kind of answer that the family declares; it knows nothing else of a task.
 
 * **random**: one to five random moves from the start (pick, push, place, press, turn, shake, throw, wait). **foreign**:
-  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in pairs. Each column shows hits of
-  rollouts, and the one-sided 95 % Clopper-Pearson bound of the rate.
+  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in pairs. **servo**: feedback plans that
+  pursue, press down, block, cradle, carry through narrow ways, and do what a latch asks for by itself. **clock**: the
+  scenario's own solution, with every wait as long as in training on average; "-" if its waits hardly vary. Each
+  column shows hits of rollouts, and the one-sided 95 % Clopper-Pearson bound of the rate.
+* **1 memory, 3 memories**: the best training solutions, carried to the scenario by the pose of a body, one after the
+  other in one episode. They are chosen among sixteen on other draws. A memory that works says how little a policy must
+  see in training; it does what the oracle does, so it is no way around the task.
+* **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, and given one
+  after the other without looking at the scene: share of fresh draws that they solve, and its bound. "-" if the answer
+  is not a number, or if a wrong answer ends the episode.
 * **retries**: one move is repeated while a height, a tilt, a place or a direction is swept, often from a state of the
   scenario's own witness. **own**: that witness with a phase dropped, repeated, mirrored, slowed or accelerated, and a
   search that continues from its states. Starting from the witness, partial success is expected: these two columns
   search for ways around the task, and their rates are no bounds.
-* **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, and given one
-  after the other without looking at the scene: share of fresh draws that they solve, and its bound. "-" if the answer
-  is not a number, or if a wrong answer ends the episode.
 * **refuting**: hits without a contact that the oracle makes in its witness and in forty varied runs, which bypass the
-  task. There should be none; if you find one, please report it. (The three of `ramp_sort` are its own witness played
-  faster: two balls do not meet in their bin.)
+  task. There should be none; if you find one, please report it.
 
 The adversary knows the positions of the bodies, which no policy knows in `mirror_pick_place`. There a random pick at
 the right place is all that the task requires, so its rate says nothing about a policy that sees a mirrored picture.
+Servo plans are for jaws: a task for suction alone has none.
 
-| task | random | foreign | shortcuts | 1 fixed | 2 fixed | 3 fixed | retries | own | rollouts | refuting |
-|---|---|---|---|---|---|---|---|---|---|---|
 """
+COLUMNS = (
+    *("task", "random", "foreign", "shortcuts", "servo", "clock", "1 memory", "3 memories"),
+    *("1 fixed", "2 fixed", "3 fixed", "retries", "own", "rollouts", "refuting"),
+)
+"""Columns of the table."""
 
 
 def main(budget: str, *tasks: str) -> None:
@@ -59,6 +67,7 @@ def main(budget: str, *tasks: str) -> None:
             refuted.append(task)
         report = json.loads(target.read_text())
         report["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
+        report["cpu"] = _cpu(Path("generated/attack") / task / "attack.jsonl")
         target.write_text(json.dumps(report, indent=1, sort_keys=True) + "\n")
     PAGE.write_text(page())
     sys.exit(f"refuted, or not attacked: {', '.join(refuted)}" if refuted else 0)
@@ -66,29 +75,37 @@ def main(budget: str, *tasks: str) -> None:
 
 def page() -> str:
     """The whole page, from the reports."""
-    paths = [path for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
-    return HEAD + "".join(line(json.loads(path.read_text())) for path in paths)
+    reports = [json.loads(path.read_text()) for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
+    hours = sum(report["cpu"] for report in reports) / 3600
+    told = f"The rollouts of all {len(reports)} tasks took {hours:.1f} hours of one core.\n\n"
+    table = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n"
+    return HEAD + told + table + "".join(map(line, reports))
 
 
 def line(report: Mapping[str, Any]) -> str:
     """The line of one task in the table."""
-    blind, given = (("random",), ("foreign",), ("shortcut",)), (("retry",), ("witness", "search"))
     fixed = {len(prior["values"]): _share(prior) for prior in report["priors"]}
     cells = [
         report["task"],
-        *(_counted(rate for rate in report["rates"] if rate["tier"] in names) for names in blind),
+        *(_counted(report, tier) for tier in ("random", "foreign", "shortcut", "servo", "clock")),
+        *(_counted(report, tier) for tier in ("memory_1", "memory_3")),
         *(fixed.get(count, "-") for count in (1, 2, 3)),
-        *(_counted(rate for rate in report["rates"] if rate["tier"] in names) for names in given),
+        *(_counted(report, *tiers) for tiers in (("retry",), ("witness", "search"))),
         str(report["rollouts"]),
         str(len(report["hits"])),
     ]
     return f"| {' | '.join(cells)} |\n"
 
 
-def _counted(rates: Iterable[Mapping[str, Any]]) -> str:
-    known = list(rates)
+def _counted(report: Mapping[str, Any], *tiers: str) -> str:
+    known = [rate for rate in report["rates"] if rate["tier"] in tiers]
     total = TierRate("", False, sum(rate["rollouts"] for rate in known), sum(rate["hits"] for rate in known))
     return f"{total.hits} of {total.rollouts} (< {total.bound:.1%})" if total.rollouts else "-"
+
+
+def _cpu(log: Path) -> float:
+    """Processor time of the rollouts of an attack [s], from its log."""
+    return round(sum(json.loads(line).get("cpu", 0.0) for line in log.read_text().splitlines()), 1)
 
 
 def _share(prior: Mapping[str, Any]) -> str:

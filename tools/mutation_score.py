@@ -1,9 +1,9 @@
 """Mutation score of the adversary: `python tools/mutation_score.py [budget] [task ...]`.
 
-Every mutant of tests/attack/mutants.py is attacked until an attempt succeeds that the sound family refuses. For
-comparison: the written cheats that exploit the mutant, the hits of random macros with the same number of rollouts, and
-the number of varied runs of the oracle that would be taken for a way around the task. Results are stored in
-generated/mutation_score.jsonl, and a repeated call continues there.
+Every mutant of tests/attack/mutants.py that a written cheat exploits is attacked, without the declared shortcuts, until
+an attempt succeeds that the sound family refuses. For comparison: the hits of random macros with the same number of
+rollouts, and the number of varied runs of the oracle that would be taken for a way around the task. Results are stored
+in records/mutation_score.jsonl, and a repeated call continues there.
 
 `python tools/mutation_score.py hits [budget] [task ...]` counts, for each mutant that a written cheat exploits, all
 successes that the sound family refuses, of the adversary and of random macros with the same number of rollouts.
@@ -13,6 +13,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -24,27 +25,28 @@ from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import load_task
 from scengen.attack.adversary import PRIOR, RANDOM, TIERS, Attack
-from scengen.attack.campaign import AttackSettings, Subject, drawn, fitted, player_of
+from scengen.attack.campaign import FITTING_SEED, AttackSettings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import CausalContacts, Hit
+from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
 from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
-RESULTS = Path("generated/mutation_score.jsonl")
+RESULTS = Path("records/mutation_score.jsonl")
 """File of the results."""
-SCENARIOS = 3
+SCENARIOS = 2
 """Number of scenarios for each mutant."""
-UNEXPLOITED_DIVISOR = 3
-"""Divisor of the number of rollouts for mutants that no written cheat exploits."""
+PLAYED = tuple(tier for tier in TIERS if tier != "shortcut")
+"""Tiers that attack a mutant: shortcuts are written cheats, so that they would find nothing by themselves."""
 VARIED_RUNS = 40
 """Number of varied runs of the oracle for each task."""
 WIDER_JITTER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=0.04)
 """Jitter of these runs: 1.5 times that of a certificate."""
 
 
-def main(budget: str = "300", *tasks: str) -> None:
+def main(budget: str = "200", *tasks: str) -> None:
     """Score all mutants, or those of some tasks, and print the score."""
     RESULTS.parent.mkdir(exist_ok=True)
     records = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
@@ -69,12 +71,11 @@ def compare(budget: str = "60", *tasks: str) -> None:
         if mutant.narrow or (tasks and mutant.task not in tasks):
             continue
         with mutant.weakened():
-            subjects = mutant.subjects(2)
+            subjects = mutant.subjects(SCENARIOS)
             if not exploits(mutant, subjects):
                 continue
-            tiers = [tier for tier in TIERS if tier != "shortcut"]  # those of a sound family are declared, not found
             found, random = (
-                counted(mutant, subjects, int(budget), tiers),
+                counted(mutant, subjects, int(budget), PLAYED),
                 counted(mutant, subjects, int(budget), [RANDOM]),
             )
         ours, luck = ours + found, luck + random
@@ -87,8 +88,7 @@ def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Seq
     priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     hits = 0
     for number, subject in enumerate(subjects):
-        player = player_of(subject)
-        player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+        player = informed(mutant, subject, subjects)
         result = Attack(player, 0, number, len(subjects), priors).run(budget // len(subjects), tiers)
         hits += sum(mutant.kills(hit, subject.scenario, subject.scene_xml) for hit in result.hits)
     return hits
@@ -102,10 +102,7 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
     with mutant.weakened():
         subjects = mutant.subjects(SCENARIOS)
         cheats = exploits(mutant, subjects[:2])
-        used, found = hunted(mutant, subjects, budget if cheats else budget // UNEXPLOITED_DIVISOR, TIERS)
-        plain = found
-        if found and found.tier == "shortcut":
-            _, plain = hunted(mutant, subjects, budget, [tier for tier in TIERS if tier != "shortcut"])
+        used, found = hunted(mutant, subjects, budget, PLAYED) if cheats else (0, None)
         luck = hunted(mutant, subjects, used, [RANDOM])[1] if found else None
     return {
         "task": mutant.task,
@@ -114,7 +111,6 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
         "cheats": cheats,
         "rollouts": used,
         "found": _told(found),
-        "without_shortcuts": _told(plain),
         "random": _told(luck),
         "cpu": round(time.process_time() - start, 1),
     }
@@ -138,7 +134,6 @@ def guessed(mutant: Mutant) -> dict[str, Any]:
         "cheats": [f"{len(p.values)} fixed: {p.fresh:.0%}" for p in above],
         "rollouts": used,
         "found": told,
-        "without_shortcuts": told,
         "random": "",
         "cpu": round(time.process_time() - start, 1),
     }
@@ -170,8 +165,7 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
     used = 0
     priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
     for number, subject in enumerate(subjects):
-        player = player_of(subject)
-        player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+        player = informed(mutant, subject, subjects)
 
         def kills(hit: Hit, subject: Subject = subject) -> bool:
             return mutant.kills(hit, subject.scenario, subject.scene_xml)
@@ -182,6 +176,21 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
         if attack.done:
             return used, result.hits[-1]
     return used, None
+
+
+def informed(mutant: Mutant, subject: Subject, subjects: Sequence[Subject]) -> Player:
+    """The player of a subject that knows the other subjects' witnesses, and what training tells."""
+    player, known = player_of(subject), trained(mutant.task)
+    player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
+    player.memories = {memory.name: memory.follow for memory in known.memories}
+    player.durations = known.durations
+    return player
+
+
+@cache
+def trained(task: str) -> Experience:
+    """What training tells of a task."""
+    return experience(load_task(task), FITTING_SEED, PLAYED)
 
 
 def flagged(task: str) -> dict[str, Any]:
@@ -225,9 +234,8 @@ def _summary(records: Sequence[dict[str, Any]]) -> str:
     scores = [record for record in records if record["mutant"]]
     exploited = [record for record in scores if record["cheats"]]
     lines = [f"{len(scores)} mutants, {len(exploited)} exploited by a written cheat"]
-    for what in ("found", "without_shortcuts", "random"):
-        hits, all_hits = sum(bool(r[what]) for r in exploited), sum(bool(r[what]) for r in scores)
-        lines.append(f"{what}: {hits} of {len(exploited)}, {all_hits} of all")
+    for what in ("found", "random"):
+        lines.append(f"{what}: {sum(bool(r[what]) for r in exploited)} of {len(exploited)}")
     varied = [record for record in records if not record["mutant"]]
     runs, taken = (sum(record[what] for record in varied) for what in ("runs", "flagged"))
     lines.append(f"varied oracle runs flagged: {taken} of {runs}")

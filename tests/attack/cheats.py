@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 import numpy as np
+from test_hands import HANDS
 
 from scengen.assets.cage import lowered
 from scengen.errors import GaveUp
@@ -147,11 +148,15 @@ CHEATS: Mapping[str, Mapping[str, Cheat]] = {
     "ball_cage_escape": {f.__name__: f for f in (snap, hop)},
     "seesaw_balance": {f.__name__: f for f in (hold_the_weight_down, nudge_the_target)},
     "tool_retrieve": {f.__name__: f for f in (only_draw_it_in, take_it_by_hand)},
-    "packing": {},
 }
 
 
 def written(task: str, scenario) -> dict[str, Shortcut]:
-    """The cheats of a scenario: the declared shortcuts and those that stand here."""
-    own = {name: Shortcut(lambda world, f=cheat: f(scenario, world)) for name, cheat in CHEATS[task].items()}
-    return {**scenario.shortcuts(), **own}
+    """The cheats of a scenario: the declared shortcuts, those that stand here, and those that hands found."""
+    own = {name: Shortcut(lambda world, f=cheat: f(scenario, world)) for name, cheat in CHEATS.get(task, {}).items()}
+    hands = {
+        name: Shortcut(lambda world, f=hand.plan: f(scenario, world))
+        for (of, name), hand in HANDS.items()
+        if of == task
+    }
+    return {**scenario.shortcuts(), **own, **hands}
