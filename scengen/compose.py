@@ -193,7 +193,7 @@ def _logging_restored() -> Iterator[None]:
 
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
-LISTS = ("pool", "cameras", "mujoco")
+LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles")
 """Settings for which several values are a list and not a sweep. `keep` is always a list."""
 
 

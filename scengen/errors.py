@@ -102,6 +102,7 @@ MAX_SETTINGS = {
     "repeats": 1000,
     "rollouts": 1_000_000,
     "rounds": 10_000,
+    "runs": 1000,
     "sample": 1_000_000_000,
     "seed": 2**63 - 1,  # a column of a pool holds it
     "seeds": 1_000_000,

@@ -29,6 +29,7 @@ LAYERS = (
     ("envs", "intake"),
     ("export", "evaluate"),
     ("analysis",),
+    ("demos",),
     ("ood", "drift"),
     ("conformance",),
     ("commands",),

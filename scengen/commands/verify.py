@@ -14,8 +14,10 @@ from ..analysis.redraw import task_of
 from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
+from ..demos.verify import verify_demonstrations
 from ..errors import BadConfig, at_least, cut
 from ..pool import Pool
+from ..pool.demonstrations import Demonstrations, demonstration_folders, is_demonstrations
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..task_files import search_path
@@ -76,6 +78,9 @@ def command(arguments: Arguments) -> int:
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
     if settings.pool is None:
         raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
+    demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
+    if demonstrated:
+        return _replay_demonstrations(demonstrated, settings, search_path(arguments))
     folders = several(settings.pool)
     if settings.ycb is not None:
         for folder in folders:
@@ -180,6 +185,41 @@ def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str])
         say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")
     return FAILED if wrong else OK
+
+
+def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, search: Sequence[str]) -> int:
+    """Verify folders of demonstrations.
+
+    Returns:
+        Exit status.
+
+    Raises:
+        BadConfig: a setting is for pools alone, or a folder is one of a pool.
+    """
+    if others := set(demonstration_folders(settings.pool or "")) - set(folders):
+        raise BadConfig(f"{min(others)} holds no demonstrations; verify pools and demonstrations separately")
+    for name in ("sample", "ycb", "junit"):
+        if getattr(settings, name) is not None:
+            raise BadConfig(f"{name} is for pools; demonstrations are all replayed: leave it out")
+    reports = []
+    for folder in folders:
+        found = Demonstrations.open(folder)
+        limits = Limits(settings.limit_seconds, settings.limit_mb)
+        with ProgressBar(err, f"verify {folder}", len(found), settings.workers) as progress_bar:
+            task, oracle = compose.load_task(found.task, search), settings.level == "full"
+            report = verify_demonstrations(found, task, settings.workers, limits, oracle, progress_bar.show)
+        for fault in report.faults[:MAX_PRINTED]:
+            warn(f"REFUTED {fault[:2000]}")
+        for why in report.declined[:MAX_PRINTED]:
+            warn(f"DECLINED {why[:2000]}")
+        for remark in report.remarks:
+            say(remark)
+        say(f"{folder}: {report.verdict}: {report.exact} of {report.checked} replay bit for bit")
+        reports.append(report)
+    if settings.json:
+        write_json(settings.json, [{**vars(report), "verdict": report.verdict} for report in reports])
+    verdicts = Counter(report.verdict for report in reports)
+    return next(status for verdict, status in WORST.items() if verdicts[verdict])
 
 
 def _print_report(pool: Pool, report: Report) -> None:

@@ -16,6 +16,7 @@ from ..certificate import StoredCertificate, as_json
 from ..sim.world import EMBODIMENTS, action_size
 from .untrusted import (
     HASH,
+    MAX_HORIZON,
     MAX_TEXT,
     SHORT_HASH,
     canonical,
@@ -42,6 +43,7 @@ ACTION_SIZES = frozenset(map(action_size, EMBODIMENTS))
 
 ID = re.compile(r"[0-9a-f]{12}")
 VERDICTS = ("certified", "refuted", "unknown")
+OUTCOMES = ("success", "failure", "timeout", "unstable")
 
 Reader = Callable[[str, Any], Any]
 """Turns the stored value of a column, given after the column's name, into the value of a row's field, or raises
@@ -80,6 +82,18 @@ def whole(name: str, value: Any) -> Any:
 def horizon(name: str, value: Any) -> Any:
     """A time limit [s]."""
     check_horizon(value)
+    return value
+
+
+def seconds(name: str, value: Any) -> Any:
+    """A time in an episode [s]."""
+    demand(isinstance(value, float) and 0 <= value <= 2 * MAX_HORIZON, f"{name} {str(value)[:60]} is not a time")
+    return value
+
+
+def outcome(name: str, value: Any) -> Any:
+    """Result of an episode."""
+    demand(value in OUTCOMES, f"{name} {str(value)[:60]!r} is not an outcome; known: {', '.join(OUTCOMES)}")
     return value
 
 

@@ -33,6 +33,17 @@ def sha256_of_opened(file: BufferedReader) -> str:
 
 
 @dataclass(frozen=True)
+class FileEntry:
+    """What a manifest says of a file with rows."""
+
+    file: str
+    """Name of the file, which lies beside the manifest."""
+    rows: int
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
 class Identity:
     """Numbers of a file, one of which changes when it is replaced or written. Programs cannot set the time of a change,
     as they can set the time of the last writing."""
@@ -49,6 +60,26 @@ class Identity:
         """The identity of an opened file."""
         status = os.fstat(file.fileno())
         return cls(status.st_dev, status.st_ino, status.st_size, status.st_ctime_ns)
+
+
+def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]) -> str:
+    """What is wrong with a file; empty if nothing is.
+
+    Args:
+        entry: what the manifest beside the file says of it.
+        identities: identities of the files that were compared so far, to which this one is added.
+    """
+    path = folder / entry.file
+    try:
+        with open_plain(path) as file:
+            identity = Identity.of(file)
+            if identity.size != entry.bytes:
+                return f"has {identity.size} bytes instead of {entry.bytes}: truncated"
+            if sha256_of_opened(file) != entry.sha256:
+                return "has another sha256 than the manifest says"
+    except (OSError, ValueError) as error:
+        return str(error).removeprefix("it ")
+    return "has been changed since its sha256 was compared" if identities.setdefault(path, identity) != identity else ""
 
 
 def replace_file(path: Path, content: bytes) -> None:

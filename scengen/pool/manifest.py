@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import PoolError, ScengenError
 from ..typed import typed
+from .files import FileEntry as FileEntry
 from .files import read_json_file, replace_file
 from .untrusted import (
     HASH,
@@ -46,17 +47,6 @@ _SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _HIT = re.compile(r"hits/[A-Za-z0-9_-]{1,200}\.npz")
 _SAMPLER = re.compile(r"iid|sobol|(lhs|grid):[0-9]{1,6}")
 _NUMBER = re.compile(r"((?<!\w)-)?\d+(\.\d+)?")
-
-
-@dataclass(frozen=True)
-class FileEntry:
-    """What a manifest says of a file with rows."""
-
-    file: str
-    """Name of the file, which lies beside the manifest."""
-    rows: int
-    bytes: int
-    sha256: str
 
 
 @dataclass(frozen=True)
@@ -206,18 +196,11 @@ def without_numbers(reason: str) -> str:
 
 def _check(manifest: Manifest) -> None:
     _check_config(manifest.config)
-    for name in ("funnel", "reasons"):
-        for what, count in getattr(manifest, name).items():
-            check_text(name, what, 1000)
-            check_whole(f"{name} {what[:60]!r}", count, MAX_INDICES * 100)
-    for name in ("indices", "n", "first_draws"):
-        check_whole(name, getattr(manifest, name), MAX_INDICES)
-    check_versions(manifest.versions)
-    check_match("fingerprint", manifest.fingerprint, SHORT_HASH)
-    check_match("source_sha256", manifest.source_sha256, HASH)
+    check_counts(manifest, ("funnel", "reasons"), ("indices", "n", "first_draws"))
+    check_origin(manifest)
     demand(0 < len(manifest.shards) <= MAX_SHARDS, f"{len(manifest.shards)} shards; 1 to {MAX_SHARDS} are read")
     for entry in manifest.files:
-        _check_entry(entry)
+        check_entry(entry)
     demand(len({entry.file for entry in manifest.shards}) == len(manifest.shards), "a shard is listed twice")
     if manifest.rejected is not None:
         demand(manifest.rejected.file == REJECTED, f"rejected names another file than {REJECTED}")
@@ -228,15 +211,37 @@ def _check(manifest: Manifest) -> None:
         check_text("subset.chosen", manifest.subset.get("chosen"), 1000)
 
 
+def check_counts(manifest: Any, groups: Sequence[str], numbers: Sequence[str]) -> None:
+    """Counts by text, and numbers, of a manifest."""
+    for name in groups:
+        for what, count in getattr(manifest, name).items():
+            check_text(name, what, 1000)
+            check_whole(f"{name} {what[:60]!r}", count, MAX_INDICES * 100)
+    for name in numbers:
+        check_whole(name, getattr(manifest, name), MAX_INDICES)
+
+
+def check_origin(manifest: Any) -> None:
+    """Entries that say with what something was made."""
+    check_versions(manifest.versions)
+    check_match("fingerprint", manifest.fingerprint, SHORT_HASH)
+    check_match("source_sha256", manifest.source_sha256, HASH)
+
+
 def _check_config(config: RunConfig) -> None:
-    _check_task(config.task)
+    check_draws(config.task, config.split, config.sampler, config.seed)
     check_text("config.certify.name", config.certify.get("name"), 100)
     check_settling(config.certify.get("settle"))
-    check_text("config.split", config.split, 1000)
-    check_match("config.sampler", config.sampler, _SAMPLER)
-    check_whole("config.seed", config.seed)
     for verdict in config.keep:
         demand(verdict in ("refuted", "unknown"), "config.keep names another verdict than refuted and unknown")
+
+
+def check_draws(task: Mapping[str, Any], split: str, sampler: str, seed: int) -> None:
+    """Entries of a configuration that decide which scenarios are drawn."""
+    _check_task(task)
+    check_text("config.split", split, 1000)
+    check_match("config.sampler", sampler, _SAMPLER)
+    check_whole("config.seed", seed)
 
 
 def _check_task(task: Mapping[str, Any]) -> None:
@@ -256,7 +261,8 @@ def _check_task(task: Mapping[str, Any]) -> None:
         left -= count
 
 
-def _check_entry(entry: FileEntry) -> None:
+def check_entry(entry: FileEntry) -> None:
+    """An entry of a file with rows."""
     check_text("the file of a shard", entry.file, 1000)
     demand(_SHARD.fullmatch(entry.file) is not None, f"the shard {entry.file[:60]!r} lies outside the pool")
     check_whole("rows of a shard", entry.rows, MAX_INDICES)

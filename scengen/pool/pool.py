@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import PoolError, UnknownName
 from .directory import Directory
-from .files import Identity, open_plain, sha256_of_file, sha256_of_opened
+from .files import Identity, sha256_of_file, why_damaged
 from .manifest import MANIFEST, FileEntry, Manifest
 from .names import Name
 from .reader import MAX_ROWS, Reader
@@ -63,24 +63,8 @@ class Pool:
     def damaged(self) -> dict[str, str]:
         """Faults of the files, by name; empty for a sound pool. From now on only the very files are read that were
         compared: a file that is replaced or written afterwards cannot be read."""
-        faults = ((entry.file, self._fault(entry)) for entry in self.manifest.files)
+        faults = ((entry.file, why_damaged(self.folder, entry, self._identities)) for entry in self.manifest.files)
         return {name: why for name, why in faults if why}
-
-    def _fault(self, entry: FileEntry) -> str:
-        """What is wrong with a file; empty if nothing is."""
-        path = self.folder / entry.file
-        try:
-            with open_plain(path) as file:
-                identity = Identity.of(file)
-                if identity.size != entry.bytes:
-                    return f"has {identity.size} bytes instead of {entry.bytes}: truncated"
-                if sha256_of_opened(file) != entry.sha256:
-                    return "has another sha256 than the manifest says"
-        except (OSError, ValueError) as error:
-            return str(error).removeprefix("it ")
-        if self._identities.setdefault(path, identity) != identity:
-            return "has been changed since its sha256 was compared"
-        return ""
 
     def check(self) -> "Pool":
         """Raise `PoolError` unless every file is what the manifest says."""

@@ -1,8 +1,9 @@
-"""One scenario of a pool. Its fields are the columns of the shards: a new column is a new field of `PoolRow`."""
+"""Rows of the shards: scenarios of a pool, and demonstrations. A new column is a new field of a class of rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, get_args, get_type_hints
+from functools import cache, cached_property
+from typing import Annotated, Any, Self, get_args, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -14,15 +15,15 @@ from ..params import Value
 from . import columns
 from .columns import ID, matching, text
 from .names import Name
-from .untrusted import HASH, MAX_TEXT, WORD
+from .untrusted import HASH, MAX_TEXT, SHORT_HASH, WORD
 
 NO_WITNESS: NDArray[np.float32] = np.zeros((0, ACTION), np.float32)
 """Witness of a row that was read without its witness."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PoolRow:
-    """One scenario of a pool.
+class SceneRow:
+    """Columns of every row: a scenario with recorded actions.
 
     Each field is a column: its type says how Arrow stores the column, and the function beside the type reads it.
     """
@@ -55,7 +56,6 @@ class PoolRow:
     witness: Annotated[NDArray[np.float32], columns.witness] = field(repr=False, compare=False)
     """Actions of a success as the controller received them, shape (n, 7 * arms)."""
     witness_sha256: Annotated[str, matching(HASH)]
-    certificate: Annotated[StoredCertificate, columns.certificate] = field(repr=False)
 
     @property
     def name(self) -> Name:
@@ -64,28 +64,80 @@ class PoolRow:
 
     def plain(self) -> dict[str, Any]:
         """All columns but the witness as plain data, as a shard stores them."""
-        return {name: columns.plain_value(getattr(self, name)) for name in WITHOUT_WITNESS}
+        return {name: columns.plain_value(getattr(self, name)) for name in layout(type(self)).without_witness}
 
     @classmethod
-    def of(cls, plain: Mapping[str, Any], witness: NDArray[np.float32]) -> "PoolRow":
+    def of(cls, plain: Mapping[str, Any], witness: NDArray[np.float32]) -> Self:
         """The reverse of `plain`.
 
         Raises:
             ValueError: a column holds something that is not allowed there.
         """
-        return cls(**{name: READERS[name](name, value) for name, value in plain.items()}, witness=witness)
+        readers = layout(cls).readers
+        return cls(**{name: readers[name](name, value) for name, value in plain.items()}, witness=witness)
 
 
-_KINDS = {name: get_args(hint) for name, hint in get_type_hints(PoolRow, include_extras=True).items()}
+@dataclass(frozen=True, kw_only=True)
+class PoolRow(SceneRow):
+    """One scenario of a pool."""
 
-NAMES = tuple(_KINDS)
-"""Names of all columns."""
-WITHOUT_WITNESS = tuple(name for name in NAMES if name != "witness")
-"""Names of all columns but the largest."""
-READERS: dict[str, columns.Reader] = {name: read for name, (_, read) in _KINDS.items()}
-"""Functions that turn stored values into values of fields, by column."""
-SCHEMAS = {
-    size: pa.schema([(name, columns.arrow_type(kind, size)) for name, (kind, _) in _KINDS.items()])
-    for size in sorted(columns.ACTION_SIZES)
-}
-"""Columns of a shard, by the numbers in an action of its robots."""
+    certificate: Annotated[StoredCertificate, columns.certificate] = field(repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemonstrationRow(SceneRow):
+    """One demonstration: actions that solve a scenario, or a failed attempt."""
+
+    run: Annotated[int, columns.whole]
+    """Number of the run in its scenario, from 0."""
+    style: Annotated[str, matching(WORD)]
+    """Style of the moves, see `scengen.demos.styles`."""
+    outcome: Annotated[str, columns.outcome]
+    """Result of the run; `success` for a demonstration, another one for a failed attempt."""
+    reason: Annotated[str, text(MAX_TEXT)]
+    """Reason why a failed attempt is one; empty for a success."""
+    seconds: Annotated[float, columns.seconds]
+    """Time at which the goal was reached, or at which the run ended [s]."""
+    final_state: Annotated[str, matching(SHORT_HASH)]
+    """Hash of the physics state at the end of the actions."""
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Identity of the run, which its style and noise depend on: task, scenario, number of the run."""
+        return self.task, self.id, self.run
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Columns of one kind of row."""
+
+    names: tuple[str, ...]
+    """Names of all columns."""
+    readers: Mapping[str, columns.Reader]
+    """Functions that turn stored values into values of fields, by column."""
+    schemas: Mapping[int, pa.Schema]
+    """Columns of a shard as Arrow stores them, by the numbers in an action of its robots."""
+
+    @cached_property
+    def without_witness(self) -> tuple[str, ...]:
+        """Names of all columns but the largest."""
+        return tuple(name for name in self.names if name != "witness")
+
+
+@cache
+def layout(kind: type[SceneRow]) -> Layout:
+    """The columns of a kind of row."""
+    kinds = {name: get_args(hint) for name, hint in get_type_hints(kind, include_extras=True).items()}
+    schemas = {
+        size: pa.schema([(name, columns.arrow_type(type_, size)) for name, (type_, _) in kinds.items()])
+        for size in sorted(columns.ACTION_SIZES)
+    }
+    return Layout(tuple(kinds), {name: read for name, (_, read) in kinds.items()}, schemas)
+
+
+NAMES = layout(PoolRow).names
+"""Names of all columns of a pool."""
+WITHOUT_WITNESS = layout(PoolRow).without_witness
+"""Names of all columns of a pool but the largest."""
+SCHEMAS = layout(PoolRow).schemas
+"""Columns of a shard of a pool, by the numbers in an action of its robots."""

@@ -15,10 +15,11 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..errors import PoolError
+from . import columns
 from .columns import ID, check_robot
 from .files import MAX_JSON, Identity, open_plain
 from .manifest import FORMAT
-from .row import READERS, SCHEMAS
+from .row import Layout, PoolRow, layout
 from .untrusted import memory_bounded
 
 BATCH_ROWS = 20
@@ -42,6 +43,8 @@ class Shard:
     """Number of its rows, by the manifest."""
     identities: Mapping[Path, Identity]
     """Identities of the files whose hashes were compared. The file is not read if its own has changed since."""
+    layout: Layout = layout(PoolRow)
+    """Columns of the rows."""
 
 
 # --- rows -------------------------------------------------------------------------------------------------------------
@@ -57,7 +60,7 @@ def read_rows(shard: Shard, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
         _check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, BATCH_ROWS):
-            for values in _values(batch):
+            for values in _values(batch, shard.layout):
                 count += 1
                 _check_count(shard, count, False)
                 yield values
@@ -83,7 +86,7 @@ def read_rows_at(
         place = next(wanted, None)
         for batch in _batches(file, names, BATCH_ROWS, [group]):
             while place is not None and place < start + len(batch):
-                yield from _values(batch.slice(place - start, 1))
+                yield from _values(batch.slice(place - start, 1), shard.layout)
                 place = next(wanted, None)
             if place is None:
                 return
@@ -91,10 +94,10 @@ def read_rows_at(
         raise ValueError(f"there is no row {place}")
 
 
-def _values(batch: pa.RecordBatch) -> Iterator[dict[str, Any]]:
+def _values(batch: pa.RecordBatch, layout: Layout) -> Iterator[dict[str, Any]]:
     _check_no_nulls(batch)
     names = batch.schema.names
-    streams = [_column(column, name) for name, column in zip(names, batch.columns, strict=True)]
+    streams = [_column(column, name, layout.readers[name]) for name, column in zip(names, batch.columns, strict=True)]
     for row in zip(*streams, strict=True):
         values = dict(zip(names, row, strict=True))
         if {"embodiment", "witness"} <= values.keys():
@@ -102,9 +105,8 @@ def _values(batch: pa.RecordBatch) -> Iterator[dict[str, Any]]:
         yield values
 
 
-def _column(column: pa.Array, name: str) -> Iterator[Any]:
+def _column(column: pa.Array, name: str, read: columns.Reader) -> Iterator[Any]:
     """Values one by one. A witness becomes an array at once: a list of numbers would need fifty times the memory."""
-    read = READERS[name]
     if name == "witness":
         for actions in column:
             flat = actions.values.flatten().to_numpy(zero_copy_only=False)
@@ -145,7 +147,7 @@ def read_categories(shard: Shard, name: str) -> tuple[list[str], NDArray[np.int3
     for batch in _small_columns(shard, (name,)):
         encoded = batch.column(0).dictionary_encode()
         for text in (texts := encoded.dictionary.to_pylist()):
-            found.setdefault(READERS[name](name, text), len(found))
+            found.setdefault(shard.layout.readers[name](name, text), len(found))
             if len(found) > MAX_CATEGORIES:
                 raise PoolError(f"{shard.path} holds more than {MAX_CATEGORIES} kinds of {name}; see scengen verify")
         codes.append(np.array([found[text] for text in texts], np.int32)[encoded.indices.to_numpy()])
@@ -200,7 +202,7 @@ def opened(shard: Shard, metadata: pq.FileMetaData | None = None) -> Iterator[pq
         ) as file,
     ):
         _check_unchanged(shard, content)
-        if not any(file.schema_arrow.equals(known) for known in SCHEMAS.values()):
+        if not any(file.schema_arrow.equals(known) for known in shard.layout.schemas.values()):
             raise ValueError(f"its columns are not those of pool format {FORMAT}")
         yield file
         _check_unchanged(shard, content)

@@ -15,7 +15,7 @@ from ..control.loop import ACTION
 from .files import sha256_of_file
 from .manifest import REJECTED, FileEntry, Manifest
 from .pool import Pool
-from .row import SCHEMAS, PoolRow
+from .row import SCHEMAS, PoolRow, SceneRow, layout
 
 SHARD_ROWS = 10_000
 """Number of scenarios in a file: some 150 MB, written and hashed in seconds."""
@@ -95,17 +95,18 @@ def write_shard(folder: Path, number: int, rows: Iterable[PoolRow]) -> FileEntry
     return write_rows(folder / f"scenarios-{number:05d}.parquet", rows)
 
 
-def write_rows(path: Path, rows: Iterable[PoolRow]) -> FileEntry:
+def write_rows(path: Path, rows: Iterable[SceneRow], kind: type[SceneRow] = PoolRow) -> FileEntry:
     """Write one file, a group of rows at a time.
 
     If the process dies at any moment, the file is either the old one or the new one.
 
     Args:
         rows: all of robots with the same number of arms.
+        kind: class of the rows.
     """
     part, count = path.with_name(path.name + ".part"), 0
-    tables = _tables(rows)
-    begin = list(islice(tables, 2)) or [_table([])]
+    tables = _tables(rows, kind)
+    begin = list(islice(tables, 2)) or [_table([], kind)]
     packing = PACKING | LARGE_FILE_PACKING if len(begin) > 1 else PACKING
     try:
         with open(part, "wb") as file:
@@ -122,18 +123,18 @@ def write_rows(path: Path, rows: Iterable[PoolRow]) -> FileEntry:
     return entry
 
 
-def _tables(rows: Iterable[PoolRow]) -> Iterator[pa.Table]:
+def _tables(rows: Iterable[SceneRow], kind: type[SceneRow]) -> Iterator[pa.Table]:
     """Groups of rows."""
     left = iter(rows)
     while group := list(islice(left, GROUP_ROWS)):
-        yield _table(group)
+        yield _table(group, kind)
 
 
-def _table(group: Sequence[PoolRow]) -> pa.Table:
+def _table(group: Sequence[SceneRow], kind: type[SceneRow]) -> pa.Table:
     """A group of rows. Witnesses become a column without lists of numbers, which would need fifty times the memory."""
     witnesses = [row.witness for row in group]
     size = witnesses[0].shape[1] if witnesses else ACTION
-    schema = SCHEMAS[size]
+    schema = layout(kind).schemas[size]
     plain = pa.Table.from_pylist([{**row.plain(), "witness": None} for row in group], schema=schema)
     offsets = np.cumsum([0, *map(len, witnesses)], dtype=np.int32)
     flat = np.concatenate([np.zeros((0, size)), *witnesses], dtype=np.float32).ravel()

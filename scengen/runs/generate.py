@@ -1,29 +1,27 @@
 """A generation run: draw, certify in parallel, remember everything, write the pool."""
 
-import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
-from ..errors import BadConfig, Infeasible, PoolError, at_least
+from ..errors import BadConfig, Infeasible, at_least
 from ..pool import Pool, PoolRow, writing
 from ..pool.files import replace_file, sha256
-from ..pool.manifest import PROCESS, Manifest, RunConfig, without_numbers
+from ..pool.manifest import PROCESS, Manifest, RunConfig
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..validate import lock
 from ..validate.certify import Certified, certify
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
-from ..work.parallel import Limits, Workers, each
-from ..work.targets import refused
+from ..work.parallel import Limits, Workers
+from .attempts import Progress, Wanted, extend, first_of, rejection, writing_told
 from .filling import Filling, moved_shards
 from .journal import Journal, Record
 
@@ -71,15 +69,6 @@ class Summary:
     """Report of the adversary, if an attack was asked for."""
     cpu: float
     """Processor time of all counted indices, in this run or earlier ones [s]."""
-
-
-MAX_LOST = 100
-"""Number of scenarios in a row that crash or reach a limit, at which a run ends: of a sound family hardly one in a
-hundred does."""
-
-Progress = Callable[[int, int, Mapping[str, int], Mapping[str, int]], None]
-"""Called with the numbers of certified scenarios and of finished indices, and the numbers of indices by verdict and of
-rejected ones by "check: reason"."""
 
 
 @dataclass(frozen=True)
@@ -151,28 +140,14 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
         locked = lock.lock_of_run(journal.folder, task.family, made_with(task))
         records = journal.records()
         _extend(job, settings, records, journal, progress)
-        asked = settings.attack and _first_certified(records, settings.n)
+        asked = settings.attack and first_of(records, "certified", settings.n)
         report = _attack(job, settings, records, journal, progress) if asked else None
-        with _writing(folder):
+        with writing_told(folder):
             folder.mkdir(parents=True, exist_ok=True)
             replace_file(folder / lock.LOCK_FILE, locked.encode())
             return _finish(folder, task, config, settings, records, journal, report)
     finally:
         journal.close()
-
-
-@contextmanager
-def _writing(folder: Path) -> Iterator[None]:
-    """Report a folder that cannot be written.
-
-    Raises:
-        PoolError: one line with the remedy.
-    """
-    try:
-        yield
-    except OSError as error:
-        why = f"{refused(folder, error)}; finished work is kept, repeat the command to continue"
-        raise PoolError(why) from None
 
 
 def row_of(task: Task, draw: Draw, certified: Certified) -> PoolRow:
@@ -230,48 +205,18 @@ def _extend(
     limit = settings.limit or max(100, 20 * settings.n)
     if size := job.task.design(job.sampler).size:
         limit = min(limit, size)
-    missing = (i for i in range(limit) if i not in records)
+    # an attack decides last which scenarios are in a pool
+    filling = Filling(journal, 0 if settings.attack else settings.n)
     limits = Limits(settings.limit_seconds, settings.limit_mb)
-    verdicts = Counter(r.verdict for r in records.values())
-    reasons = Counter(_rejection(r) for r in records.values() if r.check)
-    lost_in_a_row = 0
-    filling = Filling(
-        journal, 0 if settings.attack else settings.n
-    )  # an attack decides last which scenarios are in a pool
-
-    def needed(index: int) -> bool:
-        """Whether an index can still be among the first n certified ones."""
-        if verdicts["certified"] < settings.n:
-            return True
-        return sum(r.verdict == "certified" for i, r in records.items() if i < index) < settings.n
-
-    with _writing(journal.folder):
-        filling.follow(records)
-    for record in each(job, itertools.takewhile(needed, missing), settings.workers, limits, job.lost_record):
-        journal.add(record)
-        records[record.index] = record.light()
-        with _writing(journal.folder):
-            filling.follow(records)
-        verdicts[record.verdict] += 1
-        if record.check:
-            reasons[_rejection(record)] += 1
-        lost_in_a_row = lost_in_a_row + 1 if record.check == PROCESS else 0
-        if lost_in_a_row == MAX_LOST:
-            why = f"{MAX_LOST} scenarios in a row have no verdict, the last because it {record.reason}"
-            raise PoolError(f"{why}; raise limit_seconds= and limit_mb=, or debug one with workers=1")
-        progress(verdicts["certified"], len(records), verdicts, reasons)
-
-
-def _rejection(record: Record) -> str:
-    """Check and reason of a rejected index, the same for rejections of the same kind."""
-    return without_numbers(f"{record.check}: {record.reason}")
+    wanted = Wanted("certified", settings.n, limit, settings.workers, limits)
+    extend(job, wanted, records, journal, progress, filling.follow)
 
 
 def _attack(
     job: Job, settings: GenerateSettings, records: dict[int, Record], journal: Journal, progress: Progress
 ) -> attacks.AttackReport:
     """Attack the scenarios that go into the pool. Those that have a way around are left out."""
-    indices = _first_certified(records, settings.n)
+    indices = first_of(records, "certified", settings.n)
     subjects = attacks.certified(job.task, journal.rows(indices))
     wanted = attacks.AttackSettings(
         split=settings.split,
@@ -295,11 +240,6 @@ def _attack(
     return report
 
 
-def _first_certified(records: Mapping[int, Record], n: int) -> list[int]:
-    """The first n certified indices."""
-    return [i for i in sorted(records) if records[i].verdict == "certified"][:n]
-
-
 def _finish(
     folder: Path,
     task: Task,
@@ -310,11 +250,11 @@ def _finish(
     report: attacks.AttackReport | None,
 ) -> Summary:
     """Write the first n certified scenarios, and count the indices up to the last of them."""
-    certified = _first_certified(records, settings.n)
+    certified = first_of(records, "certified", settings.n)
     enough = len(certified) == settings.n
     counted = [records[i] for i in sorted(records) if not enough or i <= certified[-1]]
     kept = [r.index for r in counted if r.verdict in settings.keep and r.check not in _WITHOUT_ROW]
-    reasons = Counter(_rejection(r) for r in counted if r.check not in ("", "feasible"))
+    reasons = Counter(rejection(r) for r in counted if r.check not in ("", "feasible"))
     for record in counted:
         reasons.update({f"feasible: {why}": times for why, times in record.infeasible.items()})
     counts = funnel(counted)

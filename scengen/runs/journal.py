@@ -16,6 +16,7 @@ from filelock import FileLock, Timeout
 from ..errors import PoolError
 from ..pool import PoolRow
 from ..pool.manifest import MANIFEST, FileEntry
+from ..pool.row import SceneRow
 from ..sim.world import action_size
 from ..work.log import different
 from ..work.targets import refused, try_folder
@@ -23,19 +24,20 @@ from ..work.targets import refused, try_folder
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Result of one index."""
+    """Result of one index, or of one attempt at a demonstration."""
 
     index: int
     verdict: str
     check: str
-    """The first check that failed; empty for a certified scenario."""
+    """The first check that failed; empty if there is none."""
     reason: str
     proposals: int
     """Number of draws for this index, infeasible ones included."""
     infeasible: dict[str, int]
     """Number of infeasible draws by reason."""
-    row: PoolRow | None
-    """The scenario, if it goes into the pool or is kept on request; None in the records of `Journal.records`."""
+    row: SceneRow | None
+    """The scenario or demonstration, if it goes into the pool or is kept on request; None in the records of
+    `Journal.records`."""
     cpu: float
     """Processor time spent [s]; differs from run to run and stays out of the pool."""
 
@@ -50,31 +52,41 @@ NONE_INFEASIBLE: dict[str, int] = {}
 
 
 class Journal:
-    """Records of one run in an SQLite file beside the pool. One writer at a time."""
+    """Records of one run in an SQLite file beside the pool, or another folder of rows. One writer at a time."""
 
-    def __init__(self, pool: Path, identity: Mapping[str, Any]):
+    def __init__(
+        self,
+        pool: Path,
+        identity: Mapping[str, Any],
+        manifest: str = MANIFEST,
+        kind: type[SceneRow] = PoolRow,
+        setting: str = "pool",
+    ):
         """Begin or continue the run that makes `pool`.
 
         Args:
             identity: all settings that the scenarios depend on.
+            manifest: name of the file that a finished folder has.
+            kind: class of the rows.
+            setting: name of the setting that names the folder, for errors.
 
         Raises:
             ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was begun.
         """
         if not pool.name or pool.name == "..":
-            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with pool=")
+            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
         try_folder(pool)
-        self.folder = pool.with_name(pool.name + ".run")
+        self.folder, self._kind, self._setting = pool.with_name(pool.name + ".run"), kind, setting
         self._path = self.folder / "journal.sqlite"
-        if (pool / MANIFEST).exists() and not self._path.exists():
-            raise PoolError(f"{pool} is finished and its run's journal is gone; choose another pool=")
+        if (pool / manifest).exists() and not self._path.exists():
+            raise PoolError(f"{pool} is finished and its run's journal is gone; choose another {setting}=")
         new = not self.folder.exists()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._lock = FileLock(self.folder / "lock")
             self._lock.acquire(timeout=0)
         except Timeout:
-            raise PoolError(f"another run is writing {pool}; wait for it or choose another pool=") from None
+            raise PoolError(f"another run is writing {pool}; wait for it or choose another {setting}=") from None
         except OSError as error:
             raise refused(self.folder, error) from None
         try:
@@ -104,7 +116,7 @@ class Journal:
         if before is not None and begun[0] != text:
             differs = ", ".join(different(before, json.loads(text)))
             raise PoolError(
-                f"{pool} was begun with other settings ({differs}); choose another pool=, or move it and "
+                f"{pool} was begun with other settings ({differs}); choose another {self._setting}=, or move it and "
                 f"{self.folder} aside"
             )
 
@@ -114,15 +126,15 @@ class Journal:
             found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
             return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu).light() for body, cpu in found)}
 
-    def rows(self, indices: Iterable[int]) -> Iterator[PoolRow]:
-        """The stored scenarios of some indices, one after the other."""
+    def rows(self, indices: Iterable[int]) -> Iterator[Any]:
+        """The stored rows of some indices, one after the other."""
         for index in indices:
             with self._faults_told():
                 query = "SELECT scene, actions FROM record WHERE idx = ?"
                 scene, actions = self._db.execute(query, (index,)).fetchone()
                 plain = json.loads(scene)
                 size = action_size(plain["embodiment"])
-                row = PoolRow.of(plain, np.frombuffer(actions, np.float32).reshape(-1, size))
+                row = self._kind.of(plain, np.frombuffer(actions, np.float32).reshape(-1, size))
             yield row
 
     def add(self, record: Record) -> None:

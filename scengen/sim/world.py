@@ -22,6 +22,7 @@ from ..robots.jaw import OVERLAP
 from ..robots.panda import MAX_ARMS, Names
 from . import scene_text
 from .memory import Memory
+from .style import Style
 
 ROBOT = "robot"
 """Name that stands for any body of any arm in questions about contact."""
@@ -269,6 +270,8 @@ class World:
     memory: Memory = field(init=False)
     """Numbers that record the episode's history, by the names that the scene was told to `remember`; all 0 at the
     start."""
+    style: Style | None = field(default=None, init=False)
+    """Style of the moves in this episode; None for those of certificates. A reset removes it."""
     _happening: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
@@ -313,6 +316,7 @@ class World:
         """Return to the start. A used world then behaves bit by bit like a fresh one."""
         self.loop.reset()
         self.filter.reset()
+        self.style = None
         for arm in (*self.arms, *self.partners):
             arm.grip, arm.told = -1.0, IDLE
 

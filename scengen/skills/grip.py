@@ -57,9 +57,13 @@ def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
 def best_grip(arm: Arm, body: str) -> Grip | None:
     """The narrowest grasp of an object as it lies now; among equal ones the one that turns the hand least.
 
-    None if the object is too wide in every direction.
+    A style may choose any of the grasps that are hardly wider. None if the object is too wide in every direction.
     """
-    found = grips(arm.world, body)
+    found, style = grips(arm.world, body), arm.world.style
+    if style and found:
+        widest = (1.0 + style.slack) * min(grip.width for grip in found)
+        equal = [grip for grip in found if grip.width <= widest]
+        return equal[int(style.number("grip", body, arm.number) * len(equal))]
     return min(found, key=lambda grip: (round(grip.width, 3), abs(_turn(arm, grip.closing))), default=None)
 
 

@@ -7,7 +7,6 @@ that it steers; `together` joins the moves of several arms.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import wraps
 from typing import TypeVar
 
@@ -20,6 +19,10 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.world import ROBOT, Arm, World
+from .pace import COARSE as COARSE
+from .pace import FINE as FINE
+from .pace import STEADY as STEADY
+from .pace import Manner, Pace
 
 OPEN = -1.0
 """Gripper command: jaw open, or suction off."""
@@ -52,26 +55,6 @@ Condition = Callable[[], bool]
 """Condition on the world, such as the end of a move."""
 S = TypeVar("S")
 """Scenario family of a decorated method."""
-
-
-@dataclass(frozen=True)
-class Pace:
-    """Speed, accuracy and time limit of a move."""
-
-    speed: float
-    """Largest speed of the hand [m/s]."""
-    within: float
-    """Distance from the target at which the hand has arrived [m]."""
-    give_up: float = 6.0
-    """Time after which the move gives up [s]."""
-
-
-COARSE = Pace(0.30, 0.02)
-"""Pace of transit through free space, as fast as an action of 1."""
-STEADY = Pace(0.25, 0.005)
-"""Pace of a move to a place beside objects."""
-FINE = Pace(0.15, 0.003)
-"""Pace of a move up to an object that is to be grasped, put down or touched."""
 
 
 def facing_down(yaw: float = 0.0) -> Mat3:
@@ -136,8 +119,12 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
     Raises:
         GaveUp: the move took too long.
     """
-    world, goal, setpoint = arm.world, np.asarray(pos, float), arm.hand
-    end, rot = world.time + pace.give_up, arm.hand_rot if rot is None else rot
+    world, goal, rot = arm.world, np.asarray(pos, float), arm.hand_rot if rot is None else rot
+    manner = Manner.of(arm, goal, pace)
+    if manner.pause:
+        yield from hold(arm, manner.pause)
+    setpoint, beside, pace = arm.hand, np.zeros(3), manner.pace
+    end = world.time + pace.give_up
     while True:
         left = goal - arm.hand
         turn = between(arm.hand_rot, rot)
@@ -152,7 +139,12 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
         speed = min(pace.speed, 4.0 * distance)
         velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)
         setpoint = setpoint + velocity * Loop.PERIOD
-        yield steer(arm, setpoint, velocity, turn, grip)
+        if not manner.styled:
+            yield steer(arm, setpoint, velocity, turn, grip)
+            continue
+        before, beside = beside, manner.detour_at(distance)
+        drift = (beside - before) / Loop.PERIOD
+        yield steer(arm, setpoint + beside + manner.displacement_at(distance), velocity + drift, turn, grip)
 
 
 def _touching(arm: Arm) -> str:

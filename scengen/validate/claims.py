@@ -117,11 +117,12 @@ def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
         return
     for name, there in labels_of_draw(draw).items():
         here = getattr(row, name)
-        if name != "params" and _comparable(here) != _comparable(there):  # the id covers params
-            yield f"the {name} is {_short(_comparable(here))}; drawn again it is {_short(_comparable(there))}"
+        if name != "params" and comparable(here) != comparable(there):  # the id covers params
+            yield f"the {name} is {_short(comparable(here))}; drawn again it is {_short(comparable(there))}"
 
 
-def _comparable(value: Any) -> Any:
+def comparable(value: Any) -> Any:
+    """A value of a column in a form whose equality says that a pool stores the same."""
     return as_json(value) if isinstance(value, Mapping) else value
 
 
@@ -255,7 +256,7 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
                 f"check {name} cannot have passed with its numbers, or they are not those of this family; "
                 "if the family has changed since, certify the pool again"
             )
-    if not _passed_filter(row.witness):
+    if not passed_filter(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
 
 
@@ -312,7 +313,7 @@ def _numerics_hold(numbers: Mapping[str, Any]) -> bool:
     return set(numbers) == set(NUMERICS) and all(held)
 
 
-def _passed_filter(witness: np.ndarray) -> bool:
+def passed_filter(witness: np.ndarray) -> bool:
     """Whether the teleoperation filter can give these actions, starting from rest."""
     if np.abs(witness).max(initial=0.0) > 1.0:
         return False

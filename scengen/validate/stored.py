@@ -4,6 +4,7 @@ from dataclasses import asdict
 
 from ..errors import PoolError, ScengenError
 from ..pool import Pool
+from ..pool.demonstrations import Demonstrations
 from ..pool.manifest import Manifest
 from ..samplers.task import Task, load
 from ..typed import typed
@@ -13,8 +14,8 @@ MAX_SETTING = 3600
 """Largest number that is read as a setting of certificates: of the seconds, an hour."""
 
 
-def task_of_manifest(pool: Pool, installed: Task) -> Task:
-    """The task as it was when the pool was made.
+def task_of_manifest(pool: Pool | Demonstrations, installed: Task) -> Task:
+    """The task as it was when the pool, or the demonstrations, were made.
 
     Args:
         installed: the task of that name on this machine. Nothing is imported because a manifest names it: the family

@@ -20,6 +20,7 @@ from scengen import cli, list_tasks, load_task, task_files
 from scengen.cli.completion import completions
 from scengen.cli.verbs import RENAMED
 from scengen.commands.settings import read
+from scengen.demos.generate import DemosSettings
 from scengen.errors import BadConfig
 from scengen.evaluate import rollouts
 from scengen.export import recording
@@ -280,6 +281,7 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     ("verb", "kind", "given"),
     [
         ("generate", generate.GenerateSettings, {}),
+        ("demos", DemosSettings, {}),
         ("probe", axis_card.AxisSettings, {"axis": "diagonal"}),
         ("discover", discovery.DiscoverSettings, {}),
         ("evaluate", rollouts.EvaluateSettings, {"policy": "idle", "pool": "here"}),
@@ -287,7 +289,7 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
-    task = ["task=domino_single"] if verb in ("generate", "probe", "discover") else []
+    task = ["task=domino_single"] if verb in ("generate", "demos", "probe", "discover") else []
     assert read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 

@@ -108,7 +108,7 @@ def playground() -> Iterator[Path]:
 
 WORK = (
     "scengen.validate.certify.certify",
-    "scengen.runs.generate.each",
+    "scengen.runs.attempts.each",
     "scengen.evaluate.rollouts.each",
     "scengen.evaluate.rollouts.unplayable",
     "scengen.export.recording.unplayable",

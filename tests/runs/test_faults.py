@@ -21,7 +21,7 @@ from pools import QUICKLY, make
 from scengen import cli
 from scengen.errors import ScengenError
 from scengen.pool import Pool
-from scengen.runs import generate
+from scengen.runs import attempts, generate
 from scengen.runs.journal import Journal, Record
 from scengen.work.log import Log
 from scengen.work.targets import try_folder
@@ -155,7 +155,7 @@ def test_a_pool_that_cannot_be_finished_keeps_its_run(finished, tmp_path, capsys
 
 
 def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(generate, "each", None)  # nothing is certified
+    monkeypatch.setattr(attempts, "each", None)  # nothing is certified
     (tmp_path / "file").write_text("")
     for pool in (
         tmp_path / "file",
@@ -297,7 +297,7 @@ def test_a_limit_on_files_is_one_line_and_the_run_goes_on_afterwards(finished, t
 
 
 def test_a_run_that_loses_every_scenario_ends_and_says_why(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(generate, "MAX_LOST", 2)
+    monkeypatch.setattr(attempts, "MAX_LOST", 2)
     slow = ("limit_seconds=1", "certify.robust.runs=500")
     assert cli.run(["generate", "task=domino_single", "n=3", *slow, f"pool={tmp_path / 'pool'}"]) == 2
     told = "2 scenarios in a row have no verdict, the last because it took longer than 1 s"

@@ -1,0 +1,1 @@
+"""Demonstrations: scripted solutions in several styles, generated, verified and measured."""

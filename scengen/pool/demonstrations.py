@@ -1,0 +1,272 @@
+"""Demonstrations on disk: a folder with `demonstrations.json` and Parquet files. As a pool, it is data only."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import PoolError, ScengenError
+from ..typed import typed
+from . import writing
+from .files import Identity, read_json_file, replace_file, sha256_of_file, why_damaged
+from .manifest import (
+    MAX_INDICES,
+    MAX_SHARDS,
+    FileEntry,
+    check_counts,
+    check_draws,
+    check_entry,
+    check_origin,
+)
+from .reader import Reader
+from .row import DemonstrationRow, layout
+from .shards import Shard
+from .untrusted import (
+    HASH,
+    MAX_TEXT,
+    WORD,
+    check_mapping,
+    check_match,
+    check_settling,
+    check_text,
+    check_whole,
+    demand,
+)
+
+DEMONSTRATIONS = "demonstrations.json"
+"""File with what a folder of demonstrations says of itself."""
+FAILED = "failed.parquet"
+"""File of the failed attempts, if they were kept."""
+DEMONSTRATIONS_FORMAT = 1
+"""Version of the format, which changes with the columns, the names of files and the entries of the manifest."""
+
+
+@dataclass(frozen=True)
+class DemonstrationConfig:
+    """Everything that decides which demonstrations a run makes."""
+
+    task: Mapping[str, Any]
+    """Name of the task and content of its file, with measured limits and what the command line changed."""
+    split: str
+    sampler: str
+    """Design that the numbers came from, such as `iid`; see `scengen.samplers.designs`."""
+    seed: int
+    runs: int
+    """Number of runs of one scenario."""
+    styles: tuple[str, ...]
+    """Styles that the runs were chosen from."""
+    keep: tuple[str, ...]
+    """`failed` if failed attempts were kept."""
+    settle: float
+    """Time for which a reached goal had to last [s]."""
+    apart: tuple[str, ...]
+    """Hashes of the pools from which the scenarios were kept apart."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemonstrationManifest:
+    """What a folder of demonstrations says of itself."""
+
+    config: DemonstrationConfig
+    n: int
+    """Number of demonstrations that were asked for."""
+    indices: int
+    """Number of attempts: of indices, times the runs of each."""
+    funnel: Mapping[str, int]
+    """Number of attempts that got through each step."""
+    reasons: Mapping[str, int]
+    """Number of failed attempts by "check: reason"."""
+    outcomes: Mapping[str, int]
+    """Number of rollouts by outcome."""
+    styles: Mapping[str, int]
+    """Number of demonstrations by style."""
+    versions: Mapping[str, str]
+    """Versions of the packages that the physics depends on, and the platform."""
+    fingerprint: str
+    """Rounding of the machine; see `scengen.fingerprint`."""
+    source_sha256: str
+    """Hash of the code that gives the family its meaning."""
+    shards: tuple[FileEntry, ...] = ()
+    """Files of the demonstrations, in the order of the attempts."""
+    failed: FileEntry | None = None
+    """File of the failed attempts, if they were kept."""
+
+    @classmethod
+    def read(cls, folder: Path) -> "DemonstrationManifest":
+        """The manifest of a folder.
+
+        Raises:
+            PoolError: there is none, it is damaged, or it is of another format.
+        """
+        path = folder / DEMONSTRATIONS
+        if not path.is_file():
+            begun = Path(f"{folder}.run").is_dir()
+            hint = "a run was begun there; repeat its command to finish it" if begun else "see scengen demos"
+            raise PoolError(f"no demonstrations at {folder}: {DEMONSTRATIONS} is missing; {hint}")
+        try:
+            plain = dict(check_mapping("the manifest", read_json_file(path)))
+            version = plain.pop("format")
+            if version == DEMONSTRATIONS_FORMAT:
+                found = typed("", cls, plain, exact=True)
+                _check(found)
+                return found
+        except (ScengenError, ValueError, KeyError, TypeError, OSError) as error:
+            why = " ".join(str(error).split())[:160]
+            raise PoolError(f"{path} is damaged; restore it or make the demonstrations again ({why})") from None
+        told = f"{folder} has format {str(version)[:20]} of demonstrations, this scengen reads {DEMONSTRATIONS_FORMAT}"
+        raise PoolError(f"{told}; make them again with the command that made them")
+
+    def write(self, folder: Path) -> None:
+        """Write the manifest of a folder."""
+        plain = {name: value for name, value in asdict(self).items() if value is not None}
+        text = json.dumps({"format": DEMONSTRATIONS_FORMAT, **plain}, indent=1, sort_keys=True) + "\n"
+        replace_file(folder / DEMONSTRATIONS, text.encode())
+
+    @property
+    def task_node(self) -> dict[str, Any]:
+        """Content of the task's file as it was, with measured limits and what the command line changed."""
+        return {key: node for key, node in self.config.task.items() if key != "name"}
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """All files with rows."""
+        return self.shards if self.failed is None else (*self.shards, self.failed)
+
+
+def _check(manifest: DemonstrationManifest) -> None:
+    config = manifest.config
+    check_draws(config.task, config.split, config.sampler, config.seed)
+    check_whole("config.runs", config.runs, MAX_INDICES)
+    demand(config.runs > 0, "config.runs is 0")
+    check_settling(config.settle)
+    demand(0 < len(config.styles) <= 100, f"config.styles has {len(config.styles)} entries")
+    for style in config.styles:
+        check_match("config.styles", style, WORD)
+    demand(config.keep in ((), ("failed",)), "config.keep names something else than failed")
+    demand(len(config.apart) <= MAX_SHARDS, f"config.apart has {len(config.apart)} entries")
+    for pool in config.apart:
+        check_match("config.apart", pool, HASH)
+    check_counts(manifest, ("funnel", "reasons", "outcomes", "styles"), ("n", "indices"))
+    check_origin(manifest)
+    demand(0 < len(manifest.shards) <= MAX_SHARDS, f"{len(manifest.shards)} files; 1 to {MAX_SHARDS} are read")
+    for entry in manifest.files:
+        check_entry(entry)
+    demand(len({entry.file for entry in manifest.files}) == len(manifest.files), "a file is listed twice")
+    if manifest.failed is not None:
+        demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
+    check_text("config.split", config.split, MAX_TEXT)
+
+
+@dataclass(frozen=True)
+class Demonstrations:
+    """A finished folder of demonstrations, opened for reading. Errors are those of `scengen.pool.pool.Pool`."""
+
+    folder: Path
+    manifest: DemonstrationManifest
+
+    @classmethod
+    def open(cls, folder: str | Path) -> "Demonstrations":
+        """Open the demonstrations in a folder."""
+        return cls(Path(folder), DemonstrationManifest.read(Path(folder)))
+
+    def __len__(self) -> int:
+        return sum(entry.rows for entry in self.manifest.shards)
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        return self.manifest.config.task["name"]
+
+    @property
+    def split(self) -> str:
+        return self.manifest.config.split
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the manifest, which holds the hash of every file: equal hashes mean equal demonstrations."""
+        return sha256_of_file(self.folder / DEMONSTRATIONS)
+
+    def damaged(self) -> dict[str, str]:
+        """Faults of the files, by name. From now on only the very files are read that were compared."""
+        faults = ((entry.file, why_damaged(self.folder, entry, self._identities)) for entry in self.manifest.files)
+        return {name: why for name, why in faults if why}
+
+    def check(self) -> "Demonstrations":
+        """Raise `PoolError` unless every file is what the manifest says."""
+        for name, what in self.damaged().items():
+            raise PoolError(f"{self.folder / name} {what}; restore it or make the demonstrations again")
+        return self
+
+    def rows(self) -> Iterator[DemonstrationRow]:
+        """All demonstrations in the order of their attempts."""
+        return _rows(self._reader)
+
+    def failures(self) -> Iterator[DemonstrationRow]:
+        """The failed attempts, if they were kept (`keep=failed`)."""
+        entry = self.manifest.failed
+        return _rows(Reader([] if entry is None else [self._shard(entry)]))
+
+    def kinds(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
+        """The different texts in a column such as `style`, and which of them each demonstration has, shape (n,)."""
+        return self._reader.categories(name)
+
+    def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
+        """A few columns of the demonstrations, with the values of the fields of `DemonstrationRow`."""
+        for values in self._reader.rows(names):
+            yield tuple(values[name] for name in names)
+
+    @cached_property
+    def _identities(self) -> dict[Path, Identity]:
+        """Identities of the files whose hashes were compared."""
+        return {}
+
+    @cached_property
+    def _reader(self) -> Reader:
+        return Reader([self._shard(entry) for entry in self.manifest.shards])
+
+    def _shard(self, entry: FileEntry) -> Shard:
+        return Shard(self.folder / entry.file, entry.rows, self._identities, layout(DemonstrationRow))
+
+
+def _rows(reader: Reader) -> Iterator[DemonstrationRow]:
+    return (DemonstrationRow(**values) for values in reader.rows(layout(DemonstrationRow).names))
+
+
+def write_demonstrations(
+    folder: Path,
+    about: DemonstrationManifest,
+    rows: Iterable[DemonstrationRow],
+    failures: Iterable[DemonstrationRow],
+) -> Demonstrations:
+    """Write a folder of demonstrations: rows first, the manifest last.
+
+    Args:
+        about: the manifest; its files are replaced by those that are written.
+        rows: demonstrations in the order of their attempts.
+        failures: failed attempts; a file for them is written only if failed attempts are kept.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    shard = writing.write_rows(folder / "demonstrations-00000.parquet", rows, DemonstrationRow)
+    keep = bool(about.config.keep)
+    failed = writing.write_rows(folder / FAILED, failures, DemonstrationRow) if keep else None
+    replace(about, shards=(shard,), failed=failed).write(folder)
+    return Demonstrations.open(folder)
+
+
+def is_demonstrations(folder: str | Path) -> bool:
+    """Whether a folder holds demonstrations."""
+    return (Path(folder) / DEMONSTRATIONS).is_file()
+
+
+def demonstration_folders(given: str | Sequence[str]) -> list[str]:
+    """Folders of demonstrations. A folder without a manifest stands for those in it, as `task=all` writes them."""
+    found: list[str] = []
+    for folder in [given] if isinstance(given, str) else given:
+        inside = [] if is_demonstrations(folder) else sorted(Path(folder).glob(f"*/{DEMONSTRATIONS}"))
+        found += [str(path.parent) for path in inside] or [folder]
+    return found
