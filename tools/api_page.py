@@ -15,7 +15,15 @@ PAGE = ROOT / "docs" / "api.md"
 MODULES = {
     "The family": ("scenario", "params", "symmetry", "orientation"),
     "The world": ("sim.world", "sim.memory", "predicates", "geometry", "physics"),
-    "Moves": ("skills.motion", "skills.jaw", "skills.grip", "skills.suction", "skills.hook", "skills.handover"),
+    "Moves": (
+        "skills.motion",
+        "skills.pace",
+        "skills.jaw",
+        "skills.grip",
+        "skills.suction",
+        "skills.hook",
+        "skills.handover",
+    ),
     "The robot": ("robots.jaw", "control.teleop"),
     "Distributions and draws": (
         "samplers.task",
