@@ -1,15 +1,15 @@
-"""write witnesses as a LeRobot data set or a robomimic file, with forces and pictures"""
+"""write witnesses or demonstrations as a LeRobot data set or a robomimic file, with forces and pictures"""
 
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..export.recording import ROBOMIMIC, RecordSettings, record
-from ..pool import Pool
+from ..export.recording import RecordSettings, record
+from ..export.sources import ROBOMIMIC, open_source
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
-from . import FAILED, INTERRUPTED, OK, Arguments, err, names, say, warn
+from . import FAILED, INTERRUPTED, OK, Arguments, err, say, warn
 from .settings import read
 
 
@@ -35,7 +35,7 @@ def _split_up(settings: RecordSettings) -> Mapping[str, RecordSettings]:
     """The recordings to make by the shared property, below `to` if there are multiple."""
     found: dict[str, list[str]] = defaultdict(list)
     for folder in settings.folders:
-        for value in Pool.open(folder).kinds(_kind(settings))[0] or [""]:
+        for value in open_source(folder).kinds(_kind(settings))[0] or [""]:
             found[value].append(folder)
     if len(found) < 2:
         return {settings.to: settings}
@@ -61,9 +61,8 @@ def _record(settings: RecordSettings, arguments: Arguments) -> int:
         f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} per second, "
         f"{len(settings.camera_names)} cameras to {settings.to}"
     )
-    called = names(map(Pool.open, settings.folders), [*summary.failed, *summary.lost])
     for scenario in summary.failed:
-        warn(f"FAILED {called[scenario]}: the witness does not reach the goal here; its episode has success = false")
+        warn(f"FAILED {scenario}: its actions do not reach the goal here; its episode has success = false")
     for scenario, why in summary.lost.items():
-        warn(f"UNKNOWN {called[scenario]}: {why}; it is left out")
+        warn(f"UNKNOWN {scenario}: {why}; it is left out")
     return FAILED if summary.failed or summary.lost else OK

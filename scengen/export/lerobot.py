@@ -1,7 +1,8 @@
 """A LeRobot data set, format v3.0, written with pyarrow and PyAV only.
 
+    README.md                               card for people and for the Hugging Face Hub
     meta/info.json                          columns, and numbers of episodes and rows
-    meta/stats.json                         statistics of every column
+    meta/stats.json                         statistics of every column, with smallest spreads (`scengen.export.floors`)
     meta/tasks.parquet                      instructions
     meta/episodes/chunk-000/file-000.parquet   one row per episode: its rows, its frames, and its scenario
     meta/cameras/<camera>.json              intrinsics and extrinsics; an addition of the paper's to LeRobot's format
@@ -28,6 +29,8 @@ import pyarrow.parquet as pq
 from ..errors import BadConfig
 from ..pictures.render import Picture
 from ..pictures.video import CODEC, PIXELS, Movie
+from .dataset_card import card
+from .floors import floors_of, with_floors
 from .stats import Shades, Stats, describe
 
 VERSION = "v3.0"
@@ -186,9 +189,12 @@ class DatasetWriter:
         _write_table(self.folder / "meta" / "tasks.parquet", _task_table(self.tasks))
         for name, calibration in self._cameras.items():
             _write_json(self.folder / "meta" / "cameras" / f"{name}.json", calibration)
-        _write_json(self.folder / "meta" / "stats.json", self._stats())
+        stats = self._stats()
+        source = {**source, "constant": self._constant(stats)}
+        _write_json(self.folder / "meta" / "stats.json", self._floored(stats))
         _write_json(self.folder / "meta" / "info.json", self._info())
         _write_json(self.folder / "meta" / "scengen.json", source)
+        (self.folder / "README.md").write_text(card(self._info(), self.tasks, source))
 
     def __enter__(self) -> Self:
         return self
@@ -223,6 +229,22 @@ class DatasetWriter:
             column = pa.chunked_array([c for file in files for c in pq.read_table(file, columns=[name])[name].chunks])
             found[name] = describe(np.array(column.to_pylist(), feature.dtype))
         return found
+
+    def _floored(self, stats: Mapping[str, Stats]) -> dict[str, Stats]:
+        """The statistics with smallest spreads in all columns that trainers normalise."""
+        floats = {name: f for name, f in self.features.items() if f.dtype == "float32"}
+        floored = {n: with_floors(stats[n], floors_of(n, f.names, f.shape)) for n, f in floats.items()}
+        return {**stats, **floored}
+
+    def _constant(self, stats: Mapping[str, Stats]) -> list[str]:
+        """Names of the entries of vectors that never change in the data set."""
+        return [
+            entry
+            for name, feature in self.features.items()
+            if feature.names and len(feature.shape) == 1
+            for entry, low, high in zip(feature.names, stats[name]["min"], stats[name]["max"], strict=True)
+            if low == high
+        ]
 
     def _info(self) -> dict[str, Any]:
         return {

@@ -1,16 +1,18 @@
-"""Recordings: witnesses replayed and written as a LeRobot data set or for robomimic, with the paper's streams.
+"""Recordings: witnesses or demonstrations replayed and written as a LeRobot data set or for robomimic, with the paper's
+streams.
 
 A LeRobot data set has one rate, `fps`. A row holds the observations at one moment and the actions until the next row:
-with 25 rows per second, those of four control periods. The whole witness is kept: `actions` holds the actions that the
-controller received in all control periods of the row. These actions have passed the teleoperation filter; give them to
+with 25 rows per second, those of four control periods. All actions are kept: `control.actions` holds those that the
+controller received in all control periods of the row. LeRobot takes every column whose name begins with `action` for an
+output of the policy, hence the name. These actions have passed the teleoperation filter; give them to
 an environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -21,14 +23,15 @@ from .. import compose
 from ..control.loop import Loop
 from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
-from ..errors import BadConfig, PoolError, UnknownName, at_least
+from ..errors import BadConfig, UnknownName, at_least
 from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
-from ..pool import Pool, PoolRow, collection
+from ..pool import collection
+from ..pool.demonstrations import demonstration_folders, is_demonstrations
+from ..pool.row import DemonstrationRow
 from ..sim.world import World, hands
-from ..validate.identity import check_versions
 from ..validate.playable import stored_world, unplayable
 from ..versions import versions
 from ..work.parallel import Workers
@@ -37,13 +40,10 @@ from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
 from .replay import DatasetRow, Snapshot, WitnessReplay
+from .sources import LEROBOT, ROBOMIMIC, opened, robot_of, rows_of, scenes_of
 
 NONE = "none"
 """Value of `cameras` for a recording without pictures."""
-LEROBOT = "lerobot"
-"""Value of `format` for a LeRobot data set."""
-ROBOMIMIC = "robomimic"
-"""Value of `format` for robomimic's file."""
 FULL_RATE = round(1 / Loop.PERIOD)
 """Number of control periods in a second."""
 PAPER_RATE = 25
@@ -53,6 +53,10 @@ EPISODE_COLUMNS = (
     *("scene_sha256", "witness_sha256"),
 )
 """Columns of a pool that are also columns `scengen/<column>` of LeRobot's table of episodes."""
+DEMONSTRATION_COLUMNS = ("run", "style", "seconds")
+"""Columns of demonstrations that LeRobot's table of episodes has, too."""
+CONTROL_ACTIONS = "control.actions"
+"""Column with the actions of all control periods of a row."""
 STATE = "observation.state"
 """LeRobot's name of the robot's own pose."""
 ENVIRONMENT = "observation.environment_state"
@@ -76,8 +80,9 @@ class RecordSettings:
 
     @cached_property
     def folders(self) -> list[str]:
-        """Folders of the pools to record."""
-        return collection.folders(self.pool)
+        """Folders of the pools, or of the demonstrations, to record."""
+        found = demonstration_folders(self.pool)
+        return found if any(map(is_demonstrations, found)) else collection.folders(self.pool)
 
     @property
     def camera_names(self) -> list[str]:
@@ -125,9 +130,9 @@ class RecordSummary:
     rows: int
     """Number of rows."""
     failed: tuple[str, ...]
-    """Ids of the scenarios whose witness did not reach the goal; their episodes are marked as failures."""
+    """Names of the scenarios whose actions did not reach the goal; their episodes are marked as failures."""
     lost: Mapping[str, str]
-    """Reasons by id of the scenarios that were left out, because they cannot be replayed within the limits."""
+    """Reasons by name of the scenarios that were left out, because they cannot be replayed within the limits."""
 
 
 def record(settings: RecordSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> RecordSummary:
@@ -141,8 +146,8 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
         ScengenError: a pool or a setting is invalid, or OpenGL is missing for pictures.
     """
     settings.check()
-    pools = [Pool.open(folder).check() for folder in settings.folders]
-    robot, count = _robot(pools), sum(map(len, pools))
+    pools = opened(settings.folders, settings.format)
+    robot, count = robot_of(pools), sum(map(len, pools))
     for name in settings.camera_names:
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
@@ -151,17 +156,19 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
     tasks = {name: compose.load_task(name, search) for name in names}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
         raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them separately")
-    streams = streams_of(robot)
+    streams, bodies_told = streams_of(robot), ()
     if settings.privileged:
-        bodies = all_bodies(bodies_of(task, _scenes(pools, name)) for name, task in tasks.items())
+        bodies = all_bodies(bodies_of(task, scenes_of(pools, name)) for name, task in tasks.items())
         state = ObjectState(bodies, len(hands(robot)))
+        bodies_told = state.ordered
         streams[NAME] = Stream(state.names, state.bounds, state.read)
-    failed = []
+    failed, left_out, styles = list[str](), dict[str, str](), Counter[str]()
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
-        lost = dict(unplayable(_rows(pools, count), settings.workers))
-        with _writer(settings, path, robot, streams, next(iter(tasks)), tuple(search)) as writer:
-            for row in _rows(pools, count):
+        lost = dict(unplayable(rows_of(pools, count), settings.workers))
+        with _writer(settings, path, robot, streams, bodies_told, next(iter(tasks)), tuple(search)) as writer:
+            for row in rows_of(pools, count):
                 if row.id in lost:
+                    left_out[str(row.name)] = lost[row.id]
                     continue
                 with ExitStack() as stack:
                     world = stored_world(row, bool(settings.camera_names))
@@ -170,20 +177,13 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     observe = partial(Snapshot.of, world, writer.streams, pictures)
                     replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe)
                     if not writer.episode(replay):
-                        failed.append(row.id)
+                        failed.append(str(row.name))
+                if isinstance(row, DemonstrationRow):
+                    styles[row.style] += 1
                 progress(writer.episodes, count)
-            writer.finish({"pools": [pool.sha256 for pool in pools], "versions": versions()})
-    return RecordSummary(writer.episodes, writer.rows, tuple(failed), lost)
-
-
-def _scenes(pools: Sequence[Pool], task: str) -> Iterator[str]:
-    """Texts of the scenes of a task in some pools."""
-    holding = [pool for pool in pools if task in pool.kinds("task")[0]]
-    return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
-
-
-def _rows(pools: Sequence[Pool], count: int) -> Iterator[PoolRow]:
-    return islice(chain.from_iterable(pool.rows() for pool in pools), count)
+            source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
+            writer.finish({**source, "styles": dict(styles)} if styles else source)
+    return RecordSummary(writer.episodes, writer.rows, tuple(failed), left_out)
 
 
 class Writer(Protocol):
@@ -222,11 +222,12 @@ def _writer(
     path: Path,
     robot: str,
     streams: Mapping[str, Stream],
+    bodies: Sequence[str],
     task: str,
     search: tuple[str, ...],
 ) -> Writer:
     if settings.format == LEROBOT:
-        return _LeRobotWriter(settings, path, robot, streams)
+        return _LeRobotWriter(settings, path, robot, streams, bodies)
     from . import robomimic
 
     size = (settings.width, settings.height)
@@ -235,13 +236,19 @@ def _writer(
 
 
 class _LeRobotWriter(DatasetWriter):
-    """Writer of a LeRobot data set of replayed witnesses."""
+    """Writer of a LeRobot data set of replayed actions."""
 
-    def __init__(self, settings: RecordSettings, path: Path, robot: str, streams: Mapping[str, Stream]):
+    def __init__(
+        self, settings: RecordSettings, path: Path, robot: str, streams: Mapping[str, Stream], bodies: Sequence[str]
+    ):
+        """
+        Args:
+            bodies: bodies of the environment state; each episode tells which of them its scene lacks.
+        """
         size = (settings.width, settings.height)
         features = _features(settings, robot, streams)
         super().__init__(path, settings.rate, robot, features, settings.camera_names, size)
-        self.settings, self.streams = settings, streams
+        self.settings, self.streams, self._bodies = settings, streams, bodies
 
     def episode(self, replay: WitnessReplay) -> bool:
         row, success = replay.row, False
@@ -253,8 +260,12 @@ class _LeRobotWriter(DatasetWriter):
             self.add(_values(dataset_row, proprioception(row.embodiment)), dataset_row.observed.pictures)
             success = dataset_row.success
         columns = row.plain()
-        columns_of_pool = {f"scengen/{name}": columns[name] for name in EPISODE_COLUMNS}
-        self.end_episode(row.instruction, {**columns_of_pool, "scengen/success": success})
+        further = DEMONSTRATION_COLUMNS if isinstance(row, DemonstrationRow) else ()
+        told = {f"scengen/{name}": columns[name] for name in (*EPISODE_COLUMNS, *further)}
+        model = replay.world.model
+        present = {model.body(i).name for i in range(model.nbody)}
+        absent = ",".join(body for body in self._bodies if body not in present)
+        self.end_episode(row.instruction, {**told, "scengen/absent": absent, "scengen/success": success})
         return success
 
 
@@ -269,7 +280,7 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
         **{ENVIRONMENT if name == NAME else name: values for name, values in observed.items()},
         STATE: np.concatenate([observed[name] for name in state]),
         "action": row.action,
-        "actions": row.actions,
+        CONTROL_ACTIONS: row.actions,
         "reward": np.float32(row.success),
         "next.reward": np.float32(row.success),
         "next.done": row.done,
@@ -306,22 +317,9 @@ def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream
         **seen,
         STATE: Feature("float32", (len(own),), own),
         "action": Feature("float32", (len(numbers),), numbers),
-        "actions": Feature("float32", (periods_between(settings.rate), len(numbers)), ("period", "action")),
+        CONTROL_ACTIONS: Feature("float32", (periods_between(settings.rate), len(numbers)), ("period", "action")),
         "reward": Feature("float32"),
         "next.reward": Feature("float32"),
         "next.done": Feature("bool"),
         "next.success": Feature("bool"),
     }
-
-
-def _robot(pools: list[Pool]) -> str:
-    """The one embodiment of all scenarios."""
-    robots = set()
-    for pool in pools:
-        check_versions(pool.manifest.versions, str(pool.folder))
-        robots |= {*pool.kinds("embodiment")[0]}
-    if not robots:
-        raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
-    if len(robots) > 1:
-        raise BadConfig(f"pools for {' and '.join(sorted(robots))}; a data set has one robot: record them separately")
-    return robots.pop()

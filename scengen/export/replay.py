@@ -10,7 +10,7 @@ from ..control.loop import ACTION
 from ..envs.observations import Stream
 from ..episode import Actions, Episode
 from ..pictures.render import Picture
-from ..pool import PoolRow
+from ..pool.row import SceneRow
 from ..scenario import Scenario
 from ..sim.world import World
 
@@ -56,7 +56,7 @@ class DatasetRow:
 class WitnessReplay:
     """A witness to be replayed, with the same steps as the Gymnasium environment."""
 
-    row: PoolRow
+    row: SceneRow
     scenario: Scenario
     world: World
     periods_per_row: int

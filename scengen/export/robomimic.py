@@ -28,6 +28,7 @@ from ..envs import object_state
 from ..envs.observations import Stream, cameras_of
 from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
+from ..pool import PoolRow
 from ..robots.panda import Names
 from ..sim.world import World, hands
 from ..versions import versions
@@ -88,6 +89,7 @@ class Demonstrations:
             BadConfig: the file cannot grow.
         """
         row, name, success = replay.row, f"demo_{self.episodes}", False
+        assert isinstance(row, PoolRow)  # demonstrations are refused before
         group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[Snapshot]()
         views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
         for dataset_row in replay.rows():

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from ..episode import Actions
 from ..errors import PoolError, Unstable, cut
 from ..pool import PoolRow
-from ..pool.row import NO_WITNESS
+from ..pool.row import NO_WITNESS, SceneRow
 from ..sim.world import World
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, apart, each
 
@@ -25,7 +25,7 @@ def play(what: Played) -> None:
             world.apply(action)
 
 
-def stored_world(row: PoolRow, visual: bool = False) -> World:
+def stored_world(row: SceneRow, visual: bool = False) -> World:
     """The world of a stored scene at its start.
 
     Args:
@@ -52,7 +52,7 @@ def scene_errors(which: str = "") -> Iterator[None]:
         raise PoolError(f"MuJoCo does not read the scene{which}: {why}; see scengen verify") from None
 
 
-def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[str, str]]:
+def unplayable(rows: Iterable[SceneRow], workers: Workers = 1) -> Iterator[tuple[str, str]]:
     """Id and reason of every scenario that crashes or exceeds the limits of a scenario.
 
     Raises:
@@ -62,7 +62,7 @@ def unplayable(rows: Iterable[PoolRow], workers: Workers = 1) -> Iterator[tuple[
     return (found for found in tried if found is not None)
 
 
-def _try(row: PoolRow) -> tuple[str, str] | None:
+def _try(row: SceneRow) -> tuple[str, str] | None:
     play((row.scene_xml, row.embodiment, row.witness))
     return None
 

@@ -20,6 +20,7 @@ from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import streams_of
 from scengen.export import recording
 from scengen.export.cameras import calibration
+from scengen.export.floors import floors_of
 from scengen.export.lerobot import DatasetWriter, Feature
 from scengen.export.recording import RecordSettings, record
 from scengen.export.stats import QUANTILES, Shades
@@ -149,14 +150,14 @@ def test_episodes_name_their_scenario_and_nothing_else_does(made, witnesses):
 
 def test_the_actions_are_the_witness_bit_by_bit(made, witnesses):
     for episode, row in zip(episodes_of(made), witnesses, strict=False):
-        actions = column(made, "actions")[episode["dataset_from_index"] : episode["dataset_to_index"]]
+        actions = column(made, "control.actions")[episode["dataset_from_index"] : episode["dataset_to_index"]]
         played = actions.astype(np.float32).reshape(-1, 7)
         assert played.tobytes() == row.witness[: len(played)].tobytes()
         assert len(played) <= len(row.witness) - 90, "the second after the goal is not recorded"
 
 
 def test_the_action_of_a_row_asks_for_the_motion_of_its_control_periods(made):
-    actions, action = column(made, "actions"), column(made, "action")
+    actions, action = column(made, "control.actions"), column(made, "action")
     assert actions.shape[1:] == (4, 7)
     assert np.allclose(4 * action[:, :6], actions[:, :, :6].sum(axis=1), atol=1e-5)
     assert (action[:, 6] == actions[:, -1, 6]).all()
@@ -240,8 +241,13 @@ def test_statistics_are_those_of_the_columns(made):
     assert set(stats) == set(read_json(made, "info.json")["features"])
     for name in ("action", "robot0_tactile_left", "reward"):
         values = column(made, name)
-        for kind, of in (("min", np.min), ("max", np.max), ("mean", np.mean), ("std", np.std)):
-            assert np.allclose(stats[name][kind], of(values, axis=0), atol=1e-6)
+        floors = floors_of(name, read_json(made, "info.json")["features"][name]["names"], values.shape[1:])
+        wide = np.broadcast_to((values.max(axis=0) - values.min(axis=0)) >= 2 * floors, np.shape(stats[name]["std"]))
+        assert wide.any() and np.allclose(stats[name]["mean"], values.mean(axis=0), atol=1e-6)
+        assert np.allclose(stats[name]["std"], np.maximum(values.std(axis=0), floors), atol=1e-6)
+        for kind, of in (("min", np.min), ("max", np.max)):
+            found, there = np.array(stats[name][kind]), np.broadcast_to(of(values, axis=0), wide.shape)
+            assert np.allclose(found[wide], there[wide], atol=1e-6)
         assert stats[name]["count"] == [len(values)]
         assert np.allclose(stats[name]["q90"], np.quantile(values, 0.9, axis=0), atol=1e-6)
     first = episodes_of(made)[0]

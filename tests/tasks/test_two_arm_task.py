@@ -169,9 +169,9 @@ def test_recordings_hold_the_actions_of_both_arms(folder, rows, tmp_path):
     size = ("width=64", "height=48", "n=1")
     assert cli.run(("record", f"pool={folder}", f"to={made}", f"cameras={cameras}", *size, *SEARCH)) == 0
     about = json.loads((made / "meta" / "info.json").read_text())
-    assert about["robot_type"] == PAIR and about["features"]["actions"]["shape"] == [4, 14]
+    assert about["robot_type"] == PAIR and about["features"]["control.actions"]["shape"] == [4, 14]
     table = pq.read_table(next((made / "data").rglob("*.parquet")))
-    actions, action = (np.array(table[name].to_pylist(), np.float32) for name in ("actions", "action"))
+    actions, action = (np.array(table[name].to_pylist(), np.float32) for name in ("control.actions", "action"))
     played = actions.reshape(-1, 14)[: len(rows[0].witness)]
     np.testing.assert_array_equal(played, rows[0].witness[: len(played)])
     np.testing.assert_array_equal(action[:, [6, 13]], actions[:, -1][:, [6, 13]])
