@@ -13,6 +13,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,8 @@ from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import load_task
-from scengen.attack.adversary import PRIOR, RANDOM, TIERS, Attack
-from scengen.attack.campaign import FITTING_SEED, AttackSettings, Subject, drawn, fitted, player_of
+from scengen.attack.adversary import MEMORY, PRIOR, RANDOM, TIERS, Attack
+from scengen.attack.campaign import FITTING_SEED, AttackJob, AttackSettings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import CausalContacts, Hit
 from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
@@ -85,13 +86,12 @@ def compare(budget: str = "60", *tasks: str) -> None:
 
 def counted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> int:
     """Number of successes that the sound family refuses, in `budget` rollouts."""
-    priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
-    hits = 0
-    for number, subject in enumerate(subjects):
-        player = informed(mutant, subject, subjects)
-        result = Attack(player, 0, number, len(subjects), priors).run(budget // len(subjects), tiers)
-        hits += sum(mutant.kills(hit, subject.scenario, subject.scene_xml) for hit in result.hits)
-    return hits
+    job = _job(mutant, subjects, budget // len(subjects), tiers)
+    return sum(
+        mutant.kills(hit, subject.scenario, subject.scene_xml)
+        for number, subject in enumerate(subjects)
+        for hit in job(number).hits
+    )
 
 
 def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
@@ -163,28 +163,24 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
         The number of rollouts, and the hit; None if there was none.
     """
     used = 0
-    priors = fitted(load_task(mutant.task), AttackSettings()) if "prior" in tiers and not mutant.change else ()
+    job = _job(mutant, subjects, budget // len(subjects), tiers)
     for number, subject in enumerate(subjects):
-        player = informed(mutant, subject, subjects)
 
         def kills(hit: Hit, subject: Subject = subject) -> bool:
             return mutant.kills(hit, subject.scenario, subject.scene_xml)
 
-        attack = Attack(player, 0, number, len(subjects), priors, kills)
-        result = attack.run((budget - used) // (len(subjects) - number), tiers)
+        result = replace(job, until=kills)(number)
         used += sum(rate.rollouts for rate in result.rates)
-        if attack.done:
+        if result.hits and kills(result.hits[-1]):
             return used, result.hits[-1]
     return used, None
 
 
-def informed(mutant: Mutant, subject: Subject, subjects: Sequence[Subject]) -> Player:
-    """The player of a subject that knows the other subjects' witnesses, and what training tells."""
-    player, known = player_of(subject), trained(mutant.task)
-    player.foreign = {one.scenario.id: one.witness for one in subjects if one is not subject}
-    player.memories = {memory.name: memory.follow for memory in known.memories}
-    player.durations = known.durations
-    return player
+def _job(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> AttackJob:
+    """The attack on a mutant, with `budget` rollouts for each scenario."""
+    priors = fitted(load_task(mutant.task), AttackSettings()) if PRIOR in tiers and not mutant.change else []
+    known = trained(mutant.task) if MEMORY in tiers else Experience()
+    return AttackJob(tuple(subjects), budget, 0, tuple(tiers), tuple(priors), known=known)
 
 
 @cache

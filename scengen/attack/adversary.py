@@ -139,6 +139,11 @@ class Archive:
         return far[int(number * len(far))] if far else None
 
 
+def never(hit: Hit) -> bool:
+    """No hit ends an attack: all rollouts are spent."""
+    return False
+
+
 class Attack:
     """The attack on one scenario."""
 
@@ -149,7 +154,7 @@ class Attack:
         number: int = 0,
         of: int = 1,
         priors: Sequence[Prior] = (),
-        until: Callable[[Hit], bool] = lambda hit: False,
+        until: Callable[[Hit], bool] = never,
     ):
         """
         Args:

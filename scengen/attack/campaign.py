@@ -22,7 +22,7 @@ from ..validate.rollout import run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.targets import write
-from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut
+from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
 from .evidence import Hit, TierRate, rates, unsound
 from .experience import Experience, experience, feasible
 from .player import Player
@@ -160,6 +160,8 @@ class AttackJob:
     """Rules that end an episode."""
     known: Experience = Experience()
     """What the adversary knows from training."""
+    until: Callable[[Hit], bool] = never
+    """Test of a hit at which the attack on a scenario ends."""
 
     def __call__(self, number: int) -> AttackResult:
         attacked = self.subjects[number]
@@ -167,7 +169,7 @@ class AttackJob:
         player.foreign = {one.scenario.id: one.witness for one in self.subjects if one is not attacked}
         player.memories = {memory.name: memory.follow for memory in self.known.memories}
         player.durations = self.known.durations
-        attack = Attack(player, self.seed, number, len(self.subjects), self.priors)
+        attack = Attack(player, self.seed, number, len(self.subjects), self.priors, self.until)
         return attack.run(self.budget, self.tiers)
 
     def lost(self, number: int, reason: str) -> AttackResult:

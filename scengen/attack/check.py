@@ -5,10 +5,12 @@ from .adversary import RANDOM, SEARCH, Attack
 from .evidence import spelled
 from .player import Player
 from .retries import RETRY
+from .servo import SERVO
 from .variations import WITNESS
 
-TIERS = (RETRY, WITNESS, RANDOM, SEARCH)
-"""Tiers of the check. Shortcuts have a check of their own; fixed answers and foreign witnesses need other scenarios."""
+TIERS = (SERVO, RETRY, WITNESS, RANDOM, SEARCH)
+"""Tiers of the check. Shortcuts have a check of their own. Fixed answers, memories and foreign witnesses need other
+scenarios, and a certificate depends on its own scenario alone."""
 
 
 def attacked(trial: Trial) -> Finding:

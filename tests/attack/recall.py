@@ -1,9 +1,9 @@
 """Which cheats of people does the adversary find by itself? `python tests/attack/recall.py [n] [budget] [task ...]`
 
-Every kept cheat (`hands`) has a mend. Here the mend is taken out, and the adversary attacks the open task. A success
-counts if the closed task refuses the same actions. Where the mend changes the physics or the events, the same actions
-prove nothing; there the closed task is attacked as well, and must be solved less than half as often. A line for each:
-hits by tier. Records are in `records/recall.jsonl`; the command continues them.
+Every kept cheat (`hands`) has a mend. Here the mend is taken out, and the adversary attacks the open task. If the mend
+is a rule, a success counts if the closed task refuses the same actions. If it changes the physics or the events, the
+same actions prove nothing; there the closed task is attacked as well, and must be solved less than half as often.
+Records are in `records/recall.jsonl`; the command continues them.
 """
 
 import json
@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from test_hands import HANDS
 
-from scengen.attack.adversary import CLOCK, MEMORY, PRIOR, RANDOM, SEARCH, SERVO, SHORTCUT
+from scengen.attack.adversary import CLOCK, MEMORY, PRIOR, RANDOM, SEARCH, SERVO, SHORTCUT, TIERS
 from scengen.attack.campaign import GRAMMAR, AttackJob, AttackSettings, drawn, fitted
 from scengen.attack.experience import experience
 from scengen.compose import load_task
@@ -26,8 +26,9 @@ from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import replay
 
 RECORDS = Path(__file__).parents[2] / "records" / "recall.jsonl"
-TIERS = (SHORTCUT, PRIOR, MEMORY, CLOCK, SERVO, RANDOM, SEARCH)
-"""Tiers that do not continue the witness of the scenario, which of course reaches the goal."""
+UNAIDED = (SHORTCUT, PRIOR, MEMORY, CLOCK, SERVO, RANDOM, SEARCH)
+"""Tiers that do not continue the witness of the scenario, which of course reaches the goal. They alone attack a task
+whose mend changes the physics or the events."""
 SEED = 21
 
 
@@ -45,42 +46,55 @@ class Opened:
         return replace(draw, scenario=self._unmended(draw.scenario))
 
 
-def hits(task, n, budget, refused=None):
-    """Hits and rollouts by tier.
-
-    Args:
-        refused: test of the number of a subject and a hit; a hit that does not pass it does not count.
-    """
-    subjects = drawn(task, "id", n, SEED)
+def job(task, n, budget, tiers):
+    """The attack on the first draws."""
     settings = AttackSettings(n=n, budget=budget, seed=SEED)
-    job = AttackJob(
-        tuple(subjects), budget // n, SEED, TIERS, tuple(fitted(task, settings)), experience(task, SEED + 1, TIERS)
-    )
+    subjects, priors = drawn(task, "id", n, SEED), fitted(task, settings)
+    return AttackJob(tuple(subjects), budget // n, SEED, tiers, tuple(priors), known=experience(task, SEED + 1, tiers))
+
+
+def counted(results):
+    """Hits and rollouts by tier."""
     found, made = Counter(), Counter()
-    for number, subject in enumerate(subjects):
-        result = job(number)
-        made.update({rate.tier: 0 for rate in result.rates})
+    for result in results:
         for rate in result.rates:
+            found[rate.tier] += rate.hits
             made[rate.tier] += rate.rollouts
-        found.update(hit.tier for hit in result.hits if refused is None or refused(subject, hit))
     return {tier: [found[tier], made[tier]] for tier in made}
 
 
+def compared(task, unmended, n, budget):
+    """Results of a mend that changes the physics or the events: hits in the open and in the closed task."""
+    jobs = {"open": job(Opened(task, unmended), n, budget, UNAIDED), "closed": job(task, n, budget, UNAIDED)}
+    found = {which: counted(map(one, range(len(one.subjects)))) for which, one in jobs.items()}
+    new = [tier for tier, (hits, _) in found["open"].items() if hits > 2 * found["closed"].get(tier, [0])[0]]
+    return {**found, "found": ", ".join(new)}
+
+
+def hunted(task, unmended, n, budget):
+    """Results of a mend that is a rule: attack until a success whose actions the closed task refuses."""
+    attack, results = job(Opened(task, unmended), n, budget, TIERS), []
+    for number, subject in enumerate(attack.subjects):
+        world = World.load(subject.scene_xml, task.embodiment)
+        scenario = task.draw("id", SEED, subject.name.index).scenario
+
+        def refused(hit, world=world, scenario=scenario):
+            world.reset()
+            return not replay(scenario, world, hit.actions, task.horizon, until_settled=True).solved
+
+        results.append(replace(attack, until=refused)(number))
+        if results[-1].hits and refused(last := results[-1].hits[-1]):
+            return {"open": counted(results), "found": f"{last.tier}: {last.plan}"}
+    return {"open": counted(results), "found": ""}
+
+
 def attacked(task, unmended, n, budget):
-    """Results of one mend: hits in the open task, and in the closed one if it must be attacked as well."""
+    """Results of one mend."""
     example = task.draw("id", SEED, 0).scenario
     opened = unmended(example)
     texts = [scene_text.emit(one.build())[0] for one in (example, opened)]
-    if texts[0] != texts[1] or type(example).events is not type(opened).events:
-        return {"open": hits(Opened(task, unmended), n, budget), "closed": hits(task, n, budget)}
-    closed = {one.name.index: one.scenario for one in drawn(task, "id", n, SEED)}
-
-    def refused(subject, hit):
-        scenario = closed.get(subject.name.index) or task.draw("id", SEED, subject.name.index).scenario
-        world = World.load(scene_text.emit(scenario.build())[0], task.embodiment)
-        return not replay(scenario, world, hit.actions, task.horizon, until_settled=True).solved
-
-    return {"open": hits(Opened(task, unmended), n, budget, refused), "closed": {}}
+    rule = texts[0] == texts[1] and type(example).events is type(opened).events
+    return (hunted if rule else compared)(task, unmended, n, budget)
 
 
 def main(n=4, budget=320, *tasks):
@@ -99,11 +113,8 @@ def main(n=4, budget=320, *tasks):
             record = {**about, **attacked(task, unmended, n, budget)}
             with open(RECORDS, "a") as file:
                 file.write(json.dumps(record) + "\n")
-        open_, closed = ({t: h for t, h in record[which].items() if h[0]} for which in ("open", "closed"))
-        new = [tier for tier, (k, _) in open_.items() if k > 2 * closed.get(tier, [0])[0]]
-        found += bool(new)
-        told = f"found by {', '.join(new)}" if new else "not found"
-        print(f"{name} {cheat}: {told}; open {open_}, closed {closed}", flush=True)
+        found += bool(record["found"])
+        print(f"{name} {cheat}: {record['found'] or 'not found'}", flush=True)
     print(f"found {found} of {sum(not tasks or task in tasks for task, _ in mends)} cheats")
 
 
