@@ -20,6 +20,7 @@
 | cradle  | body     | direction of the hand [rad], its pitch [rad], depth [m]                      |
 | touch   | body     | with the body in the hand                                                    |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
+| along   | body     | turn of the hand from the body's way in the witness [rad], height [m]        |
 
 Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use the body in the hand.
 """

@@ -1,6 +1,6 @@
 """The phases of a witness: its path, the states at which its phases begin, and plans that repeat them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,6 +26,8 @@ PAUSE_SPEED = 0.02
 """Speed below which a hand pauses [m/s]."""
 MIN_WAIT = 0.2
 """Shortest pause of all hands that counts as a wait [s]."""
+MAX_DEVIATION = 0.02
+"""Distance by which a body's way may deviate from the line between its corners [m]."""
 START_TOLERANCE = 0.02
 """Distance of the hand from the beginning of a phase above which it is first brought there [m]."""
 MIRROR = np.array([1.0, -1.0, 1.0])
@@ -58,6 +60,8 @@ class Trace:
     """Positions of the hands before each action and after the last one [m], shape (n + 1, arms, 3)."""
     rots: NDArray[np.float64]
     """Orientations of the hands, shape (n + 1, arms, 3, 3)."""
+    ways: Mapping[str, NDArray[np.float64]]
+    """Positions of the centre of mass of each free body [m], shape (n + 1, 3)."""
     stages: tuple[Stage, ...]
     """Beginnings of the phases in order, and the end: phase k goes from stage k to stage k + 1."""
     signature: Signature
@@ -93,6 +97,10 @@ class Trace:
         bodies = [body for _, pair in reversed(self.events) for body in pair if body not in self._robots]
         return tuple(dict.fromkeys(bodies))
 
+    def way_of(self, body: str) -> NDArray[np.float64]:
+        """Corners of the way of a free body's centre of mass in the witness [m], shape (n, 3)."""
+        return _corners(self.ways[body])
+
     def releases(self, arm: int) -> tuple[tuple[int, str], ...]:
         """Stages at which the gripper of an arm opens, each with the body that it releases."""
         grip = self.actions[:, ACTION * arm + ACTION - 1]
@@ -100,15 +108,29 @@ class Trace:
         return tuple((k, body) for k, row, body in opens if body and grip[row - 1] > 0)
 
 
+def _corners(way: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of a polyline that stays within `MAX_DEVIATION` of a way (Douglas and Peucker)."""
+    first, last = way[0], way[-1]
+    leg = last - first
+    share = np.clip((way - first) @ leg / max(float(leg @ leg), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(way - first - share[:, None] * leg, axis=1)
+    k = int(np.argmax(away))
+    if away[k] <= MAX_DEVIATION:
+        return np.array([first, last])
+    return np.concatenate([_corners(way[: k + 1])[:-1], _corners(way[k:])])
+
+
 def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
     """Replay a witness and record its trace; None if it does not reach the goal."""
     world.reset()
     start, episode = starts(world), Episode(scenario, world)
     poses, marks, events = [_poses(world)], [_Observation.of(world)], list[tuple[int, ContactPair]]()
+    places = [starts(world)]
     states = [(world.state(), 0.0, signature(world, start))]
     for action in actions:
         outcome = episode.step(action)
         poses.append(_poses(world))
+        places.append(starts(world))
         marks.append(_Observation.of(world))
         states.append((world.state(), episode.held, signature(world, start)))
         events += [(len(marks) - 2, pair) for pair in sorted(marks[-1].touched[1] - marks[-2].touched[1])]
@@ -119,7 +141,8 @@ def trace(scenario: Scenario, world: World, actions: Actions) -> Trace | None:
     left, rows = signature(world, start), actions[: len(poses) - 1]
     hands, rots = (np.array(of_all) for of_all in zip(*poses, strict=True))
     stages = tuple(Stage(row, *states[row], marks[row].holds) for row in _cuts(marks, hands))
-    return Trace(rows, hands, rots, stages, left, tuple(events), frozenset(robots(world).values()))
+    ways = {body: np.array([place[body] for place in places]) for body in start}
+    return Trace(rows, hands, rots, ways, stages, left, tuple(events), frozenset(robots(world).values()))
 
 
 def _poses(world: World) -> tuple[list[Vec3], list[Mat3]]:

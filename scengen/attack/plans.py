@@ -17,7 +17,7 @@ from ..geometry import UP, Mat3, Vec3, about_z, between
 from ..robots.jaw import TIP_BELOW
 from ..scenario import Plan
 from ..sim.world import Arm
-from ..skills.jaw import RELEASE_TIME, grasp, release
+from ..skills.jaw import RELEASE_TIME, carry, grasp, release
 from ..skills.motion import (
     CLOSED,
     COARSE,
@@ -47,6 +47,8 @@ WAY = Pace(0.30, 0.02, 1.5)
 """Pace through way points with a body in the hand."""
 LOWER = Pace(0.15, 0.006, 2.0)
 """Pace down to the place where a body is let go."""
+LEG = Pace(0.12, 0.003, 6.0)
+"""Pace along a way with little clearance."""
 LIFT = 0.12
 """Height by which a grasped body is lifted [m]."""
 
@@ -208,6 +210,30 @@ def carry_to(
     with suppress(GaveUp):  # it is let go in any case
         yield from go_to(arm, target + lag + drop * UP, rot, LOWER, CLOSED)
     yield from release(arm, 0.2 if drop else RELEASE_TIME)
+    yield from retreat(arm, 0.08, WAY)
+
+
+def carry_along(arm: Arm, body: str, way: ArrayLike, skew: float = 0.0, raise_by: float = 0.003) -> Plan:
+    """Carry a held body along a way. The jaw closes along its longest leg, so that the narrow side of the hand passes.
+
+    Args:
+        arm: the arm.
+        body: name of the held body.
+        way: corners of the way of the body's centre of mass [m], shape (n, 3).
+        skew: turn of the closing direction from the longest leg [rad].
+        raise_by: height above the way at which the body is carried [m].
+    """
+    corners = np.asarray(way, float) + raise_by * UP
+    legs = np.diff(corners, axis=0) * [1.0, 1.0, 0.0]
+    longest = legs[int(np.argmax(np.linalg.norm(legs, axis=1)))]
+    with suppress(GaveUp):
+        yield from go_to(arm, arm.hand, closing_along(arm, about_z(skew) @ longest), LOWER, CLOSED)
+    for corner in corners[1:]:
+        with suppress(GaveUp):
+            yield from carry(arm, body, corner, pace=LEG)
+    with suppress(GaveUp):
+        yield from go_to(arm, arm.hand - raise_by * UP, pace=LOWER, grip=CLOSED)
+    yield from release(arm, RELEASE_TIME)
     yield from retreat(arm, 0.08, WAY)
 
 

@@ -16,7 +16,7 @@ from ..geometry import Vec3
 from ..scenario import Plan, Scenario
 from ..sim.world import World
 from ..validate.rollout import Stillness
-from . import macros
+from . import macros, plans
 from .macros import Macro
 from .phases import by_the_clock, follow, repeat, trace
 from .signature import ContactPair, Signature, signature, starts
@@ -139,6 +139,9 @@ class Player:
                 return self.memories[macro.target](self.world)
             case "clock":
                 return by_the_clock(self.world, self.trace, macro.numbers)
+            case "along":
+                way = self.trace.way_of(macro.target)
+                return plans.carry_along(self.world.arms[macro.arm], macro.target, way, *macro.numbers)
             case "shortcut":
                 return self.scenario.shortcuts()[macro.target].plan(self.world)
             case "answer":

@@ -47,6 +47,8 @@ STRAIGHT = Macro("touch")
 """Way to touch another body with the one in the hand: straight from where it is."""
 FROM_ABOVE = Macro("press", "", (0.0, 0.0, 0.1, 0.1))
 """Way to touch another body with the one in the hand: on the middle of its upper face."""
+RAISE = 0.008
+"""Height above its way at which a body is carried along it [m]: the fingers keep off the table."""
 DROPS = (0.0, 0.04, 0.12)
 """Heights from which a carried body is let go [m]."""
 IDLE_TIME = 2.0
@@ -79,8 +81,12 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 
 def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Pick a body, touch with it what the goal asks for, and carry it to its goal by every route."""
+    """Carry a body along the way that it takes in the witness, its narrow side or its broad side across; pick it, touch
+    with it what the goal asks for, and carry it to its goal by every route."""
     pick = taking(player, arm, body)
+    for skew in (0.0, QUARTER):
+        take = Macro("take", body, (skew, 0.0), arm.number)
+        yield Attempt(SERVO, (take, Macro("along", body, (skew, RAISE), arm.number)))
     touches = [Macro("touch", other, (), arm.number) for other in asked_of(player, body)]
     for drop, route in product(DROPS, ROUTES):
         goal = bring(player, arm, body, route, drop)
