@@ -113,7 +113,7 @@ docs: setup
 	$(BIN)/python tools/api_page.py
 	$(BIN)/python tools/paper_page.py
 	$(BIN)/python tools/cluster_page.py
-	$(BIN)/python tools/certified_page.py
+	$(BIN)/python tools/all_axes.py page
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # Writes README, docs, axis cards and reports as HTML into SITE.

@@ -1,27 +1,41 @@
 """The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
 
 Cards are stored in generated/axes. A repeated call continues, and finished cards are read again. Axes without a card
-keep their line.
+keep their line. `python tools/all_axes.py page` only writes the page, with the figures of conf/certified.yaml.
 """
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scengen import cli, list_tasks, load_task
+from scengen import cli, list_tasks, load_task, task_files
 from scengen.analysis.distance import Energy
 from scengen.ood.axis_card import NOT_SEARCHED
+from scengen.validate.certify import lower_bound
 
-PAGE = Path("docs/axes.md")
-HEAD = """# Every axis, measured
+PAGE = Path(__file__).parent.parent / "docs" / "axes.md"
+HEAD = """# Every split, measured
 
-Written by `make axes`. Each line summarizes one axis card (`scengen probe`); each column states its sample size.
+Written by `make axes` and `make docs`. The figures of certification are those of conf/certified.yaml, which
+`tools/certified.py` measures:
+
+* **certified**: scenarios certified at level `quick`, of the first draws. The rejected ones are listed at the end.
+* **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its
+  success rate.
+* **robosuite**: witnesses with the same verdict in robosuite, of those replayed there.
+* **CPU s**: CPU time per certified scenario, rejected draws included, with all cores of the machine busy.
+
+## Training
+
+{training}
+## Axes
+
+Each line summarizes one axis card (`scengen probe`); each column states its sample size.
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).
-* **certified**: number of certified scenarios, of how many indices.
 * **verdict**: the strongest memory that the axis breaks, *solved by memory*, or *inconclusive*. The four columns after
   it show, for each memory, how many of its control scenarios within training and how many OOD twins it solves, and the
   excess with its 95 % interval.
@@ -41,20 +55,27 @@ Written by `make axes`. Each line summarizes one axis card (`scengen probe`); ea
 * **energy**: energy distance between the features of the twins [training ranges], its value by chance, and the p value
   of a test that exchanges twins; `equal` if the axis moves no feature.
 
-{titles}
-{rule}
+{axes}
+## Rejected draws
+
+{lost}
 """
-"""Text before the table, with places for its titles and rule."""
+"""The page, with places for its tables."""
+CERTIFIED = ("certified", "oracle", "robosuite")
+"""Titles of the figures of certification."""
 COLUMNS = (
-    *("task", "axis", "outside", "physics", "certified", "verdict"),
+    *("task", "axis", "outside", "physics", *CERTIFIED, "verdict"),
     *("replay", "any replay", "object-centric", "any object-centric"),
     *("replay ends", "oracle ends", "energy"),
 )
-"""Titles of the table."""
+"""Titles of the table of axes."""
 
 
 def main(*arguments: str) -> None:
     """Make all cards, or those of some tasks, and write the page."""
+    if arguments == ("page",):
+        PAGE.write_text(page())
+        return
     settings = [argument for argument in arguments if "=" in argument]
     tasks = [argument for argument in arguments if "=" not in argument]
     failed = []
@@ -68,24 +89,64 @@ def main(*arguments: str) -> None:
 
 def page() -> str:
     """The whole page."""
-    return HEAD.format(titles=_row(COLUMNS), rule=_row(["---"] * len(COLUMNS))) + "".join(_lines())
+    told = task_files.certified()
+    training = [
+        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}"]
+        for task in list_tasks()
+        for found in [told.get(task, {}).get(task_files.ID, {"cpu": 0.0})]
+    ]
+    lost = [
+        f"* {task}, {split}: {times} {reason}"
+        for task in list_tasks()
+        for split, found in told.get(task, {}).items()
+        for reason, times in found.get("lost", {}).items()
+    ]
+    return HEAD.format(
+        training=_table(("task", *CERTIFIED, "CPU s"), training),
+        axes=_table(COLUMNS, _axes(told)),
+        lost="\n".join(lost),
+    )
 
 
-def _lines() -> list[str]:
-    """A line for each card, in the order of the task files. An axis without a card keeps its line of the page."""
-    written = PAGE.read_text().splitlines(keepends=True) if PAGE.is_file() else []
-    lines = []
+def _axes(told: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """The cells of each axis, in the order of the task files. An axis without a card keeps those of the page."""
+    written = _written()
+    rows = []
     for task in list_tasks():
         for axis in load_task(task).axes:
-            path = Path(f"generated/axes/{task}-{axis}/card.json")
-            if path.is_file():
-                lines.append(_line(json.loads(path.read_text())))
-            else:
-                lines += [line for line in written if line.startswith(f"| {task} | {axis} |")]
-    return lines
+            path = PAGE.parent.parent / f"generated/axes/{task}-{axis}/card.json"
+            cells = _of_card(json.loads(path.read_text())) if path.is_file() else written.get((task, axis), {})
+            figures = dict(zip(CERTIFIED, _certification(told.get(task, {}).get(axis, {})), strict=True))
+            known = {"task": task, "axis": axis, **cells, **figures}
+            rows.append([known.get(title, "no card") for title in COLUMNS])
+    return rows
 
 
-def _line(card: dict[str, Any]) -> str:
+def _written() -> dict[tuple[str, str], dict[str, str]]:
+    """The cells of each axis on the page, by title."""
+    lines = PAGE.read_text().splitlines() if PAGE.is_file() else []
+    rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in lines if line.startswith("| ")]
+    titles: list[str] = []
+    found = {}
+    for row in rows:
+        if row[:2] == list(COLUMNS[:2]):
+            titles = row
+        elif titles and len(row) == len(titles):
+            found[row[0], row[1]] = dict(zip(titles, row, strict=True))
+    return found
+
+
+def _certification(found: Mapping[str, Any]) -> list[str]:
+    """The figures of certification of a split."""
+    if "draws" not in found:
+        return ["not measured"] * len(CERTIFIED)
+    oracle = f"{found['solved']} of {found['draws']} (> {100 * lower_bound(found['solved'], found['draws']):.0f}%)"
+    same = f"{found['same']} of {found['replays']}" if found.get("replays") else "-"
+    return [f"{found['certified']} of {found['indices']}", oracle, same]
+
+
+def _of_card(card: dict[str, Any]) -> dict[str, str]:
+    """The cells of a card, by title."""
     gaps = [p["relative"] for p in card["proofs"] if p["relative"]]
     leaving = [d["feature"] for d in card["features"] if d["inside"] == 0]
     cells = [
@@ -93,18 +154,18 @@ def _line(card: dict[str, Any]) -> str:
         card["axis"],
         f"{min(gaps):.2g}" if gaps else "another value",
         ", ".join(leaving) or "stays",
-        f"{card['funnel']['certified']} of {card['indices']}" if card["indices"] else "not tried",
         card["verdict"].replace("_", "-").replace("any-", "any "),
         *map(_baseline, card["baselines"]),
         _boundary(card, "replay"),
         _boundary(card, "oracle"),
         str(Energy(**card["energy"])),
     ]
-    return _row(cells) + "\n"
+    return dict(zip([title for title in COLUMNS if title not in CERTIFIED], cells, strict=True))
 
 
-def _row(cells: Iterable[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _table(titles: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
+    lines = (titles, ["---"] * len(titles), *rows)
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
 def _baseline(baseline: dict[str, Any]) -> str:

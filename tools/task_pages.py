@@ -137,11 +137,12 @@ def _attacks(task: Task) -> Iterator[str]:
 def _measured(page: Path, task: Task) -> Iterator[str]:
     """Lines of a task in the table of another page, if there are any."""
     lines = page.read_text().splitlines() if page.is_file() else []
-    head = next((i for i, line in enumerate(lines) if line.startswith("| task |")), None)
-    if head is not None and (mine := [line for line in lines if line.startswith(f"| {task.name} |")]):
+    mine = [i for i, line in enumerate(lines) if line.startswith(f"| {task.name} |")]
+    if mine:
+        head = max(i for i in range(mine[0]) if lines[i].startswith("| task |"))
         yield f"Measurements ([columns](../{page.name})):"
         yield ""
-        yield from (*lines[head : head + 2], *mine, "")
+        yield from (*lines[head : head + 2], *(lines[i] for i in mine), "")
 
 
 def _plans(certified: Certified) -> Iterator[str]:
