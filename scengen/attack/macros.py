@@ -18,7 +18,9 @@
 | block   | body     | lead [s]                                                                     |
 | take    | body     | skew of the jaw from the body's narrow side [rad], lift [m]                  |
 | cradle  | body     | direction of the hand [rad], its pitch [rad], depth [m]                      |
-| touch   | body     | with the body in the hand                                                    |
+| touch   | body     | place of the body in the hand, from above [m]; none: straight from its place |
+| await   | body     | none: hold the open hand until the body changes its course                   |
+| roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
 | along   | body     | turn of the hand from the body's way in the witness [rad], height [m]        |
 
@@ -260,13 +262,29 @@ def _cradle(field: MacroContext, macro: Macro) -> Plan:
 
 
 def _touch(field: MacroContext, macro: Macro) -> Plan:
-    """Move the body in the hand straight to another one until they touch."""
+    """Move the body in the hand to another one until they touch: straight, or down to a place."""
     load = held(field.arm)
     if load is None:
         raise GaveUp("no body in the hand")
+    if macro.numbers:
+        above = np.array(macro.numbers) + TRAVEL_HEIGHT * UP
+        yield from _rise(field.arm, float(above[2]))
+        yield from go_to(field.arm, above + field.arm.hand - field.world.com(load), pace=LADEN, grip=CLOSED)
+        yield from _lower_until_contact(field, macro.target, 2 * TRAVEL_HEIGHT, 0.1)
+        return
     way = field.solids[macro.target].centre(field.world) - field.world.com(load)
     velocity = 0.15 * way / max(float(np.linalg.norm(way)), 1e-9)
     yield from plans.touch_with(field.arm, load, field.solids[macro.target].body, velocity)
+
+
+def _await(field: MacroContext, macro: Macro) -> Plan:
+    return plans.await_turn(field.arm, macro.target)
+
+
+def _roll(field: MacroContext, macro: Macro) -> Plan:
+    if held(field.arm) != macro.target:
+        raise GaveUp(f"{macro.target} is not in the hand")
+    yield from plans.turn_about(field.arm, macro.target, plans.on_its_side(*macro.numbers))
 
 
 def _bring(field: MacroContext, macro: Macro) -> Plan:
@@ -295,6 +313,8 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "take": _take,
     "cradle": _cradle,
     "touch": _touch,
+    "await": _await,
+    "roll": _roll,
     "bring": _bring,
 }
 """The plan of each kind of macro."""

@@ -101,6 +101,12 @@ class Trace:
         """Corners of the way of a free body's centre of mass in the witness [m], shape (n, 3)."""
         return _corners(self.ways[body])
 
+    def place_at(self, body: str, one: str, other: str) -> tuple[float, float, float]:
+        """Position of a free body's centre of mass when two bodies touch for the first time [m]."""
+        row = next(row for row, pair in self.events if {*pair} == {one, other})
+        x, y, z = self.ways[body][row + 1].tolist()
+        return x, y, z
+
     def releases(self, arm: int) -> tuple[tuple[int, str], ...]:
         """Stages at which the gripper of an arm opens, each with the body that it releases."""
         grip = self.actions[:, ACTION * arm + ACTION - 1]

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..assets.prop import TABLE_TOP
+from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, between
+from ..geometry import UP, Mat3, Vec3, about_z, between, heading, rotation
 from ..robots.jaw import TIP_BELOW
 from ..scenario import Plan
 from ..sim.world import Arm
@@ -158,6 +159,56 @@ def cradle(arm: Arm, body: str, azimuth: float, pitch: float, depth: float = 0.0
     yield from go_to(arm, arm.hand + raise_by * UP, rot, FINE, CLOSED)
 
 
+def await_turn(arm: Arm, body: str, angle: float = math.radians(20.0), seconds: float = 8.0) -> Plan:
+    """Hold the open hand until a moving body has changed its course, as at a wall.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        angle: change of course [rad].
+        seconds: time limit [s].
+    """
+    course: Vec3 | None = None
+    end = arm.world.time + seconds
+    while arm.world.time < end:
+        velocity = velocity_of(arm, body) * [1.0, 1.0, 0.0]
+        if (speed := float(np.linalg.norm(velocity))) > SLOW:
+            course = velocity / speed if course is None else course
+            if course @ velocity < speed * math.cos(angle):
+                return
+        yield from hold(arm, Loop.PERIOD, OPEN)
+
+
+def turn_about(arm: Arm, body: str, rot: Mat3, rate: float = 1.8) -> Plan:
+    """Turn the hand about the middle of a held body, for at most 1.5 s longer than the turn takes.
+
+    Args:
+        arm: the arm.
+        body: name of the held body.
+        rot: final orientation of the hand; see `on_its_side`.
+        rate: rate of the turn [rad/s].
+    """
+    world, middle, start, begin = arm.world, arm.world.com(body), arm.hand_rot, arm.world.time
+    held, turn = start.T @ (middle - arm.hand), between(start, rot)
+    seconds = float(np.linalg.norm(turn)) / rate
+    while world.time < begin + seconds + 1.5:
+        share = min(1.0, (world.time - begin) / max(seconds, 1e-9))
+        if share == 1.0 and np.linalg.norm(between(arm.hand_rot, rot)) < 0.08:
+            return
+        aim = rotation(share * turn) @ start
+        yield steer(arm, middle - aim @ held, np.zeros(3), between(arm.hand_rot, aim), CLOSED)
+
+
+def on_its_side(azimuth: float, elevation: float) -> Mat3:
+    """Orientation of a hand that looks along a direction [rad] and whose fingers close in a vertical plane.
+
+    What it holds rests on the lower finger when the jaw opens a little.
+    """
+    along = math.cos(elevation) * heading(math.degrees(azimuth)) + math.sin(elevation) * UP
+    closing = np.cross(along, [-math.sin(azimuth), math.cos(azimuth), 0.0])
+    return np.stack([closing, np.cross(along, closing), along], axis=1)
+
+
 def pick_where_it_is(arm: Arm, body: str, skew: float = 0.0, lift: float = LIFT) -> Plan:
     """Pick up a body from above at its present place, across its narrow level side.
 
@@ -210,7 +261,7 @@ def carry_to(
     with suppress(GaveUp):  # it is let go in any case
         yield from go_to(arm, target + lag + drop * UP, rot, LOWER, CLOSED)
     yield from release(arm, 0.2 if drop else RELEASE_TIME)
-    yield from retreat(arm, 0.08, WAY)
+    yield from retreat(arm, max(0.08, over - drop), WAY)
 
 
 def carry_along(arm: Arm, body: str, way: ArrayLike, skew: float = 0.0, raise_by: float = 0.003) -> Plan:

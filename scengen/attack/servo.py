@@ -28,6 +28,10 @@ PITCHES = (math.radians(20.0), math.radians(8.0))
 """Angles by which a cradling hand looks above the horizontal [rad]."""
 SIDES = (0.0, math.radians(50.0), math.radians(-50.0))
 """Directions from which a body is cradled, from that of the robot's base [rad]."""
+ROLLS = (math.radians(135.0), math.radians(-135.0), math.radians(90.0), math.radians(-90.0))
+"""Directions in which a hand on its side looks [rad]: 0 is away from the robot."""
+ELEVATIONS = (math.radians(30.0), math.radians(10.0))
+"""Angles by which a hand on its side looks above the horizontal [rad]."""
 QUARTER = math.pi / 2
 """Turn of the hand that puts its narrow side across the way [rad]."""
 HIGH = (0.2, 0.0, 0.0)
@@ -43,10 +47,6 @@ ROUTES = (
 )
 """Ways to carry a body: height above its goal [m], turn of the hand [rad], and the largest distance to the left of the
 straight way [m]. They go through a gap, over an obstacle, straight, high, and around both sides."""
-STRAIGHT = Macro("touch")
-"""Way to touch another body with the one in the hand: straight from where it is."""
-FROM_ABOVE = Macro("press", "", (0.0, 0.0, 0.1, 0.1))
-"""Way to touch another body with the one in the hand: on the middle of its upper face."""
 RAISE = 0.008
 """Height above its way at which a body is carried along it [m]: the fingers keep off the table."""
 DROPS = (0.0, 0.04, 0.12)
@@ -61,23 +61,34 @@ def servo(player: Player) -> Iterator[Attempt]:
     """All attempts, for every arm with a jaw and every handled body in turn, the most promising ones first."""
     jaws = [arm for arm in player.world.arms if not arm.suction]
     bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
-    families = [made(player, arm, body) for arm, body in product(jaws, bodies) for made in (chased, carried, cradled)]
-    if len(bodies) > 1:
-        families = [*(all_carried(player, arm, bodies) for arm in jaws), *families]
+    makers = (chased, carried, cradled)
+    of_one = _in_turn([made(player, arm, body) for arm, body in product(jaws, bodies) for made in makers])
+    of_all = _in_turn([all_carried(player, arm, bodies) for arm in jaws]) if len(bodies) > 1 else iter(())
+    yield from _in_turn([of_all, of_one])
+
+
+def _in_turn(families: Sequence[Iterator[Attempt]]) -> Iterator[Attempt]:
+    """The first attempt of each family, then the second ones."""
     for round_ in zip_longest(*families):
         yield from (attempt for attempt in round_ if attempt)
 
 
 def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Pursue, press down and block a body that moves by itself; then carry it to its goal if it is not reached yet."""
+    """Pursue, press down and block a body that moves by itself, at once or after it has changed its course.
+
+    Then it is carried to its goal if it is not reached yet.
+    """
     if body not in moving(player):
         return
     rest = bring(player, arm, body, ROUTES[1], 0.0)
+    later = Macro("await", body, (), arm.number)
     plans = [("pursue", PURSUIT_LEADS), ("pin", BLOCK_LEADS), ("block", BLOCK_LEADS)]
     for leads in zip_longest(*(leads for _, leads in plans)):
         for (kind, _), lead in zip(plans, leads, strict=True):
             if lead is not None:
-                yield Attempt(SERVO, (Macro(kind, body, (lead,), arm.number), rest))
+                chase = Macro(kind, body, (lead,), arm.number)
+                yield Attempt(SERVO, (later, chase, rest))
+                yield Attempt(SERVO, (chase, rest))
 
 
 def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
@@ -87,30 +98,62 @@ def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     for skew in (0.0, QUARTER):
         take = Macro("take", body, (skew, 0.0), arm.number)
         yield Attempt(SERVO, (take, Macro("along", body, (skew, RAISE), arm.number)))
-    touches = [Macro("touch", other, (), arm.number) for other in asked_of(player, body)]
+    asked = asked_of(player, body)
     for drop, route in product(DROPS, ROUTES):
         goal = bring(player, arm, body, route, drop)
         yield Attempt(SERVO, (pick, goal))
-        if touches:
-            yield Attempt(SERVO, (pick, *touches, goal))
+        if asked:
+            yield Attempt(SERVO, (pick, *touched_there(player, arm, body, asked), goal))
+            yield Attempt(SERVO, (pick, *touched_straight(player, arm, body, asked), goal))
 
 
 def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
     """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
     asked = {body: asked_of(player, body) for body in bodies}
-    ways = product(dict.fromkeys((HIGH, *ROUTES)), reversed(DROPS), (0.0, QUARTER))
-    for route, drop, skew in ways:
-        for touch in (FROM_ABOVE, STRAIGHT, None) if any(asked.values()) else (None,):
-            moves: list[Macro] = []
-            for body in bodies:
-                taken = [Macro("take", body, (skew, 0.2), arm.number)]
-                touches = [] if touch is None else [replace(touch, target=one, arm=arm.number) for one in asked[body]]
-                moves += [*taken, *touches, bring(player, arm, body, route, drop)]
-            yield Attempt(SERVO, tuple(moves))
+    touches = (touched_there, touched_straight, untouched) if any(asked.values()) else (untouched,)
+    for route, skew, drop, touch in product(dict.fromkeys((HIGH, *ROUTES)), (0.0, QUARTER), DROPS, touches):
+        moves: list[Macro] = []
+        for body in bodies:
+            taken = [Macro("take", body, (skew, 0.2), arm.number) if skew else taking(player, arm, body)]
+            moves += [*taken, *touch(player, arm, body, asked[body]), bring(player, arm, body, route, drop)]
+        yield Attempt(SERVO, tuple(moves))
+
+
+def touched_there(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
+    """Macros that touch other bodies with the one in the hand, where they touch in the witness, from above."""
+    places = [player.trace.place_at(body, body, other) for other in others]
+    return [Macro("touch", other, place, arm.number) for other, place in zip(others, places, strict=True)]
+
+
+def touched_straight(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
+    """Macros that touch other bodies with the one in the hand, straight from where it is."""
+    return [Macro("touch", other, (), arm.number) for other in others]
+
+
+def untouched(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
+    """No macros: no other body is touched."""
+    return []
 
 
 def cradled(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Lift a body on closed fingers, from the side of the robot and beside it, and carry it to its goal."""
+    """Carry a body to its goal from beneath.
+
+    It lies in a hand on its side, so that it rests on the lower finger, or on closed fingers that came from the side of
+    the robot or from beside it.
+    """
+    pick, (x, y, _) = taking(player, arm, body), player.goal_place(body) - player.start_place(body)
+    for direction, elevation in product(ROLLS, ELEVATIONS):
+        yield Attempt(
+            SERVO,
+            (
+                pick,
+                Macro("roll", body, (direction, elevation), arm.number),
+                Macro("move", "", (float(x), float(y), 0.0, 0.25), arm.number),
+                Macro("wait", "", (1.5,), arm.number),
+                Macro("roll", body, (direction, -QUARTER), arm.number),
+                bring(player, arm, body, ROUTES[2], 0.0),
+            ),
+        )
     base = math.atan2(*(player.start_place(body) - arm.hand)[[1, 0]])
     for pitch, side in product(PITCHES, SIDES):
         way = player.goal_place(body) - player.start_place(body)

@@ -113,7 +113,10 @@ def handles(found: Mapping[str, Solid], suction: bool) -> list[Solid]:
 
 
 def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
-    """Numbers of a solid's level axes along which an open jaw can close, the most clearance for the fingers first."""
+    """Numbers of a solid's level axes along which an open jaw can close.
+
+    The most clearance for the fingers comes first, then the fewest solids in their way.
+    """
     clearances = {}
     for which, (along, half) in enumerate(solid.level_axes(world)):
         if 2 * half < OPEN_GAP:
@@ -122,8 +125,8 @@ def sides(world: World, found: Mapping[str, Solid], solid: Solid) -> list[int]:
             near = [
                 gap(jaw, other.outline(world)) for other in others if other.top(world) > solid.top(world) - PALM_ABOVE
             ]
-            clearances[which] = min(near, default=1.0)
-    return sorted(clearances, key=lambda which: -clearances[which])
+            clearances[which] = max(min(near, default=1.0), 0.0), -sum(distance <= 0.0 for distance in near)
+    return sorted(clearances, key=clearances.__getitem__, reverse=True)
 
 
 def held(arm: Arm) -> str | None:

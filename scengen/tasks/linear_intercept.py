@@ -159,7 +159,9 @@ class LinearIntercept(LaunchedBall):
         ball, velocity, hand = world.com("ball"), world.velocity("ball")[3:], world.arm.hand
         times = np.arange(0.0, FORESIGHT_TIME, 0.02)
         margins = [t - math.dist(ball + t * velocity, hand) / HAND_SPEED for t in times]
-        soonest = next(t for t, margin in zip(times, margins, strict=True) if margin > 0)
+        soonest = next((t for t, margin in zip(times, margins, strict=True) if margin > 0), None)
+        if soonest is None:
+            raise GaveUp(f"the hand reaches no place before the ball within {FORESIGHT_TIME:g} s")
         yield from self.pick_at(world, ball + soonest * velocity)
 
     def _expect(self, world: World) -> Plan:
