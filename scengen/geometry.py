@@ -23,6 +23,24 @@ def heading(angle: float) -> Vec3:
     return np.array([math.cos(a), math.sin(a), 0.0])
 
 
+DIRECTIONS = (
+    "away from the robot",
+    "away and to the robot's left",
+    "to the robot's left",
+    "towards the robot and to its left",
+    "towards the robot",
+    "towards the robot and to its right",
+    "to the robot's right",
+    "away and to the robot's right",
+)
+"""Level directions in words, every 45 deg from x on, counter-clockwise seen from above."""
+
+
+def spoken(angle: float) -> str:
+    """The one of `DIRECTIONS` that is nearest to the direction `angle` [deg]; 0 is x, 90 is y."""
+    return DIRECTIONS[round(angle / 45.0) % len(DIRECTIONS)]
+
+
 def polar(offset: Vec3) -> tuple[float, float]:
     """Direction [rad] (0 is x) and length [m] of an offset seen from above."""
     x, y = offset[:2]

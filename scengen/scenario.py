@@ -123,7 +123,7 @@ class Scenario(abc.ABC):
     declares every field that it uses, so that it can be read without its families.
 
     A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `shortcuts`,
-    `ablations`, `constraints`, geometry.
+    `ablations`, `constraints`, `features`, `facts`, geometry.
     """
 
     HOLD: ClassVar[float] = 0.0
@@ -216,6 +216,14 @@ class Scenario(abc.ABC):
 
         Features prove and decide nothing. Scenes that differ in every parameter may have equal features; then the same
         behaviour solves them. A certificate records the features in its first check.
+        """
+        return {}
+
+    def facts(self) -> Mapping[str, float | str]:
+        """Answers to the questions about this scenario that `conf/facts/<task>.yaml` asks, by their ids.
+
+        Numbers in the unit of the question, or one of its options. They show whether a model understands the scenario,
+        see `scengen.agents`. Questions whose answer is the same in all scenarios are answered in that file.
         """
         return {}
 

@@ -100,6 +100,16 @@ def splits(name: str, search: Sequence[str] = ()) -> tuple[str, ...]:
     return (ID, *(_head(name, tuple(search)).get("axes") or ()))
 
 
+def facts_file(name: str, search: Sequence[str] = ()) -> Path | None:
+    """The file with the questions and sub-goals of a task, `facts/<task>.yaml` beside the folder of its task file.
+
+    None if it has none.
+    """
+    path = _files(tuple(search)).get(name)
+    found = path.parents[1] / "facts" / path.name if path else None
+    return found if found and found.is_file() else None
+
+
 @dataclass(frozen=True)
 class About:
     """Description of a task in its file; fields as in `samplers.task.Task`."""

@@ -28,7 +28,7 @@ LAYERS = (
     ("pictures",),
     ("envs", "intake"),
     ("export", "evaluate"),
-    ("analysis",),
+    ("analysis", "agents"),
     ("demos",),
     ("ood", "drift"),
     ("conformance",),

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..assets.box import Domino
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Vec3, heading
+from ..geometry import UP, Vec3, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
@@ -153,6 +153,15 @@ class DominoSingle(Scenario):
             "gap_over_height": self.gap / self.tile.height,
             "slab_over_tile_mass": self.slab.mass / self.tile.mass,
             "starter_tipping_angle": self.starter.tipping_angle,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "dominoes": self.count,
+            "way": spoken(self.heading),
+            "strike": "face against face" if abs(self.slab_yaw) < 15.0 else "on a corner of the slab",
+            "gap": self.gap / self.tile.height,
+            "tipping": math.degrees(self.starter.tipping_angle),
         }
 
     # --- geometry -------------------------------------------------------------------------

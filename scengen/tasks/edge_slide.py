@@ -252,6 +252,15 @@ class EdgeSlide(Scenario):
             "askew": math.radians(self.yaw),
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        strip = "a strip along one side is of another material"
+        return {
+            "edge": "the left one" if self.side > 0 else "the right one",
+            "material": strip if self.plate.off_centre > 0.0 else "one material",
+            "way": self.away - self.plate.off_centre,
+            "overhang": self.plate.tipping_overhang,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

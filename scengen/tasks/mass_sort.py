@@ -266,6 +266,13 @@ class MassSort(Scenario):
             "lightest_to_the_left": -1.0 if self.mirrored else 1.0,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "light_zone": "on the robot's right" if self.mirrored else "on the robot's left",
+            "far_row": "the zones" if self.zones_x > max(spot.x for spot in self.spots) else "the cubes",
+            "edge": self.edge,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

@@ -174,6 +174,24 @@ class MirrorPickPlace(Scenario):
             "length_over_opening": self.cube.size[1] / OPEN_GAP,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        turned = (
+            "upright",
+            "turned by 180 degrees",
+            "left and right are exchanged",
+            "above and below are exchanged",
+            "turned by 90 degrees",
+        )
+        upright = {"simplest_plan": "nothing: this plan reaches the goal"} if self.orientation == UPRIGHT else {}
+        return {
+            "pictures": turned[self.view],
+            "shown": "the right half" if self.orientation.seen_at(self.spot)[1] > 0.0 else "the left half",
+            "side": "on its left" if self.y > 0.0 else "on its right",
+            "aside": abs(self.y),
+            "height": float(self.cube.size[2]),
+            **upright,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

@@ -38,7 +38,7 @@ from ..assets.box import Block
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.seesaw import Seesaw, standing
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, heading, quat
+from ..geometry import UP, Mat3, Vec3, about_z, heading, quat, spoken
 from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
@@ -244,6 +244,13 @@ class SeesawBalance(Scenario):
             "place_of_balance": self.balance,
             "axle_off_middle": abs(self.seesaw.pivot_offset) / half,
             "target_lever": self.offset / half,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "raised": spoken(self.heading + (0.0 if self.raised > 0 else 180.0)),
+            "lever": abs(self.offset),
+            "long_arm": self.seesaw.length / 2 + abs(self.seesaw.pivot_offset),
         }
 
     # --- statics and geometry -------------------------------------------------------------

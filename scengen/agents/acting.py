@@ -1,0 +1,193 @@
+"""Stage 3: a model acts in a closed loop of reasoning and primitives (ReAct; paper, App. F)."""
+
+import re
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..assets.prop import TABLE_TOP
+from ..control.loop import Loop
+from ..envs.gym import Observation, PoolEnv
+from ..envs.object_state import xyzw
+from ..geometry import Vec3
+from ..sim.world import World, hands
+from .calls import Calls
+from .models import Call, Turn
+from .primitives import DONE, BadCall, Primitive, next_action, primitive, tools
+from .questioning import ACT, Exam, Result
+from .scene import controller, pictures, prompt, robot, told
+
+HISTORY = 12
+"""Number of batches of pictures, and of steps in the memory, that a prompt holds (paper, App. F)."""
+MAX_STEPS = 24
+"""Largest number of primitives in an episode (paper, App. F)."""
+MAX_TICKS = 10_000
+"""Largest number of control periods in an episode (paper, App. F)."""
+RETRIES = 3
+"""Number of refused calls after which the robot holds (paper, App. F)."""
+HOLD = Call("Hold", '{"ticks": 50}')
+"""Call in place of refused ones."""
+SEE = "see"
+POSES = "poses"
+POSES_SEEN = "poses_seen"
+MODES = (SEE, POSES, POSES_SEEN)
+"""What a model gets to know of things: pictures alone, poses in the axes of the actions, or the positions at which
+turned pictures show them."""
+
+
+@dataclass
+class Episode:
+    """State of one episode: what was seen, done and reached."""
+
+    env: PoolEnv
+    exam: Exam
+    mode: str
+    """One of `MODES`."""
+    observation: Observation
+    """Last observation."""
+    memory: deque[str] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    """Last primitives, and why each stopped."""
+    frames: deque[dict[str, bytes]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    """Last batches of pictures by their names."""
+    ticks: int = 0
+    """Number of control periods so far."""
+    over: str = ""
+    """Reason of the end; empty while it is open."""
+    success: bool = False
+
+    def look(self) -> None:
+        """Add the present pictures to the history."""
+        if batch := pictures(self.env, self.observation, f"{self.env.world.time:.1f} s"):
+            self.frames.append(batch)
+
+    def turns(self, left: int, fault: str) -> list[Turn]:
+        """The prompt of one step: everything that the model knows."""
+        frames = {name: picture for batch in self.frames for name, picture in batch.items()}
+        text = prompt(
+            "act",
+            instruction=" ".join(self.exam.row.instruction.split()),
+            robot=robot(self.exam.row.embodiment),
+            controller=controller(self.exam.row.embodiment),
+            table=TABLE_TOP,
+            time=f"{self.env.world.time:.1f} s",
+            reading=told(self.observation),
+            poses=self.poses(),
+            frames=list(frames),
+            memory=list(self.memory),
+            left=left,
+            fault=fault,
+        )
+        return [self.exam.system, Turn("user", text, tuple(frames.values()))]
+
+    def poses(self) -> list[str]:
+        """Positions [m], orientations and sizes [m] of the things, in the mode's axes; none if the model only sees."""
+        if self.mode == SEE:
+            return []
+        found, world, counts = list[str](), self.env.world, dict[str, int]()
+        for body in _bodies(world.model):
+            if (name := self.exam.sheet.name_of(body)) is None:
+                continue
+            counts[name] = counts.get(name, 0) + 1
+            pos = world.pos(body)
+            if self.mode == POSES_SEEN:
+                pos = self.env.scenario.orientation.seen_at(pos)
+            told_ = [
+                np.array2string(np.round(v, 3), separator=", ")
+                for v in (pos, xyzw(world.rot(body)), _size(world, body))
+            ]
+            number = f" {counts[name]}" if counts[name] > 1 else ""
+            found.append(f"{name}{number}: position {told_[0]}, quaternion xyzw {told_[1]}, size {told_[2]}")
+        return found
+
+    def neutral(self, text: str) -> str:
+        """A text with neutral names in place of those of bodies."""
+        for body in sorted(_bodies(self.env.world.model), key=len, reverse=True):
+            called = self.exam.sheet.name_of(body) or body if body == "table" else self.exam.sheet.name_of(body)
+            text = re.sub(rf"(?<![\w/]){re.escape(body)}(?![\w/])", called or "another thing", text)
+        return text
+
+    def carry_out(self, chosen: Primitive) -> str:
+        """Carry out a primitive; returns why it stopped."""
+        plan, before = chosen.plan(), self.ticks
+        while True:
+            action, why = next_action(plan)
+            if action is None:
+                break
+            self.observation, _, terminated, truncated, info = self.env.step(action)
+            self.ticks += 1
+            if terminated or truncated:
+                self.over, self.success = info["reason"] or "success", bool(info["success"])
+            elif self.ticks >= MAX_TICKS:
+                self.over = f"{MAX_TICKS} ticks are over"
+            if self.over:
+                why = "the episode is over"
+                break
+        self.look()
+        at = ", ".join(f"{value:.3f}" for value in self.env.world.arms[0].hand)
+        return f"{self.neutral(why)}, after {(self.ticks - before) * Loop.PERIOD:.2f} s, hand at ({at})"
+
+
+def act(exam: Exam, calls: Calls, env: PoolEnv, mode: str) -> Result:
+    """Let a model act in one scenario, from its start to the end of the episode."""
+    observation, _ = env.reset(options={"scenario": exam.row.id})
+    episode = Episode(env, exam, mode, observation)
+    episode.look()
+    refused = 0
+    steps: list[str] = []
+    while not episode.over and len(steps) < MAX_STEPS:
+        about = {**exam.about, "stage": ACT, "mode": mode, "attempt": len(steps) + 1}
+        chosen, faults = _choose(episode, about, calls, MAX_STEPS - len(steps))
+        refused += faults
+        if chosen.name == DONE:
+            episode.over = "the model says that it is done"
+            steps.append(chosen.told)
+            break
+        why = episode.carry_out(chosen)
+        steps.append(f"{chosen.told}: {why}")
+        episode.memory.append(f"{len(steps)}. {steps[-1]}")
+    grades = {
+        "right": episode.success,
+        "reason": episode.over or f"{MAX_STEPS} primitives are used up",
+        "steps": steps,
+        "refused": refused,
+        "seconds": round(episode.ticks * Loop.PERIOD, 2),
+    }
+    return Result(exam.about, ACT, len(steps), "", grades)
+
+
+def _choose(episode: Episode, about: dict[str, Any], calls: Calls, left: int) -> tuple[Primitive, int]:
+    """The primitive that the model calls, and the number of refused calls; after `RETRIES` of them the robot holds."""
+    fault, every = "", tools(len(hands(episode.exam.row.embodiment)))
+    for retry in range(RETRIES + 1):
+        asked = {**about, "retry": retry}
+        turns = episode.turns(left, fault)
+        reply = calls.ask(asked, turns, every, None, episode.exam.temperature, episode.exam.stand_in)
+        try:
+            if len(reply.calls) != 1:
+                raise BadCall(f"{len(reply.calls)} tools were called; call one")
+            return primitive(reply.calls[0], episode.env.world), retry
+        except BadCall as error:
+            fault = str(error)
+    return primitive(HOLD, episode.env.world), RETRIES + 1
+
+
+def _bodies(model: Any) -> list[str]:
+    """Names of all bodies."""
+    return [model.body(number).name for number in range(1, model.nbody)]
+
+
+def _size(world: World, body: str) -> Vec3:
+    """Edges of the box around a body's own geoms, in its axes [m], shape (3,)."""
+    model, number = world.model, world.body(body)
+    first, count = model.body_geomadr[number], model.body_geomnum[number]
+    corners = []
+    for geom in range(first, first + count):
+        centre, half = model.geom_aabb[geom].reshape(2, 3)
+        frame = np.empty(9)
+        mujoco.mju_quat2Mat(frame, model.geom_quat[geom])
+        for signs in np.ndindex(2, 2, 2):
+            corners.append(model.geom_pos[geom] + frame.reshape(3, 3) @ (centre + half * (2 * np.array(signs) - 1)))
+    return np.ptp(corners, axis=0) if corners else np.zeros(3)

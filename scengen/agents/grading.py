@@ -1,0 +1,102 @@
+"""Grades of stage 1 and stage 2, by code alone."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from .facts import Fact
+from .order import Order
+from .replies import OTHER, Planned, Understanding
+
+Grade = Literal["right", "wrong", "forbidden", "missing", "format"]
+"""Grade of one answer: `forbidden` claims to know what cannot be seen; `format` belongs to a reply without a form."""
+PlanError = Literal["hallucinated object", "affordance", "missing", "additional", "wrong order"]
+"""Kind of error in a plan, as in the Embodied Agent Interface (arXiv:2410.07166)."""
+
+
+def grade_understanding(artefact: Understanding | None, facts: Sequence[Fact]) -> dict[str, Grade]:
+    """Grade of each answer, by question.
+
+    Args:
+        artefact: the artefact; None if no reply followed the schema.
+        facts: the facts of the scenario.
+    """
+    if artefact is None:
+        return {fact.id: "format" for fact in facts}
+    claims = {claim.fact: claim.answer for claim in artefact.semantic}
+    unknown = {each.fact for each in artefact.unknown}
+    return {fact.id: _grade(fact, claims, unknown) for fact in facts}
+
+
+def _grade(fact: Fact, claims: Mapping[str, float | list[str]], unknown: set[str]) -> Grade:
+    if fact.hidden:
+        return "right" if fact.id in unknown else "forbidden" if fact.id in claims else "missing"
+    if fact.id in claims:
+        return "right" if fact.holds(claims[fact.id]) else "wrong"
+    return "wrong" if fact.id in unknown else "missing"
+
+
+@dataclass(frozen=True)
+class PlanGrade:
+    """Grade of a plan."""
+
+    errors: tuple[tuple[PlanError, str], ...]
+    """Errors: kind, and what it is about."""
+    conditions: float
+    """Share of the steps that name all conditions which the sub-goal needs and gives; not part of `right`."""
+    sensing: frozenset[str] = frozenset()
+    """Sub-goals of the task that bring information."""
+
+    @property
+    def right(self) -> bool:
+        """Whether the plan is a linear extension of the partial order, with nothing required missing."""
+        return not self.errors
+
+    @property
+    def audits(self) -> dict[str, bool]:
+        """Audits F1 to F3 (paper, App. F), made by code instead of the model."""
+        kinds = {kind for kind, _ in self.errors}
+        dropped = any(
+            kind in ("missing", "wrong order") and self.sensing & {*what.split()} for kind, what in self.errors
+        )
+        return {
+            "F1 no missing prerequisite": "missing" not in kinds,
+            "F2 no invalid order": "wrong order" not in kinds,
+            "F3 no dropped probing step": not dropped,
+        }
+
+
+def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade:
+    """Grade a plan: right if it is some linear extension of the partial order.
+
+    Args:
+        plan: the plan.
+        order: sub-goals of the task and their partial order.
+        objects: neutral names of the things in the scene.
+    """
+    names = [step.subgoal for step in plan.steps]
+    errors: list[tuple[PlanError, str]] = []
+    for name in (name for step in plan.steps for name in step.objects if name not in objects):
+        errors.append(("hallucinated object", name))
+    for name in (name for name in names if name in order.wrong):
+        errors.append(("affordance", name))
+    for name in (name for name in order.required if name not in names):
+        errors.append(("missing", name))
+    for position, name in enumerate(names):
+        again = name in names[:position] and not (name in order.subgoals and order.subgoals[name].repeats)
+        if name == OTHER or (again and name not in order.wrong):
+            errors.append(("additional", plan.steps[position].outcome if name == OTHER else name))
+    for one, other in sorted(order.before):
+        if one in names and other in names and names.index(other) < names.index(one):
+            errors.append(("wrong order", f"{other} before {one}"))
+    return PlanGrade(tuple(errors), _conditions(plan, order), order.sensing)
+
+
+def _conditions(plan: Planned, order: Order) -> float:
+    """Share of the known steps that name the conditions before and after them."""
+    known = [step for step in plan.steps if step.subgoal in order.subgoals]
+    good = [
+        set(order.subgoals[s.subgoal].needs) <= set(s.before) and set(order.subgoals[s.subgoal].gives) <= set(s.after)
+        for s in known
+    ]
+    return sum(good) / len(good) if good else 0.0

@@ -1,0 +1,248 @@
+"""Replies under their JSON schemas: what stage 1 and stage 2 ask for, and what is wrong with the form of a reply."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from ..errors import ScengenError, cut
+from ..typed import typed
+from .facts import Fact
+
+T = TypeVar("T")
+METADATA = "metadata"
+"""Name of the evidence that is no frame: instruction, robot, controller and readings."""
+OTHER = "other"
+"""Name of a step that is none of the sub-goals in the vocabulary."""
+
+
+class FormatError(ScengenError):
+    """A reply does not follow its schema."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What one frame shows."""
+
+    frame: str
+    """Name of the frame."""
+    seen: str
+    """Description in words."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An answer that the model claims to know."""
+
+    fact: str
+    """Id of the question."""
+    answer: float | list[str]
+    """A number, or the options that hold."""
+    evidence: list[str]
+    """Names of the frames that show it, or `metadata`."""
+    rank: int
+    """Importance for success: 1 is the most important."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A question that the model does not claim to know."""
+
+    fact: str
+    """Id of the question."""
+    sense: str
+    """Way to find the answer."""
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """The artefact of stage 1 (paper, App. F): what was seen, what is known, and what must be sensed."""
+
+    episodic: list[Seen]
+    semantic: list[Claim]
+    unknown: list[Unknown]
+
+    def faults(self, facts: Sequence[Fact], frames: Sequence[str]) -> list[str]:
+        """Faults that show without the answers: they make the stage be repeated."""
+        told = {claim.fact for claim in self.semantic} | {each.fact for each in self.unknown}
+        found = [
+            f"the question {fact.id} is neither answered nor listed as unknown" for fact in facts if fact.id not in told
+        ]
+        known = {*frames, METADATA}
+        for claim in self.semantic:
+            if not claim.evidence or not known.issuperset(claim.evidence):
+                found.append(f"{claim.fact} has no evidence that is one of the frames or {METADATA}")
+        return found
+
+
+@dataclass(frozen=True)
+class Why:
+    """Why the simplest action fails."""
+
+    constraint: str
+    """Id of the question of stage 1 whose answer is the reason."""
+    reason: str
+    """Reason in words."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One sub-goal of a plan."""
+
+    subgoal: str
+    """Name in the vocabulary, or `other`."""
+    outcome: str
+    """Physical outcome in words."""
+    objects: list[str]
+    """Names of the objects."""
+    before: list[str]
+    """Conditions that must hold before."""
+    after: list[str]
+    """Conditions that hold after it."""
+    constraint: str
+    """Id of the question of stage 1 whose answer makes it necessary."""
+
+
+@dataclass(frozen=True)
+class Audit:
+    """The model's own audit of its plan (paper, App. F)."""
+
+    f1_prerequisites: bool
+    """Whether all prerequisites are in the plan."""
+    f2_order: bool
+    """Whether no order is invalid."""
+    f3_probing: bool
+    """Whether no step that brings information was dropped."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """The plan of stage 2."""
+
+    why: Why
+    steps: list[Step]
+    audit: Audit
+
+    def faults(self, artefact: Understanding) -> list[str]:
+        """Faults that show without the answers: the artefact binds, and the model's own audit must pass."""
+        ids = {claim.fact for claim in artefact.semantic} | {each.fact for each in artefact.unknown}
+        found = [] if self.steps else ["the plan has no step"]
+        for name in [self.why.constraint, *(step.constraint for step in self.steps)]:
+            if name not in ids:
+                found.append(f"{cut(name)} is no constraint of the artefact")
+        return found + [f"your audit {name} failed" for name, passed in vars(self.audit).items() if not passed]
+
+
+def read_json(text: str) -> Any:
+    """The JSON value of a reply; a code fence around it is allowed, nothing else is.
+
+    Raises:
+        FormatError: it is no JSON.
+    """
+    fenced = re.fullmatch(r"\s*```(?:json)?\s*(.*?)\s*```\s*", text, re.S)
+    if not text.strip():
+        raise FormatError("the reply is empty")
+    try:
+        return json.loads(fenced[1] if fenced else text)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"the reply is not JSON: {cut(str(error))}") from None
+
+
+def understanding(text: str, facts: Sequence[Fact]) -> Understanding:
+    """Read the artefact of stage 1.
+
+    Raises:
+        FormatError: it does not follow the schema, answers a question twice, or names what is no question or option.
+    """
+    found = _filled(Understanding, text)
+    known, told = {fact.id: fact for fact in facts}, [each.fact for each in (*found.semantic, *found.unknown)]
+    for name in told:
+        if name not in known:
+            raise FormatError(f"{cut(repr(name))} is no question; known: {', '.join(known)}")
+        if told.count(name) > 1:
+            raise FormatError(f"the question {name} is answered {told.count(name)} times")
+    for claim in found.semantic:
+        fact = known[claim.fact]
+        if isinstance(claim.answer, list) != bool(fact.options):
+            raise FormatError(f"the answer to {fact.id} must be {'a list of options' if fact.options else 'a number'}")
+        if isinstance(claim.answer, list) and (odd := [name for name in claim.answer if name not in fact.options]):
+            raise FormatError(f"{cut(repr(odd[0]))} is no option of {fact.id}")
+    return found
+
+
+def plan(text: str, vocabulary: Mapping[str, str]) -> Planned:
+    """Read the plan of stage 2.
+
+    Raises:
+        FormatError: it does not follow the schema, or names a sub-goal that is not in the vocabulary.
+    """
+    found = _filled(Planned, text)
+    for step in found.steps:
+        if step.subgoal not in (*vocabulary, OTHER):
+            raise FormatError(f"{cut(repr(step.subgoal))} is no sub-goal; known: {', '.join((*vocabulary, OTHER))}")
+    return found
+
+
+def _filled(cls: type[T], text: str) -> T:
+    plain = read_json(text)
+    if not isinstance(plain, dict):
+        raise FormatError("the reply is not a JSON object")
+    try:
+        return typed("", cls, plain, exact=True)
+    except FormatError:
+        raise
+    except (ScengenError, RecursionError) as error:
+        raise FormatError(str(error)) from None
+
+
+def understanding_schema(facts: Sequence[Fact], frames: Sequence[str]) -> dict[str, Any]:
+    """JSON schema of the artefact of stage 1."""
+    ids, evidence = [fact.id for fact in facts], [*frames, METADATA]
+    options = sorted({option for fact in facts for option in fact.options})
+    answer = {"anyOf": [{"type": "number"}, _list({"enum": options})]}
+    claim = _object(
+        fact={"enum": ids}, answer=answer, evidence=_list({"enum": evidence}), rank={"type": "integer", "minimum": 1}
+    )
+    return _object(
+        "understanding",
+        episodic=_list(_object(frame={"enum": list(frames)} if frames else TEXT, seen=TEXT)),
+        semantic=_list(claim),
+        unknown=_list(_object(fact={"enum": ids}, sense=TEXT)),
+    )
+
+
+def plan_schema(
+    vocabulary: Mapping[str, str], objects: Sequence[str], conditions: Sequence[str], ids: Sequence[str]
+) -> dict[str, Any]:
+    """JSON schema of the plan of stage 2. Objects are free text: a plan may name one that does not exist."""
+    condition, constraint = _list({"enum": list(conditions)}), {"enum": list(ids)}
+    step = _object(
+        subgoal={"enum": [*vocabulary, OTHER]},
+        outcome=TEXT,
+        objects=_list({"type": "string", "examples": list(objects)}),
+        before=condition,
+        after=condition,
+        constraint=constraint,
+    )
+    passed = {"type": "boolean"}
+    return _object(
+        "plan",
+        why=_object(constraint=constraint, reason=TEXT),
+        steps=_list(step),
+        audit=_object(f1_prerequisites=passed, f2_order=passed, f3_probing=passed),
+    )
+
+
+TEXT = {"type": "string"}
+"""Schema of a free text."""
+
+
+def _list(items: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+def _object(title: str = "", **properties: Mapping[str, Any]) -> dict[str, Any]:
+    named = {"title": title} if title else {}
+    closed = {"required": list(properties), "additionalProperties": False}
+    return {**named, "type": "object", "properties": properties, **closed}

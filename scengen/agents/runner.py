@@ -1,0 +1,271 @@
+"""Runs of `scengen agent`: the scenarios of some pools through one stage, with a journal of calls and results."""
+
+import itertools
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from .. import compose
+from ..control.teleop import TELEOP
+from ..envs.gym import PoolEnv
+from ..errors import BadConfig, UnknownName, at_least, cut
+from ..pool import Pool, PoolRow, collection
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..typed import typed
+from ..work.log import Log
+from ..work.targets import try_folder, write
+from . import facts
+from .acting import MODES, SEE, act
+from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
+from .facts import Fact, Sheet
+from .models import Endpoint, Model, Turn, made
+from .questioning import ACT, EMPTY, PLAN, UNDERSTAND, Exam, Result, make_plan, plan_turns, understand, understand_turns
+from .scene import observe, streams
+from .standins import STAND_INS, Key
+
+STAGES = (UNDERSTAND, PLAN, ACT)
+"""Numbers of the stages."""
+SETTINGS = "settings.json"
+"""Name of the file with the settings of the last run in a folder."""
+PRIORS = 50
+"""Largest number of training scenarios from which the stand-in `blind` takes its prior."""
+TRANSCRIPT = "transcript:"
+"""Prefix of a model that is the journal of an earlier run."""
+
+
+@dataclass(frozen=True)
+class AgentSettings:
+    """Settings of `scengen agent`; conf/command/agent.yaml explains them."""
+
+    model: str = ""
+    pool: str | list[str] = ""
+    stage: int = UNDERSTAND
+    to: str | None = None
+    url: str | None = None
+    key: str = ""
+    seeds: int = 20
+    temperatures: list[float] = field(default_factory=lambda: [0.0])
+    pictures: bool = True
+    width: int = 384
+    moments: int = 3
+    spacing: float = 0.5
+    budget: Budget = Budget()
+    mode: str = SEE
+    dry: bool = False
+
+    @cached_property
+    def folders(self) -> list[str]:
+        """Folders of the pools."""
+        return collection.folders(self.pool)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results."""
+        plain = "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in self.model)
+        return Path(self.to or f"generated/agent/{plain}")
+
+    def check(self) -> None:
+        """Raise `ScengenError` if a setting is not valid."""
+        at_least(self, seeds=1, width=16)
+        if self.stage not in STAGES:
+            raise BadConfig(f"stage = {self.stage}; it must be 1 (understand), 2 (plan) or 3 (act)")
+        if self.mode not in MODES:
+            raise UnknownName("mode", self.mode, MODES)
+        if not self.temperatures or not all(0.0 <= t <= 2.0 for t in self.temperatures):
+            raise BadConfig(f"temperatures = {self.temperatures}; give one or more numbers in [0, 2]")
+        if not 1 <= self.moments <= 12 or not 0.0 < self.spacing <= 60.0:
+            raise BadConfig(
+                f"moments = {self.moments}, spacing = {self.spacing:g}; at most 12 moments, up to 60 s apart"
+            )
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Model of a journal: answers of different models are not mixed."""
+        return {"model": self.model, "url": self.url}
+
+
+def find_model(settings: AgentSettings) -> Model | None:
+    """The model of the settings; None for a stand-in, which is made for each scenario, and for a transcript.
+
+    Raises:
+        BadConfig, UnknownName: there is no such model.
+    """
+    name = settings.model
+    if settings.url:
+        return Endpoint(name, settings.url, settings.key)
+    if name in STAND_INS or name.startswith(TRANSCRIPT):
+        return None
+    if ":" in name:
+        return made(name)
+    try:
+        raise UnknownName("model", name, [*STAND_INS, "module:factory", f"{TRANSCRIPT}FILE"])
+    except UnknownName as error:
+        raise BadConfig(f"{error}; a model behind an endpoint needs url=http://.../v1") from None
+
+
+@dataclass(frozen=True)
+class Work:
+    """A scenario that is to be asked about."""
+
+    task: Task
+    pool: str
+    row: PoolRow
+
+
+def works(settings: AgentSettings, search: Sequence[str] = ()) -> list[Work]:
+    """The first scenarios of each pool, and their tasks.
+
+    Raises:
+        ScengenError: a pool is damaged or empty, or its task states no facts.
+    """
+    found = []
+    for folder in settings.folders:
+        pool = Pool.open(folder).check()
+        if not len(pool):
+            raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
+        for row in itertools.islice(pool.rows(witness=False), settings.seeds):
+            found.append(Work(compose.load_task(row.task, search), folder, row))
+    for task in {work.task.name: work.task for work in found}.values():
+        facts.load(task, search)
+    return sorted(found, key=lambda work: work.task.name)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results of a run."""
+
+    results: list[dict[str, Any]]
+    """Results as plain data, with the labels of the scenarios."""
+    calls: int
+    """Number of new calls."""
+    tokens: int
+    """Tokens of the new calls."""
+    stopped: str
+    """Reason why the run ended before all was asked; empty if it did not."""
+
+
+def run(
+    settings: AgentSettings, progress: Callable[[int, int], None], ask: bool = True, search: Sequence[str] = ()
+) -> Outcome:
+    """Ask about every scenario, grade, and write `results-<stage>.jsonl`. A repeated run asks only what is missing.
+
+    Args:
+        settings: settings of the command.
+        progress: called with the number of scenarios done, and their total.
+        ask: whether a model may be asked; else only the journal answers.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+
+    Raises:
+        ScengenError: a pool, a model or a setting is not valid, or the model cannot be reached.
+    """
+    settings.check()
+    model, todo = find_model(settings) if ask else None, works(settings, search)
+    folder = settings.folder
+    try_folder(folder)
+    path = folder / CALLS
+    with Log(path, settings.identity, "choose another to= for another model") as log:
+        calls = Calls(log, model, settings.budget)
+        if settings.model.startswith(TRANSCRIPT):
+            calls.recall(Path(settings.model.removeprefix(TRANSCRIPT)))
+        write(folder / SETTINGS, json.dumps(asdict(settings), indent=1) + "\n")
+        results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
+        try:
+            for work, exam, env in exams(settings, todo, ask, search):
+                results += [{**_labels(work), **each.plain()} for each in _stages(settings, exam, calls, env)]
+                progress(sum(r["stage"] == settings.stage for r in results), total)
+        except OutOfBudget as error:
+            stopped = str(error)
+        write(folder / f"results-{settings.stage}.jsonl", "".join(json.dumps(r) + "\n" for r in results))
+        return Outcome(results, calls.new, calls.tokens, stopped)
+
+
+def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv) -> list[Result]:
+    """Results of the stage, and of stage 1 before stage 2."""
+    if settings.stage == ACT:
+        return [act(exam, calls, env, settings.mode)]
+    artefact, first = understand(exam, calls)
+    return [first] if settings.stage == UNDERSTAND else [first, make_plan(exam, artefact, calls)]
+
+
+def exams(
+    settings: AgentSettings, todo: Sequence[Work], ask: bool = True, search: Sequence[str] = ()
+) -> Iterator[tuple[Work, Exam, PoolEnv]]:
+    """Every scenario at every temperature, seen and ready to be asked about; one environment for each task."""
+    for _, group in itertools.groupby(todo, key=lambda work: work.task.name):
+        mine = list(group)
+        task, sheet = mine[0].task, facts.load(mine[0].task, search)
+        told = [sheet.facts_of(task, work.row.params, work.row.certificate.checks) for work in mine]
+        folders = list(dict.fromkeys(work.pool for work in mine))
+        names = streams(task.embodiment, settings.pictures)
+        env = PoolEnv(
+            task.name,
+            folders,
+            names,
+            width=settings.width,
+            height=settings.width,
+            action_filter=TELEOP,
+            settle=True,
+            search=search,
+        )
+        with closing(env):
+            for number, work in enumerate(mine):
+                moments = 1 if settings.stage == ACT else settings.moments
+                view = observe(env, work.row.id, moments, settings.spacing)
+                stand_in = _stand_in(settings, mine, told, number, sheet) if ask else None
+                for temperature in settings.temperatures:
+                    yield work, Exam(work.row, sheet, told[number], view, temperature, stand_in), env
+
+
+def _stand_in(
+    settings: AgentSettings, mine: Sequence[Work], told: Sequence[tuple[Fact, ...]], number: int, sheet: Sheet
+) -> Model | None:
+    """The stand-in for one scenario; None if the model is none.
+
+    Raises:
+        BadConfig: `blind` has no training scenario to learn from.
+    """
+    if settings.model not in STAND_INS or settings.url:
+        return None
+    others = [fact for k, fact in enumerate(told) if k != number and mine[k].row.split == ID][:PRIORS]
+    if settings.model == "blind" and not others:
+        raise BadConfig(f"model blind needs another scenario of {mine[number].row.task} with split id; add such a pool")
+    return STAND_INS[settings.model](Key(told[number], sheet.plan, others))
+
+
+def _labels(work: Work) -> dict[str, Any]:
+    """Columns of a scenario that tables need."""
+    row = work.row
+    names = ("task", "category", "split", "seed", "index")
+    return {"pool": work.pool, "scenario": row.id, **{name: getattr(row, name) for name in names}}
+
+
+def prompts(settings: AgentSettings, search: Sequence[str] = ()) -> Iterator[tuple[Work, list[Turn], tuple[int, int]]]:
+    """The first prompt of every scenario, with the estimated tokens of prompt and answer.
+
+    Stage 2 is estimated with the artefact of an empty stage 1.
+    """
+    settings.check()
+    for work, exam, _ in exams(settings, works(settings, search), search=search):
+        turns = understand_turns(exam)
+        if settings.stage == PLAN:
+            turns = plan_turns(exam, EMPTY)
+        yield work, turns, estimate(turns)
+
+
+def earlier(folder: Path) -> AgentSettings:
+    """Settings of the last run in a folder.
+
+    Raises:
+        BadConfig: there is none.
+    """
+    try:
+        return typed("", AgentSettings, json.loads((folder / SETTINGS).read_text()))
+    except (OSError, ValueError) as error:
+        raise BadConfig(
+            f"{cut(str(folder))} holds no run of scengen agent ({cut(str(error))}); give to=FOLDER"
+        ) from None

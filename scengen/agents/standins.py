@@ -1,0 +1,156 @@
+"""Stand-ins for models, which show what grades mean: `facts` must score 100 %, `wrong` 0 %, `garbage` nothing but
+format errors. They know the answers, so they measure the graders and not themselves."""
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .facts import Answer, Fact
+from .models import Model, Reply, Tool, Turn
+from .order import Order
+from .replies import METADATA
+
+
+@dataclass(frozen=True)
+class Key:
+    """What stand-ins know of a scenario."""
+
+    facts: tuple[Fact, ...]
+    """Facts of the scenario."""
+    order: Order
+    """Order of the task's sub-goals."""
+    training: Sequence[tuple[Fact, ...]]
+    """Facts of training scenarios of the task, without the scenario itself: the prior of `blind`."""
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """A stand-in that answers by the title of the schema."""
+
+    key: Key
+
+    def reply(
+        self, turns: Sequence[Turn], tools: Sequence[Tool], schema: Mapping[str, Any], temperature: float, seed: int
+    ) -> Reply:
+        """Answer with a whole artefact or plan; free text is not needed."""
+        title = schema.get("title")
+        told = self.understood() if title == "understanding" else self.planned() if title == "plan" else {}
+        return Reply(json.dumps(told) if told else "See the plan below.")
+
+    def understood(self) -> dict[str, Any]:
+        """The artefact of stage 1 with the right answers."""
+        known = {fact.id: fact.right for fact in self.key.facts if fact.right is not None}
+        return artefact(known, [fact.id for fact in self.key.facts if fact.hidden])
+
+    def planned(self) -> dict[str, Any]:
+        """The plan of stage 2 in a right order."""
+        return plan(self.key.order, self.key.order.required, self.key.facts)
+
+
+class Wrong(StandIn):
+    """A stand-in that is wrong about everything, in the right form."""
+
+    def understood(self) -> dict[str, Any]:
+        """Every answer wrong: another option, a number far off, and a claim about everything hidden."""
+        return artefact({fact.id: _wrong(fact) for fact in self.key.facts}, [])
+
+    def planned(self) -> dict[str, Any]:
+        """The sub-goals in reverse order, without the first one."""
+        return plan(self.key.order, tuple(reversed(self.key.order.required[1:])), self.key.facts)
+
+
+class Blind(StandIn):
+    """A stand-in that sees nothing, and knows how often each answer is right in training."""
+
+    def understood(self) -> dict[str, Any]:
+        """The most frequent options, and the medians of the numbers, of training."""
+        before = [{fact.id: fact.right for fact in facts} for facts in self.key.training]
+        known = {f.id: _prior([told[f.id] for told in before]) for f in self.key.facts if not f.hidden}
+        options = {fact.id: fact.options for fact in self.key.facts}
+        fits = {k: a for k, a in known.items() if not isinstance(a, tuple) or set(a) <= set(options[k])}
+        return artefact(fits, [fact.id for fact in self.key.facts if fact.id not in fits])
+
+
+class Silent(StandIn):
+    """A stand-in that says nothing."""
+
+    def reply(
+        self, turns: Sequence[Turn], tools: Sequence[Tool], schema: Mapping[str, Any], temperature: float, seed: int
+    ) -> Reply:
+        """An empty reply."""
+        return Reply("")
+
+
+class Garbage(StandIn):
+    """A stand-in whose replies have no form."""
+
+    def reply(
+        self, turns: Sequence[Turn], tools: Sequence[Tool], schema: Mapping[str, Any], temperature: float, seed: int
+    ) -> Reply:
+        """Text, JSON that is cut off, JSON of another form, an unknown question, or the right artefact within text."""
+        right = json.dumps(self.understood())
+        strange = json.dumps(
+            {"episodic": [], "semantic": [], "unknown": [{"fact": "colour_of_the_sky", "sense": "look"}]}
+        )
+        return Reply(
+            ("I see a robot.", right[: len(right) // 2], "[1, 2]", "null", strange, f"Sure! {right}")[seed % 6]
+        )
+
+
+STAND_INS: dict[str, Callable[[Key], Model]] = {
+    "facts": StandIn,
+    "wrong": Wrong,
+    "blind": Blind,
+    "silent": Silent,
+    "garbage": Garbage,
+}
+"""Stand-ins by the name that `model=` has."""
+
+
+def artefact(known: Mapping[str, Answer], unknown: Sequence[str]) -> dict[str, Any]:
+    """An artefact of stage 1 that claims some answers, and lists other questions as unknown."""
+    answers = {id_: list(told) if isinstance(told, tuple) else told for id_, told in known.items()}
+    semantic = [
+        {"fact": id_, "answer": answer, "evidence": [METADATA], "rank": rank}
+        for rank, (id_, answer) in enumerate(answers.items(), 1)
+    ]
+    return {"episodic": [], "semantic": semantic, "unknown": [{"fact": id_, "sense": "by contact"} for id_ in unknown]}
+
+
+def plan(order: Order, names: Sequence[str], facts: Sequence[Fact]) -> dict[str, Any]:
+    """A plan of stage 2 with some sub-goals of the order, each with its own conditions."""
+    reason = facts[-1].id
+    steps = [
+        {
+            "subgoal": name,
+            "outcome": order.subgoals[name].outcome,
+            "objects": order.subgoals[name].objects,
+            "before": order.subgoals[name].needs,
+            "after": order.subgoals[name].gives,
+            "constraint": reason,
+        }
+        for name in names
+    ]
+    audit = {"f1_prerequisites": True, "f2_order": True, "f3_probing": True}
+    return {"why": {"constraint": reason, "reason": "see the constraint"}, "steps": steps, "audit": audit}
+
+
+def _wrong(fact: Fact) -> Answer:
+    """An answer that is wrong and has the right form."""
+    if isinstance(fact.right, float):
+        return fact.right + 10 * fact.within + 1.0
+    right = fact.right if isinstance(fact.right, tuple) else ()
+    others = [option for option in fact.options if option not in right]
+    return (others[0],)
+
+
+def _prior(answers: Sequence[Answer | None]) -> Answer:
+    """The most frequent options, or the median of numbers."""
+    if numbers := [answer for answer in answers if isinstance(answer, float)]:
+        return float(np.median(numbers))
+    (likeliest, _), *_ = Counter(answer for answer in answers if isinstance(answer, tuple)).most_common(1)
+    return likeliest

@@ -1,0 +1,89 @@
+"""Tables of a run: shares of right answers by task and category, ID beside OOD, with intervals by scenario."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..evaluate.table import TableLine, cells, table
+from ..samplers.split import ID
+from .grading import Grade
+from .questioning import UNDERSTAND, Result
+
+GRADES: tuple[Grade, ...] = ("right", "wrong", "forbidden", "missing", "format")
+"""Grades of answers in the order of the tables."""
+
+
+def result_of(plain: Mapping[str, Any]) -> Result:
+    """The result in a line of a file of results."""
+    return Result(**{name: plain[name] for name in ("about", "stage", "attempts", "format_error", "grades")})
+
+
+def lines(results: Sequence[Mapping[str, Any]], stage: int) -> list[TableLine]:
+    """The paper's table for one stage, see `evaluate.table.table`: an answer counts as a rollout of its scenario."""
+    episodes = [
+        {**{name: plain[name] for name in ("task", "category", "split", "seed", "index")}, "success": success}
+        for plain in results
+        if plain["stage"] == stage
+        for success in result_of(plain).outcomes
+    ]
+    return table(episodes)
+
+
+@dataclass(frozen=True)
+class QuestionLine:
+    """Grades of one question, or kind of error of a plan, over all scenarios."""
+
+    task: str
+    """Name of the task."""
+    question: str
+    """Id of the question."""
+    counts: Mapping[str, int]
+    """Number of replies by grade."""
+
+
+def by_question(results: Sequence[Mapping[str, Any]]) -> list[QuestionLine]:
+    """Grades of stage 1 by question."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for plain in results:
+        if plain["stage"] == UNDERSTAND:
+            for question, grade in plain["grades"].items():
+                counts.setdefault((plain["task"], question), Counter())[grade] += 1
+    return [QuestionLine(task, question, dict(found)) for (task, question), found in counts.items()]
+
+
+def plan_errors(results: Sequence[Mapping[str, Any]]) -> Counter[str]:
+    """Number of plans with each kind of error, and of plans without a form."""
+    found: Counter[str] = Counter()
+    for plain in results:
+        if "errors" in plain["grades"]:
+            found.update({kind for kind, _ in plain["grades"]["errors"]})
+            found["format"] += bool(plain["format_error"])
+    return found
+
+
+def lost_in_twins(results: Sequence[Mapping[str, Any]], stage: int) -> tuple[int, int]:
+    """How often training is understood and the OOD twin is not.
+
+    Returns:
+        Number of answers that are right in training and not in the twin of the same index, and number of answers that
+        are right in training and were asked in a twin.
+    """
+    right: dict[tuple[Any, ...], bool] = {}
+    for plain in results:
+        if plain["stage"] == stage:
+            grades = plain["grades"] if stage == UNDERSTAND else {"right": plain["grades"]["right"]}
+            where = (plain["task"], plain["seed"], plain["index"], plain["about"]["temperature"], plain["split"])
+            right.update({(*where, name): grade in ("right", True) for name, grade in grades.items()})
+    pairs = [
+        (right[*where[:4], ID, where[5]], good)
+        for where, good in right.items()
+        if where[4] != ID and (*where[:4], ID, where[5]) in right
+    ]
+    return sum(trained and not good for trained, good in pairs), sum(trained for trained, _ in pairs)
+
+
+def markdown(title: str, found: Sequence[TableLine]) -> str:
+    """A table of one stage as Markdown, rates and 95 % intervals in percent."""
+    head = f"{title}\n\n| | split | ID | OOD | difference |\n|---|---|---|---|---|\n"
+    return head + "".join(f"| {' | '.join(cells(line))} |\n" for line in found)

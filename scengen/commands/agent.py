@@ -1,0 +1,92 @@
+"""let a model understand, plan and act in certified scenarios, graded by code"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rich.table import Table
+
+from ..agents.page import TITLES, write_page
+from ..agents.runner import AgentSettings, Outcome, earlier, prompts, run
+from ..agents.tables import lines, lost_in_twins, markdown, plan_errors
+from ..errors import BadConfig
+from ..evaluate.table import cells, plain
+from ..runs.progress import ProgressBar
+from ..task_files import search_path
+from ..work.targets import write
+from . import FAILED, OK, Arguments, err, out, remark, say, write_json
+from .settings import read
+
+REPORT = "report"
+"""Word after the command that grades an earlier run again."""
+
+
+def command(arguments: Arguments) -> int:
+    if arguments and arguments[0] == REPORT:
+        return _report(arguments[1:])
+    settings = read("agent", arguments, AgentSettings)
+    if settings.dry:
+        return _dry(settings, search_path(arguments))
+    return _shown(settings, _run(settings, search_path(arguments)))
+
+
+def _run(settings: AgentSettings, search: Sequence[str] = (), ask: bool = True) -> Outcome:
+    with ProgressBar(err, f"agent {settings.model}", 1) as progress_bar:
+        return run(settings, progress_bar.of, ask, search)
+
+
+def _report(arguments: Arguments) -> int:
+    """Grade an earlier run again from its journal."""
+    if len(arguments) != 1 or not arguments[0].startswith("to="):
+        raise BadConfig("scengen agent report needs to=FOLDER, the folder of a run, and nothing else")
+    folder = Path(arguments[0].removeprefix("to="))
+    settings = replace(earlier(folder), to=str(folder), dry=False)
+    return _shown(settings, _run(settings, ask=False))
+
+
+def _shown(settings: AgentSettings, found: Outcome) -> int:
+    """Print and write the tables of a run."""
+    folder, told = settings.folder, {}
+    if not found.results:
+        raise BadConfig(f"nothing was graded: {found.stopped}")
+    for stage in sorted({result["stage"] for result in found.results}):
+        rows, title = lines(found.results, stage), f"{settings.model}: {TITLES[stage]}, right [%]"
+        shown = Table("", "split", "ID", "OOD", "difference", title=title, title_justify="left")
+        for row in rows:
+            shown.add_row(*cells(row))
+        out.print(shown)
+        lost, known = lost_in_twins(found.results, stage)
+        if known:
+            say(f"right in training, not in the twin: {lost} of {known}")
+        write(folder / f"table-{stage}.md", markdown(title, rows))
+        told[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
+    if errors := plan_errors(found.results):
+        say("plans with errors: " + ", ".join(f"{kind} {count}" for kind, count in sorted(errors.items())))
+    formats = Counter(result["stage"] for result in found.results if result["format_error"])
+    for stage, count in sorted(formats.items()):
+        say(f"{TITLES[stage]}: {count} replies had no valid form")
+    write_json(str(folder / f"table-{settings.stage}.json"), {"model": settings.model, "stages": told})
+    page = write_page(folder, found.results, settings.model)
+    say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")
+    if found.stopped:
+        remark(f"stopped early: {found.stopped}")
+        return FAILED
+    return OK
+
+
+def _dry(settings: AgentSettings, search: Sequence[str]) -> int:
+    """Write all first prompts and estimate the cost; nothing is asked."""
+    count, tokens = 0, (0, 0)
+    for work, turns, (asked, answered) in prompts(settings, search):
+        name = f"{work.task.name}-{work.row.split}-{work.row.index}-{count}"
+        text = "\n".join(f"--- {turn.role}, {len(turn.pictures)} pictures\n{turn.text}" for turn in turns)
+        write(settings.folder / "prompts" / f"{name}.txt", text + "\n")
+        for number, picture in enumerate(picture for turn in turns for picture in turn.pictures):
+            write(settings.folder / "prompts" / f"{name}-{number}.jpg", picture)
+        count, tokens = count + 1, (tokens[0] + asked, tokens[1] + answered)
+    per = {1: 1, 2: 3, 3: 24}[settings.stage]
+    say(f"{count} prompts in {settings.folder / 'prompts'}; nothing was asked")
+    total = f"{per * tokens[0]} tokens of prompts, {per * tokens[1]} of answers"
+    say(f"estimate without repeated attempts: {count * per} calls, {total}")
+    return OK
