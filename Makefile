@@ -25,9 +25,8 @@ demo: setup
 	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
 	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html
 
-# What continuous integration runs. The certified sample is one task per category and a second task with two arms, and
-# the paper's eight OOD conditions, which lie in eight categories.
-SAMPLE := sheltered_grasp galileo_ramp_drop domino_single tool_retrieve mass_sort slip_recovery packing mirror_pick_place bowl_table
+# What continuous integration runs. The slow tests certify a training scenario of every task; the certified sample is the
+# paper's eight OOD conditions, which lie in eight categories.
 OOD_TASKS := sheltered_grasp pendulum_grasp domino_single tool_retrieve occluder_push slip_recovery balance_medium keyboard_typing
 OOD_SPLITS := opposite_side plane_45 diagonal mirrored_hook stacked_lids two_slips turned unseen_words
 ci:
@@ -36,7 +35,6 @@ ci:
 	$(MAKE) slow
 	$(MAKE) readme
 	$(MAKE) wheel
-	$(MAKE) certify N=1 SPLITS=id TASKS="$(SAMPLE)"
 	$(MAKE) certify N=1 SPLITS="$(OOD_SPLITS)" TASKS="$(OOD_TASKS)"
 
 test: setup

@@ -39,6 +39,7 @@ def test_a_constant_stream_tells_nothing():
 
 
 @pytest.mark.parametrize(("task", "parameter"), [("seesaw_balance", "target.mass")])
+@pytest.mark.slow
 def test_what_very_fine_poses_tell_is_not_in_object_state(monkeypatch, task, parameter):
     """A block leans the beam on its stop by hundredths of a degree more, the heavier it is."""
     found = leaks(load_task(task), "id", 60, 3)
@@ -48,6 +49,7 @@ def test_what_very_fine_poses_tell_is_not_in_object_state(monkeypatch, task, par
     assert told[parameter].explained > 0.5
 
 
+@pytest.mark.slow
 def test_the_command_prints_leaks(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(object_state, "RESOLUTION", dict.fromkeys(object_state.RESOLUTION, 1e-12))
     monkeypatch.setattr("scengen.commands.attack.LEAK_DRAWS", 60)

@@ -121,6 +121,7 @@ def test_perturbed_witnesses_begin_where_a_phase_does(player):
 # --- evidence -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_carrying_lacks_the_chain(player, subject, causal, tmp_path):
     played = player.play((PICK, AGAINST), raw=False)
     found = hit(player, Attempt("random", (PICK, AGAINST)), False, played, None, causal)

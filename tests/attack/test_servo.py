@@ -63,6 +63,7 @@ def test_what_the_goal_asks_a_body_to_touch_is_touched_first():
     assert place in ways and straight in ways
 
 
+@pytest.mark.slow
 def test_where_the_goal_asks_for_no_touch_none_is_made():
     player = player_of("mass_sort")
     assert not any(asked_of(player, body) for body in player.trace.handled)

@@ -150,6 +150,7 @@ def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(made, h
     assert f"the environment of mujoco 3.4.0 imports {HERE}" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_fails_in_an_environment_is_one_line(here):
     with pytest.raises(ScengenError, match=f"under mujoco {HERE}: no pool at nowhere"):
         limits = {"limit_seconds": 300, "limit_mb": 4000}
@@ -165,6 +166,7 @@ def test_a_version_is_spelled_whole(version):
         environment(version)
 
 
+@pytest.mark.slow
 def test_a_version_that_does_not_exist_is_told_with_those_that_do():
     said = (
         "ERROR: Could not find a version that satisfies the requirement mujoco==3.4.9 (from versions: 3.3.7, 3.4.0)\n"

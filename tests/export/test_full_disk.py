@@ -33,6 +33,7 @@ def limited(command, kilobytes, to):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.slow
 def test_a_file_that_cannot_grow_is_one_line_and_leaves_nothing(tmp_path, name):
     command, kilobytes = COMMANDS[name]
     status, told = limited(command, kilobytes, tmp_path / "new")
@@ -42,6 +43,7 @@ def test_a_file_that_cannot_grow_is_one_line_and_leaves_nothing(tmp_path, name):
     assert not [path for path in left if path.name.startswith("new") or path.suffix == ".xml"], left
 
 
+@pytest.mark.slow
 def test_what_was_exported_before_is_kept(tmp_path):
     before = tmp_path / "new" / "0123456789ab" / "scene.xml"
     before.parent.mkdir(parents=True)
@@ -50,6 +52,7 @@ def test_what_was_exported_before_is_kept(tmp_path):
     assert list(tmp_path.rglob("*.xml")) == [before] and before.read_text() == "<mujoco/>"
 
 
+@pytest.mark.slow
 def test_a_film_before_is_kept(tmp_path):
     film = tmp_path / "new.mp4"
     film.write_bytes(b"film before")
@@ -82,6 +85,7 @@ def stored(folder, seed, kilobytes):
     return subprocess.run(["bash", "-c", shell], capture_output=True, text=True, cwd=ROOT).stderr
 
 
+@pytest.mark.slow
 def test_a_hit_before_is_kept(tmp_path):
     assert stored(tmp_path, 0, "unlimited") == ""
     (hit,) = tmp_path.iterdir()

@@ -127,6 +127,7 @@ other.reset()
 
 @drawing
 @pytest.mark.parametrize("script", [UNCLOSED, UNCLOSED + UNCLOSED_ROBOSUITE, UNCLOSED_ROBOSUITE + UNCLOSED])
+@pytest.mark.slow
 def test_a_script_that_closes_nothing_ends_without_an_error(script):
     line = [sys.executable, "-c", script.format(pool=str(REFERENCE))]
     ended = subprocess.run(line, capture_output=True, text=True)

@@ -9,6 +9,7 @@ from helpers import REFERENCE
 from scengen import cli
 
 
+@pytest.mark.slow
 def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):
     copy = shutil.copytree(REFERENCE, tmp_path / "copy")
     page, numbers = tmp_path / "report.html", tmp_path / "report.json"

@@ -199,5 +199,6 @@ def test_a_turn_is_what_it_takes_to_lie_as_in_the_slot():
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Packing) else str(value),
 )
+@pytest.mark.slow
 def test_what_solves_itself_or_cannot_be_solved_is_not_certified(scenario, check, verdict):
     assert not_certified(replace(TASK, horizon=20.0), scenario, check).verdict == verdict

@@ -62,6 +62,7 @@ def test_the_palm_just_passes_at_the_tilt_that_the_law_gives():
 
 
 @pytest.mark.parametrize("arm", [0, 1])
+@pytest.mark.slow
 def test_with_one_arm_parked_the_witness_fails(arm):
     rollout, world = parked(TASK, NOMINAL, arm)
     assert not rollout.solved and not world.touched(f"robot{arm}", "plate")

@@ -42,6 +42,7 @@ def changed(path, old, new):
     path.write_text(text.replace(old, new, 1))
 
 
+@pytest.mark.slow
 def test_a_constant_in_a_helper_of_another_package_expires_a_certificate(package):
     before = source_hash(package)
     changed(package / "helpers_of_others" / "numbers.py", "0.01", "0.02")
