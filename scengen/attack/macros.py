@@ -20,6 +20,7 @@
 | cradle  | body     | direction of the hand [rad], its pitch [rad], depth [m]                      |
 | touch   | body     | place of the body in the hand, from above [m]; none: straight from its place |
 | await   | body     | none: hold the open hand until the body changes its course                   |
+| meet    | body     | place of the hand [m], its orientation as a rotation vector, periods open    |
 | roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
 | along   | body     | turn of the hand from the body's way in the witness [rad], height [m]        |
@@ -281,6 +282,11 @@ def _await(field: MacroContext, macro: Macro) -> Plan:
     return plans.await_turn(field.arm, macro.target)
 
 
+def _meet(field: MacroContext, macro: Macro) -> Plan:
+    x, y, z, a, b, c, periods = macro.numbers
+    return plans.meet(field.arm, macro.target, [x, y, z], rotation(np.array([a, b, c])), round(periods))
+
+
 def _roll(field: MacroContext, macro: Macro) -> Plan:
     if held(field.arm) != macro.target:
         raise GaveUp(f"{macro.target} is not in the hand")
@@ -314,6 +320,7 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "cradle": _cradle,
     "touch": _touch,
     "await": _await,
+    "meet": _meet,
     "roll": _roll,
     "bring": _bring,
 }

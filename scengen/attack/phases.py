@@ -107,6 +107,14 @@ class Trace:
         x, y, z = self.ways[body][row + 1].tolist()
         return x, y, z
 
+    def hand_at(self, arm: int, body: str) -> tuple[float, ...] | None:
+        """Position [m] and rotation vector of a hand when the robot first touches a body; None if it does not."""
+        row = next((row for row, pair in self.events if body in pair and self._robots & {*pair}), None)
+        if row is None:
+            return None
+        turn = between(np.eye(3), self.rots[row, arm])
+        return *map(float, self.hands[row, arm]), *map(float, turn)
+
     def releases(self, arm: int) -> tuple[tuple[int, str], ...]:
         """Stages at which the gripper of an arm opens, each with the body that it releases."""
         grip = self.actions[:, ACTION * arm + ACTION - 1]

@@ -33,6 +33,7 @@ from ..skills.motion import (
     push,
     retreat,
     steer,
+    until,
 )
 from .solids import solids
 
@@ -42,6 +43,12 @@ LOWEST_HAND = TABLE_TOP + TIP_BELOW + 0.003
 """Lowest position of the grip site of a hand that points down [m]: the tips keep 3 mm from the table."""
 SLOW = 0.02
 """Speed below which a body counts as stopped [m/s]."""
+KEEP = 0.0
+"""Gripper command that keeps the gap."""
+NEAR_DISTANCE = 0.05
+"""Distance below which a body is at a place [m]."""
+TURNING_SPEED = 0.06
+"""Speed below which a swinging body is seen to turn round [m/s]."""
 STEP_BACK = Pace(0.15, 0.01, 2.0)
 """Pace away from a body."""
 WAY = Pace(0.30, 0.02, 1.5)
@@ -177,6 +184,44 @@ def await_turn(arm: Arm, body: str, angle: float = math.radians(20.0), seconds: 
             if course @ velocity < speed * math.cos(angle):
                 return
         yield from hold(arm, Loop.PERIOD, OPEN)
+
+
+def meet(arm: Arm, body: str, at: ArrayLike, rot: Mat3, periods: int = 2, seconds: float = 6.0) -> Plan:
+    """Wait where a swinging body turns round, and close the jaw when it is seen to be slow there.
+
+    The hand comes from behind while the body is on its way out. A jaw that is hardly open closes at once.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        at: position of the grip site when the jaw closes [m].
+        rot: orientation of the hand.
+        periods: control periods for which the jaw opens; 0 to open it wide.
+        seconds: time limit of each wait [s].
+    """
+    world, goal = arm.world, np.asarray(at, float)
+
+    def speed() -> float:
+        return float(np.linalg.norm(velocity_of(arm, body)))
+
+    def leaving() -> bool:
+        return float(velocity_of(arm, body) @ (world.com(body) - goal)) > 0.0 and speed() > SLOW
+
+    def near() -> bool:
+        return float(np.linalg.norm(world.com(body) - goal)) < NEAR_DISTANCE
+
+    grip = KEEP if periods else OPEN
+    if not periods:
+        yield from release(arm, 0.3)
+    yield from go_to(arm, goal - 0.10 * rot[:, 2], rot, WAY, grip)
+    if periods:
+        yield from hold(arm, periods * Loop.PERIOD, OPEN)
+    yield from until(hold(arm, seconds, grip), lambda: leaving() and not near())
+    yield from go_to(arm, goal, rot, Pace(0.30, 0.004, 2.0), grip)
+    yield from until(hold(arm, seconds, grip), lambda: not near())
+    yield from until(hold(arm, seconds, grip), lambda: near() and speed() < TURNING_SPEED)
+    yield from grasp(arm)
+    yield from hold(arm, 1.0)
 
 
 def turn_about(arm: Arm, body: str, rot: Mat3, rate: float = 1.8) -> Plan:

@@ -197,14 +197,13 @@ class Player:
         self.rewind(len(self.trace.stages) - 1)
         return self.world.com(body)
 
-    def place_after(self, seconds: float) -> dict[str, Vec3]:
-        """Positions of the free bodies' centres of mass after a time without action, from the start [m]."""
+    def idle(self, seconds: float) -> None:
+        """Put the world where a time without action leaves it, from the start."""
         world = self.world
         world.restore(self.start.state)
         episode = Episode(self.scenario, world, self.horizon)
         for _ in range(round(seconds / Loop.PERIOD)):
             episode.step(world.filter(world.idle))
-        return {body: world.com(body) for body in world.free_bodies}
 
     def signature(self) -> Signature:
         """The signature of the episode so far."""

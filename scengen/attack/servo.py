@@ -63,8 +63,10 @@ def servo(player: Player) -> Iterator[Attempt]:
     bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
     makers = (chased, carried, cradled)
     of_one = _in_turn([made(player, arm, body) for arm, body in product(jaws, bodies) for made in makers])
+    swinging = [body for body in player.trace.handled if body not in bodies and body in moving(player)]
+    of_hinged = [met(player, arm, body) for arm, body in product(jaws, swinging)]
     of_all = _in_turn([all_carried(player, arm, bodies) for arm in jaws]) if len(bodies) > 1 else iter(())
-    yield from _in_turn([of_all, of_one])
+    yield from _in_turn([of_all, of_one, *of_hinged])
 
 
 def _in_turn(families: Sequence[Iterator[Attempt]]) -> Iterator[Attempt]:
@@ -89,6 +91,14 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
                 chase = Macro(kind, body, (lead,), arm.number)
                 yield Attempt(SERVO, (later, chase, rest))
                 yield Attempt(SERVO, (chase, rest))
+
+
+def met(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
+    """Wait for a hinged body where the witness first touches it, with a jaw that is hardly or wide open."""
+    place = player.trace.hand_at(arm.number, body)
+    if place is not None:
+        for periods in (1.0, 2.0, 0.0):
+            yield Attempt(SERVO, (Macro("meet", body, (*place, periods), arm.number),))
 
 
 def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
@@ -187,9 +197,10 @@ def asked_of(player: Player, body: str) -> tuple[str, ...]:
 
 
 def moving(player: Player) -> frozenset[str]:
-    """Free bodies that move by themselves at the beginning of an episode."""
+    """Bodies that move by themselves at the beginning of an episode: free ones, and others that the witness touches."""
     world = player.world
+    bodies = {*world.free_bodies, *player.trace.handled}
     player.rewind()
-    before: dict[str, Vec3] = {body: world.com(body) for body in world.free_bodies}
-    after = player.place_after(IDLE_TIME)
-    return frozenset(body for body, place in after.items() if np.linalg.norm(place - before[body]) > MIN_MOTION)
+    before: dict[str, Vec3] = {body: world.com(body) for body in bodies}
+    player.idle(IDLE_TIME)
+    return frozenset(body for body in bodies if np.linalg.norm(world.com(body) - before[body]) > MIN_MOTION)
