@@ -41,6 +41,11 @@ def spoken(angle: float) -> str:
     return DIRECTIONS[round(angle / 45.0) % len(DIRECTIONS)]
 
 
+def way_to(there: Vec3, here: Vec3) -> str:
+    """The one of `DIRECTIONS` in which a place lies, seen from another one [m]."""
+    return spoken(math.degrees(math.atan2(there[1] - here[1], there[0] - here[0])))
+
+
 def polar(offset: Vec3) -> tuple[float, float]:
     """Direction [rad] (0 is x) and length [m] of an offset seen from above."""
     x, y = offset[:2]

@@ -107,6 +107,8 @@ class Sheet:
     names: Mapping[str, str] = field(default_factory=dict)
     """Neutral names of things by body: what a person calls them who only sees the scene. `tile_*` stands for all
     bodies that begin with `tile_` and have no line of their own."""
+    parts: list[str] = field(default_factory=list)
+    """Names of parts of things, such as a handle, that are no bodies."""
     facts: Mapping[str, Question] = field(default_factory=dict)
     """Questions by id."""
     order: Mapping[str, Subgoal] = field(default_factory=dict)
@@ -121,8 +123,8 @@ class Sheet:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Names of the things, each once."""
-        return tuple(dict.fromkeys(self.names.values()))
+        """Names of the things and their parts, each once."""
+        return tuple(dict.fromkeys((*self.names.values(), *self.parts)))
 
     def name_of(self, body: str) -> str | None:
         """Neutral name of a body; None if the sheet does not name it, such as a part of a thing."""

@@ -36,6 +36,10 @@ def _grade(fact: Fact, claims: Mapping[str, float | list[str]], unknown: set[str
     return "wrong" if fact.id in unknown else "missing"
 
 
+ALWAYS = frozenset({"table", "robot", "arm", "hand", "gripper", "jaw", "fingers", "finger", "suction cup", "camera"})
+"""Objects that are in every scene."""
+
+
 @dataclass(frozen=True)
 class PlanGrade:
     """Grade of a plan."""
@@ -76,7 +80,8 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
     """
     names = [step.subgoal for step in plan.steps]
     errors: list[tuple[PlanError, str]] = []
-    for name in (name for step in plan.steps for name in step.objects if name not in objects):
+    known = {*map(str.lower, objects), *ALWAYS}
+    for name in (name for step in plan.steps for name in step.objects if _plain(name) not in known):
         errors.append(("hallucinated object", name))
     for name in (name for name in names if name in order.wrong):
         errors.append(("affordance", name))
@@ -90,6 +95,11 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
         if one in names and other in names and names.index(other) < names.index(one):
             errors.append(("wrong order", f"{other} before {one}"))
     return PlanGrade(tuple(errors), _conditions(plan, order), order.sensing)
+
+
+def _plain(name: str) -> str:
+    """A name of an object without its article, in small letters."""
+    return name.strip().lower().removeprefix("the ")
 
 
 def _conditions(plan: Planned, order: Order) -> float:

@@ -35,7 +35,7 @@ import numpy as np
 from ..assets.inlaid_rod import InlaidRod
 from ..assets.ridge import Ridge
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, about_z, gap
+from ..geometry import UP, Mat3, about_z, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
@@ -267,4 +267,13 @@ class UprightRod(RodAndRidge[InlaidRod]):
             "ridge_top": self.ridge.height,
             "grip_height": self.rod.height - GRIP_DEPTH,
             "section": self.rod.width,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "rod": way_to(self.start, self.foot),
+            "apart": math.dist(self.start[:2], self.foot[:2]),
+            "height": self.rod.height,
+            "ridge": self.ridge.height,
+            "dark": "yes" if self.rod.com else "no",
         }

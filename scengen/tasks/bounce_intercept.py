@@ -44,7 +44,7 @@ from ..assets.ball import Ball
 from ..assets.enclosure import BOUNCE_TIME, Enclosure, Way
 from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, corners, heading, polar
+from ..geometry import UP, Vec3, about_z, corners, heading, polar, way_to
 from ..params import param
 from ..physics import GRAVITY, SPIN, slipping
 from ..robots import jaw
@@ -244,6 +244,14 @@ class BounceIntercept(LaunchedBall):
             "off_mirror": abs(math.remainder(polar(first)[0] - polar(image)[0], 2 * math.pi)),
             "bounces": float(len(ways) - 1),
             "bearing": math.radians(self.aim - self.turn),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "place": way_to(self.start, np.zeros(3)),
+            "robot": math.dist(self.start[:2], BASE[:2]),
+            "width": self.enclosure.width,
+            "turn": abs(self.turn),
         }
 
     # --- mechanics and geometry ---------------------------------------------------------------

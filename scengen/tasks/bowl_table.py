@@ -41,7 +41,7 @@ from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, solid, table
 from ..assets.ring_rack import RingRack
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_y, about_z, corners, gap, shortest
+from ..geometry import UP, Mat3, Vec3, about_y, about_z, corners, gap, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over
@@ -336,6 +336,14 @@ class BowlTable(Scenario):
             "droop": GRAVITY * bowl.mass * lever / (pinch(bowl.bead) * PAD / 2),
             "foot_height": self.plinth + bowl.depth,
             "side": self.goal_y - self.rack_y,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "rack": "on its left" if self.rack_y > 0.0 else "on its right",
+            "square": way_to(self.goal, self.foot),
+            "apart": math.dist(self.goal[:2], self.foot[:2]),
+            "radius": self.bowl.radius,
         }
 
     # --- geometry -------------------------------------------------------------------------

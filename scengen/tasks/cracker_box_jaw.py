@@ -33,7 +33,7 @@ import numpy as np
 from ..assets.cracker_box import CrackerBox
 from ..assets.prop import TABLE_TOP
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, axes, gap
+from ..geometry import UP, Mat3, Vec3, axes, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
@@ -257,6 +257,14 @@ class CrackerBoxJaw(BoxAndSlot):
             "flattest": self.flattest,
             "direction": math.atan2(self.out[1], self.out[0]),
             "turn": math.radians(math.remainder(self.slot_yaw - self.box_yaw, 180.0)),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "box": way_to(self.start, self.foot),
+            "apart": math.dist(self.start, self.foot),
+            "height": float(self.box.size[2]),
+            "turn": abs(math.remainder(self.slot_yaw - self.box_yaw, 180.0)),
         }
 
     # --- geometry -------------------------------------------------------------------------

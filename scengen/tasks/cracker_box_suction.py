@@ -31,7 +31,7 @@ import numpy as np
 
 from ..assets.cracker_box import CrackerBox
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, axes, gap, shortest
+from ..geometry import UP, Mat3, Vec3, axes, gap, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
@@ -249,6 +249,14 @@ class CrackerBoxSuction(BoxAndSlot):
             "room": self.clearance / self.box.size[2],
             "turn": math.radians(self.misfit),
             "azimuth": math.radians(self.box_yaw + math.copysign(90.0, self.box_y)),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "box": way_to(self.start, self.foot),
+            "apart": math.dist(self.start, self.foot),
+            "height": float(self.box.size[2]),
+            "turn": self.misfit,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -38,7 +38,7 @@ from ..assets.box import Block
 from ..assets.cup import Cup
 from ..assets.patch import Patch
 from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
-from ..geometry import UP, Vec3, about_y, about_z, heading, polar
+from ..geometry import UP, Vec3, about_y, about_z, heading, polar, spoken, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
@@ -258,6 +258,14 @@ class CupExtract(Scenario):
             "curve": self.cup.curve,
             "moment_over_pinch": moment / pinch(self.cup.bar),
             "goal_bearing": polar(self.goal - BASE)[0],
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "handle": spoken(self.handle),
+            "square": way_to(self.goal, self.foot),
+            "apart": math.dist(self.goal, self.foot),
+            "height": self.cup.height,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -34,7 +34,7 @@ import numpy as np
 from ..assets.cup import Cup
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Mat3, Vec3, between, corners, gap, rotation, shortest
+from ..geometry import UP, Mat3, Vec3, between, corners, gap, rotation, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen
@@ -327,6 +327,14 @@ class CupInversion(Scenario):
             "goal_reach": math.hypot(*goal_away),
             "carried": math.dist(self.start, self.goal),
             "friction_over_slope": self.cup.friction / self.slope,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "cup": way_to(self.start, self.goal),
+            "apart": math.dist(self.start[:2], self.goal[:2]),
+            "height": self.cup.height,
+            "base": self.cup.base,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -35,7 +35,7 @@ from ..assets.ball import Ball
 from ..assets.bin import Bin
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
 from ..params import param
 from ..robots import jaw
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
@@ -200,6 +200,16 @@ class GalileoRampDrop(Scenario):
         return {
             "release_height": self.ramp.height(self.release_place),
             "friction_over_slope": self.ramp.friction / math.tan(self.ramp.slope),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "way": spoken(self.heading),
+            "patch": self.ramp.goal,
+            "release": self.ramp.height(self.release_place),
+            "relation": "clearly higher"
+            if self.ramp.height(self.release_place) > 1.15 * self.ramp.goal
+            else "about as high",
         }
 
     # --- geometry ---------------------------------------------------------------------------

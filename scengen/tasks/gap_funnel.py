@@ -239,6 +239,18 @@ class GapFunnel(Scenario):
             "heading": self.yaw,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "side": "on the line"
+            if abs(self.offset) < 0.01
+            else "on the left"
+            if self.offset > 0.0
+            else "on the right",
+            "aside": abs(self.offset),
+            "gap": self.wall.gap,
+            "run": self.run,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

@@ -274,6 +274,15 @@ class IndirectPush(Scenario):
         missing = (self.distance + self.way - ZONE_SIZE / 2 - MAX_PUSH_DISTANCE) / self.edge - 0.5
         return {"edges_missing": missing, "needed": float(self.needed), "direction": self.angle}
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "blocks": self.needed,
+            "side": "on its left" if self.bearing > 0.0 else "on its right",
+            "way": self.way,
+            "edge": self.edge,
+            "distance": self.distance,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

@@ -370,6 +370,14 @@ class KeyboardTyping(Scenario):
             "keyboard_yaw": math.radians(self.yaw),
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "letters": len(self.letters),
+            "own": len(self.own),
+            "begins": "this robot" if self.owns(0) else "the other robot",
+            "ends": "this robot" if self.owns(len(self.letters) - 1) else "the other robot",
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

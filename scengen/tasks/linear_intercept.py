@@ -37,7 +37,7 @@ import numpy as np
 from ..assets.ball import Ball
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, between, heading, polar, quat
+from ..geometry import UP, Vec3, between, heading, polar, quat, way_to
 from ..params import param
 from ..physics import passes, rolled, rolling_deceleration
 from ..predicates import displaced
@@ -205,6 +205,13 @@ class LinearIntercept(LaunchedBall):
             "bearing": bearing,
             "running_away": float(self.u @ (self.start - BASE)) / away,
             "slowing": self.deceleration / self.speed,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "place": way_to(self.start, np.zeros(3)),
+            "edge": TABLE_HALF - max(abs(self.x), abs(self.y)),
+            "robot": math.dist(self.start[:2], BASE[:2]),
         }
 
     # --- mechanics and geometry ---------------------------------------------------------------

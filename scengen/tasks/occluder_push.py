@@ -254,6 +254,13 @@ class OccluderPush(Scenario):
             "most_turned_way": max((abs(math.atan2(along[1], along[0])) for along in self.directions), default=0.0),
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "lids": self.lids,
+            "width": self.lid.width,
+            "apart": math.hypot(self.patch_x - self.middle.x, self.patch_y - self.middle.y),
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

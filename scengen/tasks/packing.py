@@ -277,6 +277,14 @@ class Packing(Scenario):
             "solutions": guillotine.solutions(self.slots, self.footprint),
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "pieces": self.count,
+            "left": sum(spot.y > 0.0 for spot in self.spots),
+            "thickness": self.thickness,
+            "turned": sum(abs(math.remainder(spot.turn, 360.0)) > 5.0 for spot in self.spots),
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @cached_property

@@ -270,6 +270,14 @@ class PendulumGrasp(Scenario):
             "turned_aside": math.radians(self.plane) - azimuth,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "amplitude": self.amplitude,
+            "length": self.pendulum.length,
+            "period": self.period,
+            "radius": self.pendulum.radius,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

@@ -37,7 +37,7 @@ from ..assets.plate import Plate
 from ..assets.prop import TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, corners, gap
+from ..geometry import UP, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
@@ -283,6 +283,14 @@ class PlateShelf(PlateAndSlot[Plate]):
             "radius": plate.radius,
             "carried": float(np.linalg.norm(self.foot - self.start)),
             "slot_yaw": math.radians(self.shelf_yaw),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "shelf": way_to(self.foot, self.start),
+            "apart": math.dist(self.foot[:2], self.start[:2]),
+            "radius": self.plate.radius,
+            "gap": self.gap,
         }
 
 

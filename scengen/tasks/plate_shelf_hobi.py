@@ -36,7 +36,7 @@ import numpy as np
 from ..assets.dish import Dish
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, shortest
+from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
@@ -259,6 +259,14 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
             "carried": float(np.linalg.norm(self.foot - self.start)),
             "slot_yaw": math.radians(self.shelf_yaw),
             "taker": self.side,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "shelf": way_to(self.foot, self.start),
+            "apart": math.dist(self.foot[:2], self.start[:2]),
+            "radius": self.plate.radius,
+            "gap": self.gap,
         }
 
     # --- geometry of the hand over the rim --------------------------------------------------

@@ -36,7 +36,7 @@ from ..assets.barrier import Barrier, let_pass
 from ..assets.bin import Bin
 from ..assets.crowned_ramp import CrownedRamp
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
@@ -272,6 +272,15 @@ class RampSort(Scenario):
             "speed": math.sqrt(10.0 / 7.0 * GRAVITY * self.ramp.length * self.ramp.fall),
             "balls": float(len(self.colours)),
             "red_to": float(self.red_side),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "reds": self.reds,
+            "blues": self.blues,
+            "red_bin": "on the left" if self.red_side > 0 else "on the right",
+            "ridge": abs(self.ramp.ridge),
+            "box": way_to(np.array([self.box_x, self.box_y]), np.array([self.x, self.y])),
         }
 
     # --- geometry ---------------------------------------------------------------------------

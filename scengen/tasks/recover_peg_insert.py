@@ -48,7 +48,7 @@ from ..assets.prop import TABLE_TOP, place, servo, table
 from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, axes, between, corners, gap, heading, polar, rotation
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, axes, between, corners, gap, heading, polar, rotation, way_to
 from ..params import param
 from ..predicates import fallen, still
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
@@ -329,6 +329,14 @@ class RecoverPegInsert(Scenario):
             "azimuth_of_the_slot": self._azimuth,
             "peg_over_slot": self.peg.length / self.board.depth,
             "distance_at_the_turn": self.distance,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "side": "on its left" if self.side > 0 else "on its right",
+            "peg": way_to(np.array([self.peg_x, self.peg_y]), self.mouth),
+            "length": self.peg.length,
+            "slot": self.board.slot,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
-from ..geometry import UP, about_z, gap, shortest
+from ..geometry import UP, about_z, gap, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
@@ -199,4 +199,12 @@ class RodAcross(RodAndRidge[Rod]):
             "tolerance": self.ridge.width / self.rod.length,
             "weight": self.rod.mass,
             "height": self.ridge.height,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "rod": way_to(self.start, self.foot),
+            "apart": math.dist(self.start[:2], self.foot[:2]),
+            "length": self.rod.length,
+            "ridge": self.ridge.height,
         }

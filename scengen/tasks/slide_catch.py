@@ -52,6 +52,8 @@ from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
 BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
 """Lanes, counted from the left, of the lowest, the middle and the highest block."""
+LANE_NAMES = ("in the left lane", "in the middle lane", "in the right lane")
+"""Lanes in words, counted from the left."""
 FRICTION_TOLERANCE = 0.10  # share by which a block's friction may differ from its known value: jitter of certificates
 FALL_TIME = 0.16  # time from a block's middle over the lip to in the bin [s]; it tips first. Measured: 0.13 to 0.17
 VISIBLE_SLIDE = 0.002  # distance after which a block is seen to slide [m]
@@ -307,6 +309,15 @@ class SlideCatch(Scenario):
             "slopes": self.slips(last) - self.slips(first),
             "last_slide": self.lip_time(last),
             "inversions": sum(a > b for a, b in combinations(ranks, 2)),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "lowest": LANE_NAMES[ORDERS[self.order][0]],
+            "first": LANE_NAMES[self.sequence[0]],
+            "last": LANE_NAMES[self.sequence[-1]],
+            "lane": self.lane,
+            "bin": abs(self.bin_y - self.y),
         }
 
     # --- mechanics ------------------------------------------------------------------------

@@ -324,6 +324,13 @@ class StackCollapseRecovery(Scenario):
             "slope_of_the_sides": (self.bottom.edge - self.top.edge) / sum(c.edge for c in self.cubes.values()),
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "largest": self.bottom.edge,
+            "smallest": self.top.edge,
+            "away": math.hypot(self.x - BASE[0], self.y - BASE[1]),
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

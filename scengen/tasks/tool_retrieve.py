@@ -201,6 +201,13 @@ class ToolRetrieve(Scenario):
             "tip_over_edge": self.tool.engaging / self.cube.edge,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "kind": ("like an L", "like a J", "like a T")[self.kind],
+            "side": "on its left" if self.hook_y > 0.0 else "on its right",
+            "distance": self.distance,
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @property

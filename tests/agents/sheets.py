@@ -1,14 +1,18 @@
 """Sheets of all tasks that state facts, and facts of draws without a certificate."""
 
+from functools import cache
+
 from scengen import load_task
 from scengen.agents import facts
 from scengen.certificate import Check
+from scengen.params import parameters
 from scengen.task_files import facts_file, tasks
 
 STATED = [name for name in tasks() if facts_file(name)]
 """Tasks that state facts."""
 
 
+@cache
 def drawn(name, split, index):
     """Sheet, scenario and facts of a draw, with a certificate in which each shortcut broke a rule."""
     task = load_task(name)
@@ -17,8 +21,7 @@ def drawn(name, split, index):
 
 
 def task_params(scenario):
-    from scengen.params import parameters
-
+    """Values of the parameters of a scenario, as a pool holds them."""
     return {p.name: p.nominal for p in parameters(scenario)}
 
 
