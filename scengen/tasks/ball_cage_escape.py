@@ -35,7 +35,7 @@ from ..assets.ball import Ball
 from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage, lean, lowered
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
-from ..geometry import UP, Mat3, Vec3, about_z, shortest
+from ..geometry import UP, Mat3, Vec3, about_z, shortest, spoken
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
@@ -270,6 +270,14 @@ class BallCageEscape(Scenario):
     def features(self) -> Mapping[str, float]:
         """Least tilt that frees the ball [rad], and clearance of the ball in the hole over its radius."""
         return {"least_tilt": self.least_tilt, "air_over_radius": self.cage.hole / self.ball.radius - 1}
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "hole": spoken(self.yaw),
+            "trap": spoken(self.yaw + 180.0),
+            "tilt": math.degrees(self.least_tilt),
+            "ball": self.ball.radius,
+        }
 
     # --- geometry ---------------------------------------------------------------------------
 

@@ -50,7 +50,7 @@ from ..assets.bin import Bin
 from ..assets.box import Cube
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, about_z, axes, heading, polar, quat, rotation
+from ..geometry import UP, Vec3, about_z, axes, heading, polar, quat, rotation, spoken, way_to
 from ..params import param
 from ..physics import flight
 from ..predicates import seated
@@ -305,6 +305,14 @@ class CubeToss(Scenario):
             "tray_turned_by": math.radians(abs(self.turn)),
             "opening_time": self.opening_time,
             "tray_speed": abs(math.radians(self.rate)) * self.distance,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "tray": spoken(self.bearing),
+            "distance": self.distance,
+            "cube": way_to(np.array([self.x, self.y]), np.zeros(2)),
+            "height": self.stand,
         }
 
     # --- mechanics and geometry ---------------------------------------------------------------

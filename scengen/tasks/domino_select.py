@@ -40,7 +40,7 @@ import numpy as np
 from ..assets.box import Domino
 from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Vec3, about_z, heading
+from ..geometry import UP, Vec3, about_z, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
@@ -191,6 +191,14 @@ class DominoSelect(Scenario):
             "least_drift_over_height": min((drift.stretch for drift in self.lanes.defects(DRIFT)), default=0.0),
             "least_offset_over_width": min((gap.offset for gap in self.lanes.defects(GAP)), default=0.0),
             "starter_tipping_angle": self.starter.tipping_angle,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "intact": self.intact + 1,
+            "reds": len(self.targets),
+            "way": spoken(self.heading),
+            "gap": self.gap / self.tile.height,
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -35,9 +35,10 @@ import numpy as np
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
-from ..geometry import UP, Vec3, heading
+from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..predicates import fallen, held, over, rests_on, still
+from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
@@ -218,6 +219,14 @@ class PickPlaceYcb(Scenario):
             "size": self.patch.size,
             "mass": self.thing.mass,
             **self.thing.told,
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "square": way_to(np.array([self.goal_x, self.goal_y]), np.array([self.x, self.y])),
+            "apart": math.hypot(self.goal_x - self.x, self.goal_y - self.y),
+            "distance": math.hypot(self.x - BASE[0], self.y - BASE[1]),
+            "size": self.patch.size,
         }
 
     # --- geometry -------------------------------------------------------------------------

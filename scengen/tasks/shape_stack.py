@@ -34,6 +34,7 @@ from ..geometry import UP, Vec3, about_z
 from ..params import check_bounds, param
 from ..predicates import fallen, still
 from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
+from ..robots.panda import BASE
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
@@ -217,6 +218,18 @@ class ShapeStack(Scenario):
             "joints": self.count - 1,
         }
 
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "shapes": self.count,
+            "cone": "before it"
+            if abs(self.cone_spot[1]) < 0.06
+            else "on its left"
+            if self.cone_spot[1] > 0.0
+            else "on its right",
+            "distance": math.dist(self.cone_spot[:2], BASE[:2]),
+            "height": sum(piece.shape.height for piece in self.pieces.values()),
+        }
+
     # --- geometry -------------------------------------------------------------------------
 
     @cached_property
@@ -227,6 +240,11 @@ class ShapeStack(Scenario):
         found = places[: self.count - 1]
         found.insert(self.cone_at, replace(cone, shape=self.cone))
         return {f"shape_{k}": piece for k, piece in enumerate(found)}
+
+    @property
+    def cone_spot(self) -> Vec3:
+        """Position of the foot of the pointed shape that comes last [m]."""
+        return self.pieces[self.order[-1]].spot
 
     @cached_property
     def order(self) -> tuple[str, ...]:

@@ -36,10 +36,11 @@ from ..assets.bin import Bin
 from ..assets.box import Cube
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.rack import STOREYS, TierRack
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
+from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, release
@@ -198,6 +199,14 @@ class ShelteredGrasp(Scenario):
             "depth_over_palm": self.depth / PALM_ABOVE,
             "room_beside_palm": self.rack.width / 2 - abs(self.along) - PALM_ALONG,
             "cube_against_rack": math.radians((self.cube_yaw - self.rack_yaw + 45.0) % 90.0 - 45.0),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "side": "on its left" if self.side > 0 else "on its right",
+            "tray": way_to(self.tray, self.foot),
+            "apart": math.dist(self.tray, self.foot),
+            "distance": math.dist(self.foot[:2], BASE[:2]),
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -43,11 +43,12 @@ from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, heading
+from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
+from ..robots.panda import BASE
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
@@ -310,6 +311,14 @@ class SlipRecovery(Scenario):
             "mass": self.thing.mass,
             **self.thing.told,
             "narrow_side_along_the_way": abs(float(side)) / math.dist(self.start, self.goal),
+        }
+
+    def facts(self) -> Mapping[str, float | str]:
+        return {
+            "square": way_to(self.goal, self.start),
+            "apart": math.hypot(self.goal_x - self.x, self.goal_y - self.y),
+            "distance": math.hypot(self.x - BASE[0], self.y - BASE[1]),
+            "size": self.patch.size,
         }
 
     # --- geometry -------------------------------------------------------------------------
