@@ -21,6 +21,7 @@
 | touch   | body     | place of the body in the hand, from above [m]; none: straight from its place |
 | await   | body     | none: hold the open hand until the body changes its course                   |
 | meet    | body     | place of the hand [m], its orientation as a rotation vector, periods open    |
+| ease    |          | displacement [m]; the hand stops while the jaw opens by itself               |
 | roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
 | along   | body     | turn of the hand from the body's way in the witness [rad], height [m]        |
@@ -287,6 +288,10 @@ def _meet(field: MacroContext, macro: Macro) -> Plan:
     return plans.meet(field.arm, macro.target, [x, y, z], rotation(np.array([a, b, c])), round(periods))
 
 
+def _ease(field: MacroContext, macro: Macro) -> Plan:
+    return plans.carry_steadily(field.arm, macro.numbers)
+
+
 def _roll(field: MacroContext, macro: Macro) -> Plan:
     if held(field.arm) != macro.target:
         raise GaveUp(f"{macro.target} is not in the hand")
@@ -321,6 +326,7 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "touch": _touch,
     "await": _await,
     "meet": _meet,
+    "ease": _ease,
     "roll": _roll,
     "bring": _bring,
 }

@@ -49,6 +49,10 @@ NEAR_DISTANCE = 0.05
 """Distance below which a body is at a place [m]."""
 TURNING_SPEED = 0.06
 """Speed below which a swinging body is seen to turn round [m/s]."""
+LOOSE_GAP = 0.003
+"""Distance by which a jaw opens that slips [m]."""
+STEADY_WAY = Pace(0.25, 0.02, 4.0)
+"""Pace of a hand that carries a thing from beneath."""
 STEP_BACK = Pace(0.15, 0.01, 2.0)
 """Pace away from a body."""
 WAY = Pace(0.30, 0.02, 1.5)
@@ -242,6 +246,18 @@ def turn_about(arm: Arm, body: str, rot: Mat3, rate: float = 1.8) -> Plan:
             return
         aim = rotation(share * turn) @ start
         yield steer(arm, middle - aim @ held, np.zeros(3), between(arm.hand_rot, aim), CLOSED)
+
+
+def carry_steadily(arm: Arm, way: ArrayLike, tries: int = 4) -> Plan:
+    """Move a closed hand by a displacement [m], shape (3,), and hold it still while the jaw opens by itself."""
+    gap, goal = arm.gap + LOOSE_GAP, arm.hand + np.asarray(way, float)
+    for _ in range(tries):
+        with suppress(GaveUp):
+            yield from until(go_to(arm, goal, arm.hand_rot, STEADY_WAY, CLOSED), lambda: arm.gap > gap)
+        if arm.gap <= gap:
+            return
+        yield from until(hold(arm, 3.0, CLOSED), lambda: arm.gap <= gap)
+        yield from hold(arm, 0.2, CLOSED)
 
 
 def on_its_side(azimuth: float, elevation: float) -> Mat3:

@@ -152,14 +152,15 @@ def cradled(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     the robot or from beside it.
     """
     pick, (x, y, _) = taking(player, arm, body), player.goal_place(body) - player.start_place(body)
+    if pick.kind == "pick":  # as deep as the palm lets it: a thing that is held at its end tips out
+        pick = replace(pick, numbers=(0.0, *pick.numbers[1:]))
     for direction, elevation in product(ROLLS, ELEVATIONS):
         yield Attempt(
             SERVO,
             (
                 pick,
                 Macro("roll", body, (direction, elevation), arm.number),
-                Macro("move", "", (float(x), float(y), 0.0, 0.25), arm.number),
-                Macro("wait", "", (1.5,), arm.number),
+                Macro("ease", "", (float(x), float(y), 0.0), arm.number),
                 Macro("roll", body, (direction, -QUARTER), arm.number),
                 bring(player, arm, body, ROUTES[2], 0.0),
             ),
