@@ -29,7 +29,7 @@ LAYERS = (
     ("envs", "intake"),
     ("export", "evaluate"),
     ("analysis", "agents"),
-    ("demos",),
+    ("demos", "curate"),
     ("ood", "drift"),
     ("conformance",),
     ("commands",),

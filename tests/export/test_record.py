@@ -249,7 +249,7 @@ def test_statistics_are_those_of_the_columns(made):
             found, there = np.array(stats[name][kind]), np.broadcast_to(of(values, axis=0), wide.shape)
             assert np.allclose(found[wide], there[wide], atol=1e-6)
         assert stats[name]["count"] == [len(values)]
-        assert np.allclose(stats[name]["q90"], np.quantile(values, 0.9, axis=0), atol=1e-6)
+        assert np.allclose(stats[name]["q50"], np.quantile(values, 0.5, axis=0), atol=1e-6)
     first = episodes_of(made)[0]
     assert np.allclose(first["stats/action/mean"], column(made, "action")[: first["length"]].mean(axis=0), atol=1e-6)
 

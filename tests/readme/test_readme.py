@@ -32,7 +32,7 @@ def test_every_setting_of_a_command_exists(line, monkeypatch):
         if "task=push_off" in overrides and verb != "new":  # the task of the example, which is not installed
             monkeypatch.syspath_prepend(ROOT / "example")
             overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
-        for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
+        for one in compose.combinations(verb, overrides) if verb in ("generate", "demos") else [overrides]:
             compose.as_yaml(verb, getattr(one, "overrides", one))
 
 

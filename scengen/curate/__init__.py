@@ -1,0 +1,1 @@
+"""Curation of recordings in three stages: scores, checks of every episode, decisions of people."""

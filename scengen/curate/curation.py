@@ -1,0 +1,259 @@
+"""The three stages of curation of a recording (paper, App. C): score, checks of every episode, decisions of people.
+
+    curation/scores.csv            scores of people, `episode,score`; they win over the measured ones
+    curation/reports.jsonl         an `EpisodeReport` for each episode
+    curation/report.schema.json    its JSON schema
+    curation/decisions.csv         decisions of people, `episode,verdict,who,why`
+    curation/kept.json             numbers of the kept episodes, for LeRobotDataset(..., episodes=kept)
+    curation/index.html            page with the flagged episodes
+    meta/scengen.json              `curation`: number of episodes after each stage
+
+Only the recording itself is read: nothing in it depends on results of policies.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import compose
+from ..errors import BadConfig, PoolError, cut
+from ..pool.files import replace_file, sha256
+from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
+from .checks import Subject, check_rows, found
+from .dataset import EpisodeData, Recording
+from .findings import SCHEMA, EpisodeReport, Finding
+from .replays import Recorded, lost, replayed
+from .score import KEPT_SCORE, scores_of, terms_of
+from .videos import check_video
+
+FOLDER = "curation"
+"""Folder of the results, below that of the recording."""
+SCORES = "scores.csv"
+DECISIONS = "decisions.csv"
+VERDICTS = ("accept", "reject")
+"""Verdicts of people."""
+MAX_CSV = 1_000_000
+"""Size of the largest table of people that is read [bytes]."""
+
+
+@dataclass(frozen=True)
+class CurateSettings:
+    """Settings of `scengen curate`; conf/command/curate.yaml explains them."""
+
+    data: str = ""
+    replay: bool = True
+    workers: Workers = 1
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Decision of a person about an episode."""
+
+    verdict: str
+    who: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Curated:
+    """Result of a curation."""
+
+    recording: Recording
+    reports: tuple[EpisodeReport, ...]
+    decisions: Mapping[int, Decision]
+    kept: tuple[int, ...]
+    """Numbers of the kept episodes."""
+    funnel: Mapping[str, int]
+    """Number of episodes after each stage."""
+
+    @property
+    def undecided(self) -> list[EpisodeReport]:
+        """Flagged episodes with a sufficient score that nobody has decided about; they stay out."""
+        scored = (report for report in self.reports if report.score >= KEPT_SCORE)
+        return [report for report in scored if report.flagged and report.episode not in self.decisions]
+
+
+def curate(settings: CurateSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> Curated:
+    """Curate a recording, and write the results below it, except for the page.
+
+    Args:
+        progress: called with the number of finished steps and of all.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+
+    Raises:
+        ScengenError: the recording, or a table of a person, cannot be read.
+    """
+    recording = Recording.open(settings.data)
+    folder = recording.folder / FOLDER
+    count = len(recording.episodes)
+    people, decisions = _scores(folder / SCORES, count), _decisions(folder / DECISIONS, count)
+    reports, jobs = _examined(recording, settings, search, lambda done: progress(done, 2 * count))
+    for done, (number, finding) in enumerate(_replays(jobs, settings.workers), 1):
+        progress(count + done, 2 * count)
+        if finding is not None:
+            reports[number] = replace(reports[number], findings=(*reports[number].findings, finding))
+    scored = [_with_score(report, people.get(report.episode)) for report in reports]
+    curated = _decided(recording, tuple(scored), decisions)
+    _write(curated, folder)
+    return curated
+
+
+def _examined(
+    recording: Recording, settings: CurateSettings, search: Sequence[str], progress: Callable[[int], None]
+) -> tuple[list[EpisodeReport], list[Recorded]]:
+    """Reports with the scores of the measured terms, and what is to be replayed."""
+    reports, jobs, terms, tasks, solved = [], list[Recorded](), list[dict[str, float]](), list[str](), list[bool]()
+    twins: dict[str, int] = {}
+    for episode in recording.read():
+        made, findings = check_rows(episode, recording)
+        readable = not any(one.check in ("MISSING_FIELD", "NAN") for one in findings)
+        terms.append(terms_of(episode, recording.fps) if readable else {})
+        tasks.append(episode.task)
+        solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
+        if readable:
+            findings += _videos(episode, recording)
+            made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
+            content = sha256(
+                np.ascontiguousarray(episode.columns["control.actions"]).tobytes()
+                + episode.about["scengen/id"].encode()
+            )
+            if (twin := twins.setdefault(content, episode.number)) != episode.number:
+                findings.append(found("DUPLICATE", f"it repeats episode {twin}", (), "error", episode=twin))
+            if settings.replay:
+                task = compose.load_task(episode.task, search)
+                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns))
+                made = (*made, "replay")
+        about = episode.about
+        style = str(about.get("scengen/style", ""))
+        reports.append(
+            EpisodeReport(
+                episode.number, about["scengen/id"], episode.task, style, 1, "terms", terms[-1], made, tuple(findings)
+            )
+        )
+        progress(episode.number + 1)
+    scores = _scores_of_readable(terms, tasks, solved)
+    return [replace(report, score=score) for report, score in zip(reports, scores, strict=True)], jobs
+
+
+def _scores_of_readable(
+    terms: Sequence[Mapping[str, float]], tasks: Sequence[str], solved: Sequence[bool]
+) -> list[int]:
+    """Scores of all episodes; 1 for one that has no terms."""
+    readable = [k for k, own in enumerate(terms) if own]
+    found = [1] * len(terms)
+    scores = scores_of([terms[k] for k in readable], [tasks[k] for k in readable], [solved[k] for k in readable])
+    for k, score in zip(readable, scores, strict=True):
+        found[k] = score
+    return found
+
+
+def _videos(episode: EpisodeData, recording: Recording) -> list[Finding]:
+    moving = Subject(episode, recording).moves.any(axis=1)
+    findings: list[Finding] = []
+    for camera in recording.cameras:
+        findings += check_video(camera, recording.frames(episode, camera), len(episode), moving)
+    return findings
+
+
+def _replays(jobs: Sequence[Recorded], workers: Workers) -> Any:
+    """Number of each replayed episode and what its replay has found."""
+    return each(_numbered_replay, jobs, workers, UNTRUSTED_LIMITS, lambda job, reason: (job.number, lost(job, reason)))
+
+
+def _numbered_replay(job: Recorded) -> tuple[int, Finding | None]:
+    return job.number, replayed(job)
+
+
+def _with_score(report: EpisodeReport, score: int | None) -> EpisodeReport:
+    return report if score is None else replace(report, score=score, scored_by="person")
+
+
+def _decided(recording: Recording, reports: tuple[EpisodeReport, ...], decisions: Mapping[int, Decision]) -> Curated:
+    """Stage 3: a person's verdict decides; without one, episodes with a sufficient score and no flag are kept."""
+    scored = [report for report in reports if report.score >= KEPT_SCORE]
+    clean = [report.episode for report in scored if not report.flagged]
+    accepted = {k for k, decision in decisions.items() if decision.verdict == "accept"}
+    rejected = {k for k, decision in decisions.items() if decision.verdict == "reject"}
+    kept = sorted({*clean, *accepted} - rejected)
+    funnel = {"recorded": len(reports), "scored": len(scored), "without findings": len(clean), "kept": len(kept)}
+    return Curated(recording, reports, decisions, tuple(kept), funnel)
+
+
+def _write(curated: Curated, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    lines = "".join(json.dumps(report.plain(), sort_keys=True) + "\n" for report in curated.reports)
+    replace_file(folder / "reports.jsonl", lines.encode())
+    replace_file(folder / "report.schema.json", _json(SCHEMA))
+    replace_file(folder / "kept.json", _json(list(curated.kept)))
+    about = curated.recording.folder / "meta" / "scengen.json"
+    source = json.loads(about.read_text()) if about.is_file() else {}
+    funnel = {**curated.funnel, "undecided": len(curated.undecided)}
+    replace_file(about, _json({**source, "curation": {"funnel": funnel, "kept_score": KEPT_SCORE}}))
+
+
+def _json(content: Any) -> bytes:
+    return (json.dumps(content, indent=1) + "\n").encode()
+
+
+# --- tables of people ---------------------------------------------------------------------------------
+
+
+def _scores(path: Path, count: int) -> dict[int, int]:
+    """Scores of a person by episode.
+
+    Raises:
+        BadConfig: one line of the table has no meaning.
+    """
+    found = {}
+    for place, row in _table(path, ("episode", "score"), count):
+        if row["score"].strip() not in "12345" or not row["score"].strip():
+            raise BadConfig(f"{path}, line {place}: score = {cut(row['score'])!r}; it must be 1 to 5")
+        found[int(row["episode"])] = int(row["score"])
+    return found
+
+
+def _decisions(path: Path, count: int) -> dict[int, Decision]:
+    """Decisions of people by episode; lines without a verdict are still open.
+
+    Raises:
+        BadConfig: one line of the table has no meaning.
+    """
+    found = {}
+    for place, row in _table(path, ("episode", "verdict", "who", "why"), count):
+        verdict = row["verdict"].strip()
+        if verdict and verdict not in VERDICTS:
+            raise BadConfig(f"{path}, line {place}: verdict = {cut(verdict)!r}; it must be {' or '.join(VERDICTS)}")
+        if verdict:
+            found[int(row["episode"])] = Decision(verdict, row["who"].strip(), row["why"].strip())
+    return found
+
+
+def _table(path: Path, columns: Sequence[str], count: int) -> list[tuple[int, dict[str, str]]]:
+    """Lines of a table with their numbers; none if there is no such file.
+
+    Raises:
+        BadConfig: it lacks a column, or names an episode that does not exist.
+        PoolError: it cannot be read.
+    """
+    if not path.exists():
+        return []
+    try:
+        if path.stat().st_size > MAX_CSV:
+            raise PoolError(f"{path} has more than {MAX_CSV} bytes; it is no table of episodes")
+        with open(path, newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            rows = [(reader.line_num, {name: str(row.get(name) or "") for name in columns}) for row in reader]
+            named = reader.fieldnames or []
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); correct or remove it") from None
+    if missing := [name for name in columns if name not in named]:
+        raise BadConfig(f"{path} lacks the column {missing[0]}; its first line must be {','.join(columns)}")
+    for place, row in rows:
+        if not (row["episode"].isdecimal() and row["episode"].isascii() and int(row["episode"][:9]) < count):
+            raise BadConfig(f"{path}, line {place}: episode = {cut(row['episode'])!r}; it must be 0 to {count - 1}")
+    return rows

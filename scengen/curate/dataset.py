@@ -1,0 +1,144 @@
+"""A LeRobot recording of scengen, read for curation. What cannot be read is one line with the remedy."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from ..errors import PoolError
+
+MAX_FRAMES = 200_000
+"""Largest number of rows of an episode that is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeData:
+    """Rows of one episode."""
+
+    number: int
+    about: Mapping[str, Any]
+    """Row of the table of episodes."""
+    columns: Mapping[str, NDArray[Any]]
+    """Columns by name, each of shape (rows, ...)."""
+
+    def __len__(self) -> int:
+        return len(self.columns["frame_index"])
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        return str(self.about["scengen/task"])
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording in a folder."""
+
+    folder: Path
+
+    @classmethod
+    def open(cls, folder: str | Path) -> "Recording":
+        """Open a recording.
+
+        Raises:
+            PoolError: the folder holds no LeRobot recording of scengen.
+        """
+        found = cls(Path(folder))
+        if not (found.folder / "meta" / "info.json").is_file():
+            raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
+        lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
+        if lacking or not found.episodes or "scengen/task" not in found.episodes[0]:
+            raise PoolError(f"{folder} is not a recording of scengen; curate what scengen record has written")
+        return found
+
+    @cached_property
+    def info(self) -> dict[str, Any]:
+        """Content of `meta/info.json`."""
+        return self._read_json("info.json")
+
+    @property
+    def fps(self) -> float:
+        """Rows per second."""
+        return float(self.info["fps"])
+
+    @cached_property
+    def episodes(self) -> list[dict[str, Any]]:
+        """Rows of the table of episodes."""
+        files = sorted((self.folder / "meta" / "episodes").glob("*/*.parquet"))
+        return [row for file in files for row in self._table(file).to_pylist()]
+
+    @property
+    def cameras(self) -> list[str]:
+        """Keys of the videos."""
+        return [name for name, feature in self.info["features"].items() if feature["dtype"] == "video"]
+
+    def read(self) -> Iterator[EpisodeData]:
+        """All episodes in their order.
+
+        Raises:
+            PoolError: the rows cannot be read, or are not those of the table of episodes.
+        """
+        files = sorted((self.folder / "data").glob("*/*.parquet"))
+        if not files:
+            raise PoolError(f"{self.folder} has no rows; record it again")
+        whole = pa.concat_tables([self._table(file) for file in files])
+        for number, about in enumerate(self.episodes):
+            start, end = int(about["dataset_from_index"]), int(about["dataset_to_index"])
+            if not 0 <= start < end <= whole.num_rows or end - start > MAX_FRAMES:
+                raise PoolError(f"{self.folder}: episode {number} has rows {start} to {end} of {whole.num_rows}")
+            part = whole.slice(start, end - start)
+            columns = {name: self._values(part[name], name) for name in part.column_names}
+            yield EpisodeData(number, about, columns)
+
+    def frames(self, episode: EpisodeData, camera: str) -> Iterator[NDArray[np.uint8]]:
+        """Pictures of a camera in an episode, decoded, shape (height, width, 3)."""
+        import av
+        from av.error import FFmpegError
+
+        about, key = episode.about, f"videos/{camera}"
+        path = self.folder / self.info["video_path"].format(
+            video_key=camera, chunk_index=about[f"{key}/chunk_index"], file_index=about[f"{key}/file_index"]
+        )
+        first = round(about[f"{key}/from_timestamp"] * self.fps)
+        last = round(about[f"{key}/to_timestamp"] * self.fps)
+        try:
+            with av.open(str(path)) as container:
+                for number, frame in enumerate(container.decode(video=0)):
+                    if number >= last:
+                        return
+                    if number >= first:
+                        yield np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+        except (OSError, FFmpegError) as error:
+            raise PoolError(
+                f"{path} cannot be decoded ({' '.join(str(error).split())[:120]}); record it again"
+            ) from None
+
+    def _values(self, column: pa.ChunkedArray, name: str) -> NDArray[Any]:
+        shape = tuple(self.info["features"].get(name, {}).get("shape", ()))
+        flat, kind = column.combine_chunks(), column.type
+        while pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+            flat, kind = flat.flatten(), kind.value_type
+        values = flat.to_numpy(zero_copy_only=False)
+        size = (len(column), *shape) if column.type != kind else (len(column),)
+        if values.size != np.prod(size):
+            raise PoolError(f"{self.folder}: column {name} has not the shape of meta/info.json; record it again")
+        return values.reshape(size)
+
+    def _table(self, file: Path) -> pa.Table:
+        try:
+            return pq.read_table(file)
+        except (OSError, pa.ArrowException) as error:
+            raise PoolError(f"{file} cannot be read ({' '.join(str(error).split())[:120]}); restore it") from None
+
+    def _read_json(self, name: str) -> dict[str, Any]:
+        try:
+            return json.loads((self.folder / "meta" / name).read_text())
+        except (OSError, ValueError) as error:
+            raise PoolError(f"{self.folder}/meta/{name} is damaged ({str(error)[:120]}); record it again") from None
