@@ -1,5 +1,6 @@
 """Checks of the rows of one episode. Thresholds are those of lerobot-lint where it has the rule."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -27,8 +28,9 @@ FROZEN_FRAMES = 15
 """Number of identical rows, one after the other, beyond which a moving arm's state is frozen (lerobot-lint)."""
 MOVING_ACTION = 0.1
 """Mean action of the motion channels above which the hand must move."""
-MAX_SPEED = STEP * RATE
-"""Speed limit of a hand: that of an action of 1 [m/s]."""
+MAX_SPEED = math.sqrt(3) * STEP * RATE
+"""Speed limit of a hand: that of an action of 1 in all three directions [m/s]. Twice that is a jump: a hand that also
+turns was seen at 0.83 m/s."""
 MAX_BODY_JUMP = 0.03
 """Largest displacement of a body between two rows that its velocities do not explain [m]."""
 BLOW_SHARE = 1.0
