@@ -40,7 +40,7 @@ class Domino(Box):
     """
 
     height: float = param(0.080, "m", 0.03, 0.20)
-    width: float = param(0.040, "m", 0.01, 0.10)
+    width: float = param(0.040, "m", 0.01, 0.60)
     thickness: float = param(0.012, "m", 0.006, 0.04)
     mass: float = param(0.050, "kg", 0.005, 0.5)
     friction: float = param(0.5, "1", 0.05, 1.5)

@@ -4,7 +4,7 @@ x runs along the chain, from the middle of an intact chain; y is to its left.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -62,9 +62,9 @@ class Chain:
     defect: Defect | None = None
 
     @property
-    def end(self) -> str:
-        """Kind of its slab: `slab`, or `decoy` for one that does not count."""
-        return "decoy" if self.defect and self.defect.kind == DECOY else "slab"
+    def astray(self) -> bool:
+        """Whether it leads to a slab that does not count."""
+        return self.defect is not None and self.defect.kind == DECOY
 
     @property
     def gaps(self) -> NDArray[np.float64]:
@@ -98,7 +98,11 @@ class Chain:
 
 @dataclass(frozen=True)
 class Lanes:
-    """Parallel chains side by side, the first on the right. First tiles stand in one row, slabs in another."""
+    """Parallel chains side by side, the first on the right. First tiles stand in one row, slabs in another.
+
+    All chains but one lead to the same slab, which stands across their lanes. The first or the last one may lead to a
+    slab of its own, the decoy.
+    """
 
     chains: tuple[Chain, ...]
     spacing: float
@@ -108,14 +112,25 @@ class Lanes:
     def feet(self) -> dict[str, Vec3]:
         """Positions of all tiles and slabs, from the middle of the middle lane [m].
 
-        `tile_3_0` is the first tile in lane 3, `slab_3` its slab, or `decoy_3`.
+        `tile_3_0` is the first tile in lane 3; `slab` is the slab that counts, `decoy` the other one.
         """
-        feet = {}
+        feet, ends = {}, list[Vec3]()
         for k, chain in enumerate(self.chains):
             across = (k - len(self.chains) // 2) * self.spacing * np.array([0.0, 1.0, 0.0])
             for i, foot in chain.feet.items():
-                feet[f"{chain.end}_{k}" if i == chain.count else f"tile_{k}_{i}"] = foot + across
-        return feet
+                if i < chain.count:
+                    feet[f"tile_{k}_{i}"] = foot + across
+                elif chain.astray:
+                    feet["decoy"] = foot + across
+                else:
+                    ends.append(foot + across)
+        return {**feet, "slab": np.mean(ends, axis=0)}
+
+    @cached_property
+    def slab(self) -> Domino:
+        """The slab that counts: wider than that of one chain by the distance of the outermost lanes."""
+        one, *others = (chain.slab for chain in self.chains if not chain.astray)
+        return replace(one, width=one.width + len(others) * self.spacing)
 
     def defects(self, *kinds: int) -> list[Defect]:
         """Defects of the given kinds."""
@@ -123,15 +138,20 @@ class Lanes:
 
     def piece(self, name: str) -> Domino:
         """The tile or slab with a name of `feet`."""
+        if name == "slab":
+            return self.slab
+        if name == "decoy":
+            return next(chain.slab for chain in self.chains if chain.astray)
         chain = self.chains[int(name.split("_")[1])]
-        if not name.startswith("tile"):
-            return chain.slab
         return chain.starter if name.endswith("_0") else chain.tile
 
     @property
     def room(self) -> float:
-        """Smallest free space along y between pieces of different chains [m]; negative where they overlap."""
-        pairs = [(a, b) for a, b in itertools.combinations(self.feet, 2) if a.split("_")[1] != b.split("_")[1]]
+        """Smallest free space along y between tiles of different chains, and between the slabs [m]; negative where they
+        overlap."""
+        tiles = [name for name in self.feet if name.startswith("tile")]
+        pairs = [(a, b) for a, b in itertools.combinations(tiles, 2) if a.split("_")[1] != b.split("_")[1]]
+        pairs += [("slab", "decoy")] if "decoy" in self.feet else []
         return min(abs(self.feet[a][1] - self.feet[b][1]) - self._sum_of_widths(a, b) / 2 for a, b in pairs)
 
     def _sum_of_widths(self, *names: str) -> float:

@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry import quat
+from ..geometry import UP, about_y, axes, quat
 from ..params import check_bounds
+from ..robots.panda import HOME_HAND, HOME_TILT, IN_HAND
 from ..robots.suction import LEAKY
 
 TABLE_TOP = 0.8
@@ -168,6 +169,21 @@ CAMERAS = (
 """Name, position [m] and orientation (wxyz) of robosuite's TableArena cameras."""
 
 
+def aim(scene: mujoco.MjSpec, camera: str, eye: ArrayLike, at: ArrayLike) -> None:
+    """Move a camera of the scene, and point it at a place with its upper side up.
+
+    Args:
+        camera: its name.
+        eye: its position [m].
+        at: the place that is in the middle of its picture, not straight below or above it [m].
+    """
+    found, turn = scene.camera(camera), np.empty(4)
+    back = np.asarray(eye, float) - np.asarray(at, float)  # a camera looks along its own -z, with x to the right
+    right = np.cross(UP, back)
+    mujoco.mju_mat2Quat(turn, axes(right / np.linalg.norm(right), back / np.linalg.norm(back)).ravel())
+    found.pos, found.quat = np.asarray(eye, float), turn
+
+
 def place(
     scene: mujoco.MjSpec,
     asset: Prop,
@@ -190,6 +206,18 @@ def place(
     body.name = name
     if free:
         body.add_freejoint(name=f"{name}_free")
+
+
+def place_in_hand(scene: mujoco.MjSpec, asset: Prop, name: str, width: float, offset: ArrayLike) -> None:
+    """Add `asset` to the scene as a free body that the jaw of the first arm holds at the start.
+
+    Args:
+        width: width of the asset between the fingers [m]. They close along its y axis.
+        offset: position of its origin from the grip site, in its own axes, of which z points back into the hand [m].
+    """
+    pos = HOME_HAND + about_y(-HOME_TILT) @ np.asarray(offset, float)
+    place(scene, asset, name, pos, turn=quat("y", -HOME_TILT))
+    scene.add_numeric(name=IN_HAND, data=[width], size=1)
 
 
 def servo(scene: mujoco.MjSpec, joint: str, stiffness: float) -> None:

@@ -31,7 +31,7 @@ class TierRack(Prop):
 
     width: float = param(0.36, "m", 0.10, 0.50)
     """Inner width along x."""
-    depth: float = param(0.16, "m", 0.08, 0.25)
+    depth: float = param(0.185, "m", 0.08, 0.25)
     """Inner depth along y."""
     height: float = param(0.105, "m", 0.06, 0.20)
     """Inner height of a storey."""

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..robots import panda, suction
-from ..robots.panda import FINGERS, HOME, JOINTS
+from ..robots.panda import HOME, JOINTS
 from . import native, osc
 
 ACTION = 7
@@ -121,7 +121,9 @@ class Loop:
         self.touched, self.touching = self._latches
         self._action = np.zeros(self.size, np.float32)
         self._no_record = np.zeros((0, model.nu))
-        self._fingers = [panda.fingers(model, name) for name in names]
+        self._fingers = [(panda.fingers(model, name), panda.start_fingers(model, name)) for name in names]
+        self.holds = panda.width_in_hand(model) is not None
+        """Whether the jaw of the first arm is closed on a body at the start (`panda.IN_HAND`)."""
         self.reset()
 
     def __reduce__(self) -> NoReturn:
@@ -129,15 +131,15 @@ class Loop:
         raise TypeError(f"a Loop holds addresses of its model and data and cannot be copied or pickled; {remedy}")
 
     def reset(self) -> None:
-        """Return to the start: `home`, jaw half open or suction off, no contacts.
+        """Return to the start: `home`, jaw half open or closed on what it holds, suction off, no contacts.
 
         The bits equal those of a new loop.
         """
         mujoco.mj_resetData(self.model, self.data)
-        for arm, home, fingers in zip(self._arms, self.home, self._fingers, strict=True):
+        for number, (arm, home, (fingers, places)) in enumerate(zip(self._arms, self.home, self._fingers, strict=True)):
             self.data.qpos[arm["at"]["angle"]] = home
-            self.data.qpos[fingers] = FINGERS[: len(fingers)]
-            osc.start(arm["state"], home)
+            self.data.qpos[fingers] = places
+            osc.start(arm["state"], home, closed=self.holds and number == 0)
         self._latches[:] = 0
         mujoco.mj_forward(self.model, self.data)
 

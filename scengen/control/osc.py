@@ -32,6 +32,8 @@ POSTURE_KD = 2.0 * math.sqrt(POSTURE_KP)
 """Damping of the pull to the initial posture [1/s], critical."""
 JAW_SPEED = 0.2
 """Change of the jaw command in one control period: PandaGripper.speed."""
+CLOSED_JAW = (-1.0, 1.0)
+"""Jaw command after a command to close: PandaGripper.current_action."""
 MIN_SEALED_PADS = 3
 """Number of a suction cup's four pads that must touch something before it pulls. With two it would hold on to an
 edge."""
@@ -140,10 +142,15 @@ def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[
     return found
 
 
-def start(state: NDArray[np.void], posture: ArrayLike) -> None:
-    """Set the controller's state as after a reset, with the initial joint angles [rad]."""
+def start(state: NDArray[np.void], posture: ArrayLike, closed: bool = False) -> None:
+    """Set the controller's state as after a reset, with the initial joint angles [rad].
+
+    Args:
+        closed: whether the jaw has been commanded to close.
+    """
     state["goal_pos"] = state["goal_rot"] = 0.0  # set by the first action, before its first use
-    state["jaw"] = 0.0  # PandaGripper.current_action: half open until commanded; a cup's suction is off
+    # PandaGripper.current_action: half open until commanded; a cup's suction is off
+    state["jaw"] = CLOSED_JAW if closed else 0.0
     state["jammed"] = 0.0
     state["posture"] = posture
 

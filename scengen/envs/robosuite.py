@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .. import compose, task_files
 from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
+from ..control.osc import CLOSED_JAW
 from ..control.teleop import check_filter
 from ..episode import STRICT, Episode, Rules, check_rules
 from ..errors import BadConfig, PoolError, UnknownName
@@ -272,10 +273,20 @@ class RobosuiteEnv(ManipulationEnv):
         # robosuite's controllers have read the arms before these took their initial posture: make them read again.
         for controller in (part for robot in self.robots for part in robot.part_controllers.values()):
             controller.new_update = True
+        if self.world.loop.holds:
+            self._close_jaw()
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon, self.rules), 0
         self._begun = False
+
+    def _close_jaw(self) -> None:
+        """Close the jaw of the first arm on what it holds at the start."""
+        model, (gripper, *_) = self.world.model, self.robots[0].gripper.values()
+        names = panda.arms(model)[0]
+        self.world.data.qpos[panda.fingers(model, names)] = panda.start_fingers(model, names)
+        gripper.current_action, self.world.arms[0].grip = np.array(CLOSED_JAW), 1.0
+        mujoco.mj_forward(model, self.world.data)
 
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Command the arms; robosuite calls it between mj_step1 and mj_step2 of every physics step."""

@@ -103,6 +103,6 @@ def _add_home(spec: mujoco.MjSpec) -> None:
     for names in panda.arms(model):
         fingers = panda.fingers(model, names)
         qpos[[model.joint(name).qposadr[0] for name in names.joints]] = panda.HOME
-        qpos[fingers] = panda.FINGERS[: len(fingers)]
+        qpos[fingers] = panda.start_fingers(model, names)
     spec.add_key(name="home", qpos=qpos.tolist())
     spec.compile()

@@ -14,6 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .jaw import OVERLAP
+
 JOINTS = 7
 """Number of joints of the arm."""
 
@@ -25,10 +27,23 @@ reset the yaw is 0 and that joint is at pi / 4. It turns back as the yaw grows; 
 FINGERS: NDArray[np.float64] = np.array([0.020833, -0.020833])
 """Finger positions after a reset [m], shape (2,): robosuite's PandaGripper.init_qpos."""
 
+HOME_HAND: NDArray[np.float64] = np.array([-0.10277, 0.0, 1.01104])
+"""Position of a single arm's grip site after a reset [m], shape (3,), to 0.01 mm: `HOME` by the links' lengths."""
+HOME_TILT = 0.12725
+"""Angle by which a hand points ahead of straight down after a reset [rad]. Its fingers close along y."""
+IN_HAND = "in_hand"
+"""Name of a scene's custom number: the width of the body that the jaw of the first arm holds at the start [m]. Without
+it, jaws start half open and empty."""
+PRESS = 1e-4
+"""Depth by which the pads of a jaw are in the body that it holds at the start [m]: else it would fall before they
+touch."""
+
 BASE: NDArray[np.float64] = np.array([-0.56, 0.0, 0.912])
 """Base position [m], shape (3,): Panda.base_xpos_offset of a table 0.8 m long (-0.16 - 0.8 / 2), mounted."""
 BASE_QUAT: NDArray[np.float64] = np.array([1.0, 0.0, 0.0, 0.0])
 """Base orientation (wxyz). robosuite leaves a single arm, and two parallel ones, unturned, facing +x."""
+ROBOTVIEW: NDArray[np.float64] = BASE + np.array([1.0, 0.0, 0.4])
+"""Position of a single arm's camera `robotview`, which faces the arm and does not move [m], shape (3,): robot.xml."""
 ARM_OFFSET = 0.25
 """Distance to the right of `BASE` at which the first of two arms stands, and to the left for the second [m]: the layout
 "parallel" of robosuite's two-arm environments."""
@@ -185,6 +200,19 @@ def fingers(model: mujoco.MjModel, names: Names) -> list[int]:
     """Indices of the finger joints in qpos; empty for a hand without a jaw."""
     found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names.finger_joints]
     return [int(model.jnt_qposadr[joint]) for joint in found if joint >= 0]
+
+
+def width_in_hand(model: mujoco.MjModel) -> float | None:
+    """Width of the body that the jaw of the first arm holds at the start [m], or None. See `IN_HAND`."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, IN_HAND)
+    return None if number < 0 else float(model.numeric_data[model.numeric_adr[number]])
+
+
+def start_fingers(model: mujoco.MjModel, names: Names) -> NDArray[np.float64]:
+    """Positions of the finger joints after a reset [m], shape (2,), or (0,) for a hand without a jaw."""
+    width = width_in_hand(model) if names.number == 0 else None
+    pair = FINGERS if width is None else ((width + OVERLAP) / 2 - PRESS) * np.array([1.0, -1.0])
+    return pair[: len(fingers(model, names))]
 
 
 @functools.cache

@@ -99,7 +99,8 @@ class Arm:
         self.world: World = weakref.proxy(world)  # a cycle would delay freeing a world's memory
         self.number, self.data = number, world.data
         self.grip = -1.0
-        """Gripper command of the last action: -1 open or suction off, 1 closed or suction on."""
+        """Gripper command of the last action: -1 open or suction off, 1 closed or suction on. Before the first action:
+        1 if the jaw holds a body at the start, else -1."""
         self.told: NDArray[np.float64] = IDLE
         """Action of a scripted arm in the coming control period, shape (7,)."""
         joints = [model.joint(name) for name in names.joints]
@@ -318,7 +319,7 @@ class World:
         self.filter.reset()
         self.style = None
         for arm in (*self.arms, *self.partners):
-            arm.grip, arm.told = -1.0, IDLE
+            arm.grip, arm.told = (1.0 if self.loop.holds and arm.number == 0 else -1.0), IDLE
 
     @property
     def size(self) -> int:

@@ -1,29 +1,30 @@
-"""T18 domino-select: five chains of dominoes, one try; only one of them knocks over a red slab.
+"""T18 domino-select: five chains of dominoes, one try; only one of them knocks over the red slab.
 
     first tiles                       slabs         seen from above; every chain runs along +u
      |   |   |   |       #            red           lane 4   gap: a tile stands beside the chain
-                 |
-     |   |   |   |   |   #            red           lane 3   intact
-     | |  |    |         #            red           lane 2   drift: each space is wider than the one before
-     |   |   |   |   |   @            blue          lane 1   decoy: intact, but leads to the wrong slab
-     |   |       |   |   #            red           lane 0   (not in training) a tile is missing
+                 |       #
+     |   |   |   |   |   #                          lane 3   intact
+     | |  |    |         #                          lane 2   drift: each space is wider than the one before
+     |   |       |   |   #                          lane 1   (not in training) a tile is missing
+     |   |   |   |   |   @            blue          lane 0   decoy: intact, but leads to the wrong slab
 
 Bottleneck: the robot must choose by looking, because a toppled chain cannot be tried again. Near the hand all chains
-look the same: the first tiles stand in one row and so do the slabs. Only the tiles between them differ.
+look the same: the first tiles stand in one row, and the slabs in another. Only the tiles between them differ.
 
 Decisions:
 
-* The paper speaks of one target to which the chains lead. Five straight chains cannot end at one slab 5 cm wide without
-  standing in each other's way. Here every chain has a slab of its own: any red one counts, a blue one never does. So
-  colour identifies the decoys and nothing else.
-* Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth that repeats a kind.
+* "The target": one red slab, which stands across the lanes of all chains but one. Five straight chains cannot end at a
+  slab as wide as a tile without standing in each other's way.
+* "The wrong target": the outermost chain on one side leads to a blue slab of its own, which never counts. So colour
+  identifies this chain and nothing else.
+* Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth with a gap or a drift.
 * One try: the robot may touch one first tile and nothing else, and may topple it but not carry it; anything else ends
   the episode. Touching a wrong first tile is no failure: the goal can no longer be reached, so every wrong chain is
   judged by physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until
   everything is at rest.
-* Chance: the intact chain is in each lane equally often, and the others are dealt at random. A blind guess is right in
-  1 of 5 scenes. A policy that sees only colours chooses among the red slabs, 4 in two of three training scenes and 3 in
-  the others: 28 %. The place of a decoy carries no further information.
+* Chance: the intact chain is each of the four that lead to the red slab equally often, and the others are dealt at
+  random. A policy that sees only colours, and one that always chooses the same lane in the middle, are right in 1 of 4
+  scenes. The side of the decoy carries no further information.
 * The strength of the push does not matter: a first tile gets 2 rad/s from the oracle and 8 from the fastest hand, but
   11 from its own fall over a gap of 0.6 heights.
 """
@@ -31,7 +32,7 @@ Decisions:
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import mujoco
@@ -51,6 +52,8 @@ from ..skills.motion import go_to, push, retreat, wait
 
 LANES = 5
 """Chains on the table (paper, App. B, T18)."""
+RED_LANES = LANES - 1
+"""Chains that lead to the red slab."""
 SLAB_DISPLACEMENT = 0.05
 """Displacement along the table at which a slab counts as knocked over [m] (paper, App. B, T17; T18 gives no number)."""
 MIN_CLEARANCE = 0.002
@@ -61,7 +64,7 @@ CARRY_TOLERANCE = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class DominoSelect(Scenario):
-    """Five parallel chains with a slab each: one intact, four with a defect; first tiles may differ from the others."""
+    """Five parallel chains, one intact, four with a defect, and two slabs; first tiles may differ from the others."""
 
     count: int = param(4, "tiles", 3, 8)
     gap_ratio: float = param(1.25, "tile widths", 0.2, 2.5)
@@ -69,17 +72,22 @@ class DominoSelect(Scenario):
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    intact: int = param(2, "lane, from the right", 0, LANES - 1)
-    order: int = param(0, "", 0, math.factorial(LANES - 1) - 1)
-    """Number of the permutation, in lexicographic order, that deals the four defects to the other lanes."""
+    intact: int = param(2, "lane before the red slab, from the right", 0, RED_LANES - 1)
+    decoy_side: int = param(1, "-1 right, 1 left", -1, 1)
+    """Side of the chain that leads to the blue slab. 0 is refuted."""
+    order: int = param(0, "", 0, math.factorial(RED_LANES - 1) - 1)
+    """Number of the permutation, in lexicographic order, that deals three defects to the other lanes before the red
+    slab."""
     first: Defect = Defect(kind=GAP)
     second: Defect = Defect(kind=DRIFT)
-    third: Defect = Defect(kind=DECOY)
-    fourth: Defect = Defect(kind=GAP, place=0.6, side=0)
+    third: Defect = Defect(kind=GAP, place=0.6)
+    """Its tile beside the chain stands on the side of that of `first`."""
     starter: Domino = Domino(height=0.05, width=0.025, thickness=0.008, mass=0.02, rgba=(0.95, 0.70, 0.25, 1.0))
     tile: Domino = Domino(height=0.05, width=0.025, thickness=0.008, mass=0.02)
-    slab: Domino = Domino(height=0.11, width=0.04, thickness=0.012, mass=0.03, rgba=(0.78, 0.10, 0.10, 1.0))
-    decoy: Domino = Domino(height=0.11, width=0.04, thickness=0.012, mass=0.03, rgba=(0.15, 0.30, 0.62, 1.0))
+    slab: Domino = Domino(height=0.11, width=0.04, thickness=0.008, mass=0.04, rgba=(0.78, 0.10, 0.10, 1.0))
+    """The red slab. It is wider than this by three lanes, and light, so that one tile at its end tips it: with 0.1 kg
+    and 12 mm it stays up."""
+    decoy: Domino = Domino(height=0.11, width=0.04, thickness=0.008, mass=0.03, rgba=(0.15, 0.30, 0.62, 1.0))
 
     # --- scene ----------------------------------------------------------------------------
 
@@ -94,7 +102,7 @@ class DominoSelect(Scenario):
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        return any(displaced(world, slab, foot) >= SLAB_DISPLACEMENT for slab, foot in self.targets.items())
+        return displaced(world, "slab", self.feet["slab"]) >= SLAB_DISPLACEMENT
 
     def failure(self, world: World) -> str | None:
         firsts = [f"tile_{k}_0" for k in range(LANES)]
@@ -109,7 +117,7 @@ class DominoSelect(Scenario):
 
     def oracle(self, world: World) -> Plan:
         """Topple the intact chain and wait until its slab has fallen."""
-        yield from self.topple(world, f"tile_{self.intact}_0")
+        yield from self.topple(world, f"tile_{self.intact_lane}_0")
         yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def topple(self, world: World, tile: str) -> Plan:
@@ -128,7 +136,7 @@ class DominoSelect(Scenario):
         return {name: Shortcut(plan, to_rest=True) for name, plan in wrong.items()} | {
             "try_a_second_chain": Shortcut(self._try_a_second_chain),
             "push_a_slab": Shortcut(self._push_slab),
-            "push_the_last_tile": Shortcut(partial(self.topple, tile=f"tile_{self.intact}_{self.count - 1}")),
+            "push_the_last_tile": Shortcut(partial(self.topple, tile=f"tile_{self.intact_lane}_{self.count - 1}")),
             "carry_the_first_tile_to_the_slab": Shortcut(self._carry),
         }
 
@@ -136,30 +144,30 @@ class DominoSelect(Scenario):
         """Topple a wrong chain, then the right one."""
         yield from self.topple(world, f"tile_{self.wrong[0]}_0")
         yield from retreat(world.arm, 0.05)
-        yield from self.topple(world, f"tile_{self.intact}_0")
+        yield from self.topple(world, f"tile_{self.intact_lane}_0")
 
     def _push_slab(self, world: World) -> Plan:
-        """Knock the slab of the intact chain over along its lane."""
-        start = self.feet[f"slab_{self.intact}"] + 0.8 * self.slab.height * UP - 0.06 * self.u
+        """Knock the red slab over along the lane of the intact chain."""
+        start = self.end + 0.8 * self.slab.height * UP - 0.06 * self.u
         yield from poke(world.arm, start, 0.15 * self.u, lambda: self.success(world), above=0.06)
 
     def _carry(self, world: World) -> Plan:
         """Carry the intact chain's first tile, which may be touched, to the slab and knock it over with the foot."""
-        tile, slab = self.feet[f"tile_{self.intact}_0"], self.feet[f"slab_{self.intact}"]
+        tile, slab = self.feet[f"tile_{self.intact_lane}_0"], self.end
         yield from pick(world.arm, tile + 0.7 * self.starter.height * UP, np.cross(UP, self.u), above=0.06, lift=0.10)
         yield from go_to(world.arm, slab + (self.slab.height + TIP_BELOW + 0.012) * UP - 0.04 * self.u)
         yield from push(world.arm, 0.15 * self.u, lambda: self.success(world))
 
     def answer(self) -> Answer:
         """The lane of the intact chain. One try: a toppled chain cannot be tried again."""
-        lanes = tuple(float(k) for k in range(LANES))
-        return Answer(lanes, lambda w, k: self.topple(w, f"tile_{round(k)}_0"), lambda k: k == self.intact, tries=1)
+        lanes, right = tuple(map(float, range(LANES))), self.intact_lane
+        return Answer(lanes, lambda w, k: self.topple(w, f"tile_{round(k)}_0"), lambda k: k == right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Remove all tiles of the intact chain but the first; the others might bridge the place of a missing tile."""
         scene = self.build()
         for i in range(1, self.count):
-            scene.delete(scene.body(f"tile_{self.intact}_{i}"))
+            scene.delete(scene.body(f"tile_{self.intact_lane}_{i}"))
         return {"no_chain": scene}
 
     # --- constraints ------------------------------------------------------------------------
@@ -172,11 +180,12 @@ class DominoSelect(Scenario):
         yield require(beyond > height or not broken, "a falling tile reaches across the gap", gap=beyond, height=height)
         widest = max((drift.stretch * height for drift in self.lanes.defects(DRIFT)), default=0.0)
         yield require(widest < spaces, "the drift takes more space than the chain has", widest=widest, spaces=spaces)
-        red, room = len(self.targets), self.lanes.room
-        yield require(red > 1, "colour alone tells the intact chain", red_slabs=red)
+        astray, room = len(self.lanes.defects(DECOY)), self.lanes.room
+        yield require(astray == 1 and self.decoy_side != 0, "not one chain leads astray, at one side", chains=astray)
         yield require(room >= MIN_CLEARANCE, "a piece stands in a neighbouring chain", room=room, needed=MIN_CLEARANCE)
         starts = [self.feet[f"tile_{k}_0"] for k in range(LANES)]
-        fallen = [foot + self.slab.height * self.u for name, foot in self.feet.items() if not name.startswith("tile")]
+        half, along = self.lanes.slab.width / 2 * np.cross(UP, self.u), self.slab.height * self.u
+        fallen = [self.feet["slab"] + along + half, self.feet["slab"] + along - half, self.feet["decoy"] + along]
         yield on_table("a chain", starts + fallen)
         yield within_reach("a first tile", *(start + self.starter.height * UP for start in starts))
 
@@ -195,8 +204,8 @@ class DominoSelect(Scenario):
 
     def facts(self) -> Mapping[str, float | str]:
         return {
-            "intact": self.intact + 1,
-            "reds": len(self.targets),
+            "intact": self.intact_lane + 1,
+            "decoy": "the last one on the right" if self.decoy_side < 0 else "the last one on the left",
             "way": spoken(self.heading),
             "gap": self.gap / self.tile.height,
         }
@@ -216,13 +225,26 @@ class DominoSelect(Scenario):
     @cached_property
     def defects(self) -> tuple[Defect | None, ...]:
         """The defect of the chain in each lane; None for the intact one."""
-        dealt = list(itertools.permutations((self.first, self.second, self.third, self.fourth)))[self.order]
-        return *dealt[: self.intact], None, *dealt[self.intact :]
+        third = replace(self.third, side=self.first.side)  # on two sides they would not fit between their lanes
+        dealt = list(itertools.permutations((self.first, self.second, third)))[self.order]
+        red, astray = (*dealt[: self.intact], None, *dealt[self.intact :]), Defect(kind=DECOY)
+        return (astray, *red) if self.decoy_side < 0 else (*red, astray)
+
+    @property
+    def intact_lane(self) -> int:
+        """Lane of the intact chain, from the right, among all."""
+        return self.defects.index(None)
+
+    @property
+    def end(self) -> Vec3:
+        """Place on the foot of the red slab where the intact chain ends [m]."""
+        start = self.feet[f"tile_{self.intact_lane}_0"]
+        return start + float((self.feet["slab"] - start) @ self.u) * self.u
 
     @property
     def wrong(self) -> list[int]:
         """Lanes of the chains that have a defect."""
-        return [k for k in range(LANES) if k != self.intact]
+        return [k for k in range(LANES) if k != self.intact_lane]
 
     @cached_property
     def lanes(self) -> Lanes:
@@ -235,8 +257,3 @@ class DominoSelect(Scenario):
         """Positions of all feet [m], by name as in `Lanes.feet`."""
         middle, turn = np.array([self.x, self.y, TABLE_TOP]), about_z(math.radians(self.heading))
         return {name: middle + turn @ foot for name, foot in self.lanes.feet.items()}
-
-    @cached_property
-    def targets(self) -> dict[str, Vec3]:
-        """Positions of the red slabs [m], by name."""
-        return {name: foot for name, foot in self.feet.items() if name.startswith("slab")}

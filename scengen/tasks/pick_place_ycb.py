@@ -19,9 +19,9 @@ location; after 1-3 relocations, the patch locks in place":
   object.
 * It jumps a given distance, to a place on the field in front of the robot, where all places can be reached.
 * Locked means that its dark side is up; only then does it count. Nothing else shows it.
-* The objects are proxies, solids of their size, mass and balance (`assets.ycb`), or the scans if `ycb=FOLDER` is given.
-  Cartons lie on their narrow side, as a jaw must grasp them; the master chef can of the paper's list is too wide for
-  it.
+* The objects are proxies, solids of their size, mass and balance with printed labels (`assets.ycb`), or the scans if
+  `ycb=FOLDER` is given. Cartons lie on their narrow side, as a jaw must grasp them; the master chef can of the paper's
+  list is too wide for it.
 """
 
 import functools

@@ -1,9 +1,9 @@
-"""T03 sheltered-grasp: take a cube out of a covered rack, through its one open side.
+"""T03 sheltered-grasp: take an object out of a covered rack, through its one open side.
 
          ______________
         |   |      |   |           seen from above, without its roof; there are two storeys, and both
-        |   |  []  |   |  rack     have a back, ends and a roof. Whether the cube is in the upper or the
-        |   |      |   |           lower one, and how far to the left, only a camera on the hand can see.
+        |   |  []  |   |  rack     have a back, ends and a roof. Whether the object is in the upper or
+        |   |      |   |           the lower one, and how far to the left, only a camera on the hand can see.
         '---'  ^^  '---'
                hand        [tray]
 
@@ -12,72 +12,91 @@ not down; its palm, 208 mm wide, fits between floor and ceiling only in that ori
 
 Decisions, where the paper (App. B, T03) is silent:
 
-* The object. App. D.2 lists the cracker box and the pudding box for this task, its text says cube: it is the cube. The
-  cracker box, 72 mm across its narrowest side, leaves 2 mm on each side to a jaw that cannot be aimed from above.
+* The object. The text says cube, App. D.2 lists the cracker box and the pudding box: training has cubes, an axis the
+  pudding box, which lies on its narrow side. The cracker box, 72 mm across its narrowest side, leaves 2 mm on each side
+  to a jaw that cannot be aimed from above.
 * In training the rack is on the left of the table's middle and opens towards it. On the "opposite side" (App. I) rack
-  and tray are mirrored: an object that is sheltered from the left can be reached only from the right. There one camera,
-  `rgb_exo_left_cam`, looks into the rack, because robosuite's cameras are not mirrored with it.
-* The cube stands so deep that in training no fixed camera sees any part of it; the camera on the hand may.
-* The storey and the cube's place in it are geometry, which no label tells: the robot must look into one storey, then
+  and tray are mirrored: an object that is sheltered from the left can be reached only from the right.
+* "Initially not visible": no fixed camera sees any part of the object, in whatever scene; the camera on the hand may.
+  From where `rgb_exo_left_cam` stands in robosuite, it would look into a rack on the right. Here it stands higher, and
+  looks down on the roof of either rack. A scene in which any line of sight ends at the object is refuted.
+* The storey and the object's place in it are geometry, which no label tells: the robot must look into one storey, then
   into the other. The paper calls this exploring. So there is no `answer`.
-* Dropped in the tray: its middle is within the tray's walls and below their top, at rest, released, for 0.3 s, 30 steps
-  as in the paper's T12 and T13. Raking the cube out of the rack and grasping it on the table counts: it came out of the
-  open side, too.
+* Dropped in the tray: its middle is between the tray's walls, and it touches the tray and nothing else, at rest, for
+  0.3 s, 30 steps as in the paper's T12 and T13. Raking it out of the rack and grasping it on the table counts: it came
+  out of the open side, too.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import cast
 
 import mujoco
 import numpy as np
 
 from ..assets.bin import Bin
-from ..assets.box import Cube
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.box import Box, Cube
+from ..assets.package import Carton
+from ..assets.prop import CAMERAS, TABLE_TOP, aim, place, table
 from ..assets.rack import STOREYS, TierRack
+from ..assets.ycb import Ycb
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
-from ..predicates import fallen, inside, still
+from ..predicates import fallen, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..robots.panda import BASE
+from ..robots.panda import BASE, ROBOTVIEW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, facing, facing_down, go_to, retreat
 
-TRAY = Bin(width=0.13, length=0.13, depth=0.025, wall=0.006)
-"""A tray wide enough for a cube that is dropped 6 cm and rolls over an edge."""
+TRAY = Bin(width=0.15, length=0.15, depth=0.025, wall=0.006)
+"""A tray wide enough for a cube that rolls over an edge, and for a box that topples."""
+PUDDING_BOX = cast(Carton, Ycb(item=6, low=1).prop)
+"""The pudding box of the YCB set on its narrow side: 38 mm wide, 90 mm high, its length away from the open side."""
+SIDE_EYE = (-0.05, 0.45, 2.70)
+"""Position of the camera on the left [m]. From 2.4 m above a storey's floor for each metre before the object on, the
+roof hides what stands as deep as in training."""
+SIDE_AIM = (-0.05, 0.0, TABLE_TOP)
+"""Place in the middle of its picture [m]."""
+EYES = {name: np.array(pos) for name, pos, _ in CAMERAS} | {"sideview": np.array(SIDE_EYE), "robotview": ROBOTVIEW}
+"""Positions of all cameras but that on the hand [m]."""
 GRIP_HEIGHT = 0.042
 """Height of the grip site above the floor of a storey [m]: the palm of a level hand reaches 32 mm below it."""
 MIN_CLEARANCE = 0.007
 """Least clearance between hand and rack on every side [m]: jitter takes 2 mm, moves are exact to 4 mm."""
 ENTER_PACE = Pace(0.15, 0.004)  # pace of the moves into the rack and out of it
+GRIP_DEPTH = 0.025
+"""Distance of the grip site behind the front of a long object [m]: the palm stays 6 mm before it."""
 LIFT_HEIGHT = 0.008
-"""Height by which the cube is lifted before it is drawn out [m]; the clearance above the palm is larger."""
-RELEASE_HEIGHT = 0.09
-"""Height of the grip site above the tray's floor at the release [m]: the palm stays 28 mm above the walls."""
+"""Height by which the object is lifted before it is drawn out [m]; the clearance above the palm is larger."""
+RELEASE_HEIGHT = 0.072
+"""Height of the grip site above the tray's floor at the release [m]: the palm stays 15 mm above the walls."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShelteredGrasp(Scenario):
-    """A cube in a rack that is open on one side, and a tray on the table before it."""
+    """An object in a rack that is open on one side, and a tray on the table before it."""
 
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)
     """Side of the table's middle on which the rack stands. 0 is refuted."""
     rack_x: float = param(-0.06, "m", -0.3, 0.3)
-    rack_y: float = param(0.205, "m", 0.1, 0.3)  # distance of the rack to that side
+    rack_y: float = param(0.212, "m", 0.1, 0.3)  # distance of the rack to that side
     rack_yaw: float = param(0.0, "deg", -60.0, 60.0)
     """Yaw of the rack. At 0 the open side faces the middle; if negative, it faces towards the robot's base, so that the
     hand comes from there."""
     storey: int = param(0, "storey", 0, STOREYS - 1)
     along: float = param(0.03, "m", -0.15, 0.15)
-    """Position of the cube along the open side, from its middle; positive away from the robot."""
-    depth: float = param(0.085, "m", 0.03, 0.12)  # distance of the cube's middle behind the open side
-    cube_yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-    """Yaw of the cube relative to the table, whatever the yaw of the rack."""
+    """Position of the object along the open side, from its middle; positive away from the robot."""
+    depth: float = param(0.061, "m", 0.01, 0.12)
+    """Distance of the object's front behind the open side, if it stands square in the rack."""
+    item: int = param(0, "0 cube, 1 pudding box", 0, 1)
+    yaw: float = param(0.0, "deg", -45.0, 45.0)
+    """Yaw of the object relative to the table, whatever the yaw of the rack."""
     tray_x: float = param(0.11, "m", -0.4, 0.4)
     tray_y: float = param(-0.08, "m", -0.4, 0.4)  # position of the tray, positive to the side of the rack
     rack: TierRack = TierRack()
@@ -92,36 +111,37 @@ class ShelteredGrasp(Scenario):
         scene = table()
         place(scene, rack, "rack", self.foot, self.turn, free=False)
         place(scene, TRAY, "tray", self.tray, free=False)
-        place(scene, self.cube, "cube", self.spot(self.storey, self.along), math.radians(self.side * self.cube_yaw))
+        place(scene, self.thing, "thing", self.spot(self.storey, self.along), math.radians(self.side * self.yaw))
+        aim(scene, "sideview", SIDE_EYE, SIDE_AIM)
         return scene
 
     # --- goal -----------------------------------------------------------------------------
 
     def success(self, world: World) -> bool:
-        low, high = np.array([-TRAY.width, -TRAY.length, 0.0]) / 2, np.array([TRAY.width, TRAY.length, 0.0]) / 2
-        within = inside(world, "cube", "tray", low, high + (TRAY.floor + TRAY.depth) * UP)
-        return within and still(world, "cube", 0.02) and not world.touching(ROBOT, "cube")
+        x, y, _ = world.com("thing") - self.tray
+        between = abs(x) < TRAY.width / 2 and abs(y) < TRAY.length / 2
+        return between and rests_on(world, "thing", "tray") and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
-        return "the cube fell off the table" if fallen(world, "cube") else None
+        return "the thing fell off the table" if fallen(world, "thing") else None
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Enter with a level hand at the cube, grasp it, come out the same way, drop it."""
+        """Enter with a level hand at the object, grasp it, come out the same way, drop it."""
         yield from self.fetch(world, self.spot(self.storey, self.along))
 
     def fetch(self, world: World, spot: Vec3, rot: Mat3 | None = None) -> Plan:
-        """Fetch the cube from a place through the open side.
+        """Fetch the object from a place through the open side.
 
         Args:
-            spot: place of the cube's foot [m].
+            spot: place of the object's foot [m].
             rot: orientation of the hand as it enters; by default level, towards the rack.
         """
         arm, rot, into = world.arm, self.entry if rot is None else rot, self.entry[:, 2]
-        at = spot + GRIP_HEIGHT * UP
-        out = at - (self.depth + 0.12) * into  # 12 cm before the open side
-        away = np.array([0.0, -0.14 * self.side, 0.0])  # a turn drags the hand 0.1 m back towards the rack
+        at = self.grip_at(spot)
+        out = at - (self.depth + GRIP_DEPTH + 0.12) * into  # 12 cm before the open side
+        away = np.array([0.0, -0.17 * self.side, 0.0])  # a turn drags the hand 0.1 m back towards the rack
         yield from go_to(arm, arm.hand + away, pace=COARSE, grip=OPEN)
         yield from go_to(arm, out, rot, STEADY)
         yield from go_to(arm, at, rot, ENTER_PACE)
@@ -131,14 +151,14 @@ class ShelteredGrasp(Scenario):
         yield from self.drop(world)
 
     def drop(self, world: World) -> Plan:
-        """Bring the held cube above the tray with a level hand, and let go.
+        """Bring the held object above the tray with a level hand, and let go.
 
         The hand points 60 deg to the side: straight to the side it could not reach the far end of the table.
         """
         arm, rot = world.arm, facing(self.side * math.radians(60.0), 0.0)
         above = self.tray + (TRAY.floor + RELEASE_HEIGHT) * UP
         yield from go_to(arm, [above[0], above[1], max(above[2], arm.hand[2])], rot, STEADY)
-        yield from go_to(arm, above, rot, STEADY)
+        yield from go_to(arm, above - self.lever * rot[:, 2], rot, STEADY)
         yield from release(arm)
         yield from retreat(arm, 0.05)
 
@@ -159,10 +179,10 @@ class ShelteredGrasp(Scenario):
         }
 
     def _from_above(self, world: World, spot: Vec3) -> Plan:
-        """Grasp the cube from above as if there were no roof."""
+        """Grasp the object from above as if there were no roof."""
         roof = self.foot[2] + self.rack.top
         yield from go_to(world.arm, [spot[0], spot[1], roof + 0.05], facing_down(), COARSE, OPEN)
-        yield from pick(world.arm, spot + GRIP_HEIGHT * UP, self.entry[:, 0], above=0.0)
+        yield from pick(world.arm, self.grip_at(spot), self.entry[:, 0], above=0.0)
         yield from self.drop(world)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
@@ -171,34 +191,36 @@ class ShelteredGrasp(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        rack, half = self.rack, self.cube.edge / 2
+        rack, high = self.rack, float(self.thing.size[2])
         yield require(self.side != 0, "the rack stands neither left nor right", side=self.side)
         yield require(abs(self.along) <= self._max_along, "a wall is in the palm's way", along=self.along)
-        above = rack.height - GRIP_HEIGHT - PALM_ACROSS
-        yield require(above >= MIN_CLEARANCE + LIFT_HEIGHT, "a storey is too low for the hand", room=above)
-        behind = rack.depth - self.depth - max(TIP_BELOW, math.sqrt(2) * half)
-        yield require(behind >= MIN_CLEARANCE, "the cube stands too near to the back", room=behind)
-        before = self.depth - math.sqrt(2) * half
-        yield require(before >= 0.0, "the cube stands out of the rack", room=before)
-        across = OPEN_GAP - math.sqrt(2) * self.cube.edge
-        yield require(across >= MIN_CLEARANCE, "turned askew the cube is too wide for the jaw", across=across)
-        low, high = GRIP_HEIGHT - 0.02, GRIP_HEIGHT + 0.03
-        yield require(
-            low < self.cube.edge < high, "the level hand cannot hold a cube of this height", edge=self.cube.edge
-        )
+        above = rack.height - max(GRIP_HEIGHT + PALM_ACROSS, high)
+        yield require(above >= MIN_CLEARANCE + LIFT_HEIGHT, "a storey is too low", room=above)
+        (_, deep), (across, _) = self.lengths(self.thing.size[1]), self.lengths(2 * GRIP_DEPTH)
+        behind = rack.depth - self.middle_depth - max(TIP_BELOW + MIN_CLEARANCE, deep / 2 + 0.002)
+        yield require(behind >= 0.0, "the object stands too near to the back", room=behind)
+        before = self.middle_depth - deep / 2
+        yield require(before >= 0.0, "the object stands out of the rack", room=before)
+        beside = OPEN_GAP - across
+        yield require(beside >= MIN_CLEARANCE, "turned askew the object is too wide for the jaw", across=beside)
+        yield require(high > GRIP_HEIGHT - 0.02, "the level hand closes above the object", height=high)
+        hidden = min(map(self.hidden_by, EYES.values()))
+        yield require(hidden > 0.0, "a camera that stands still sees the object", hidden_by=hidden)
         yield on_table("the rack or the tray", self.outlines)
         apart = gap(*self.outlines)
         yield require(apart > 0.03, "the tray stands in the way into the rack", apart=apart)
         at = [self.spot(storey, self.along) + GRIP_HEIGHT * UP for storey in range(STOREYS)]
-        yield within_reach("the cube or the tray", *at, self.tray + RELEASE_HEIGHT * UP)
+        yield within_reach("the object or the tray", *at, self.tray + RELEASE_HEIGHT * UP)
 
     def features(self) -> Mapping[str, float]:
-        """Azimuth of the entry [rad], depth over finger length, clearance beside the palm [m], cube to rack [rad]."""
+        """Azimuth of the entry [rad], depth over finger length, clearance beside the palm [m], object to rack [rad],
+        length of the object over its width."""
         return {
             "azimuth": self._azimuth,
-            "depth_over_palm": self.depth / PALM_ABOVE,
+            "depth_over_palm": (self.depth + GRIP_DEPTH) / PALM_ABOVE,
             "room_beside_palm": self.rack.width / 2 - abs(self.along) - PALM_ALONG,
-            "cube_against_rack": math.radians((self.cube_yaw - self.rack_yaw + 45.0) % 90.0 - 45.0),
+            "object_against_rack": math.radians(self.yaw - self.rack_yaw),
+            "length_over_width": float(self.thing.size[1] / self.thing.size[0]),
         }
 
     def facts(self) -> Mapping[str, float | str]:
@@ -241,9 +263,57 @@ class ShelteredGrasp(Scenario):
         """Position of the tray's foot [m]."""
         return np.array([self.tray_x, self.side * self.tray_y, TABLE_TOP])
 
+    @property
+    def thing(self) -> Box:
+        """The object in the rack; the y axis of its body points away from the open side."""
+        return self.cube if self.item == 0 else PUDDING_BOX
+
+    def lengths(self, most: float) -> tuple[float, float]:
+        """Lengths of the object along the open side and away from it, as it stands in the rack [m].
+
+        Args:
+            most: length of it that counts, from its front [m].
+        """
+        turn, (x, y, _) = math.radians(self.yaw - self.rack_yaw), self.thing.size
+        cos, sin, y = abs(math.cos(turn)), abs(math.sin(turn)), min(most, y)
+        return cos * x + sin * y, sin * x + cos * y
+
+    @property
+    def middle_depth(self) -> float:
+        """Distance of the object's middle behind the open side [m]."""
+        return self.depth + float(self.thing.size[1]) / 2
+
+    @property
+    def lever(self) -> float:
+        """Distance from the grip site to the object's middle, which is beyond it in a long object [m]."""
+        return max(0.0, float(self.thing.size[1]) / 2 - GRIP_DEPTH)
+
     def spot(self, storey: int, along: float) -> Vec3:
-        """Place for the cube's foot in a storey [m]; the same `depth` everywhere."""
-        return self.foot + about_z(self.turn) @ self.rack.inside(storey, self.side * along, self.depth)
+        """Place for the object's foot in a storey [m]; the same `depth` everywhere."""
+        return self.foot + about_z(self.turn) @ self.rack.inside(storey, self.side * along, self.middle_depth)
+
+    def grip_at(self, spot: Vec3) -> Vec3:
+        """Position of the grip site for an object whose foot is at a place [m]."""
+        back = about_z(math.radians(self.side * self.yaw)) @ [0.0, -self.side, 0.0]
+        return spot + self.lever * back + GRIP_HEIGHT * UP
+
+    def hidden_by(self, eye: Vec3) -> float:
+        """Distance by which the nearest line of sight from `eye` to the object misses the opening of its storey, in the
+        plane of the open side [m]; negative if one passes."""
+        rack, into = self.rack, about_z(self.turn).T
+        x, y, z = into @ (eye - self.foot)
+        if y >= rack.mouth:
+            return math.inf  # the eye is behind that plane
+        signs = np.array(list(itertools.product((-1, 1), (-1, 1), (0, 2))))
+        turned = about_z(math.radians(self.side * self.yaw))
+        ends = (self.spot(self.storey, self.along) - self.foot + self.thing.size / 2 * signs @ turned.T) @ into.T
+        met = np.array([x, z]) + (ends[:, ::2] - [x, z]) * ((rack.mouth - y) / (ends[:, 1:2] - y))
+        half, low = rack.width / 2, rack.floor(self.storey)
+        opening = np.array([[sx, sz] for sx in (-half, half) for sz in (low, low + rack.height)])
+        sides = np.vstack([np.eye(2), *(met[i + 1 :] - met[i] for i in range(len(met)))])  # separating axes
+        normals = sides[:, ::-1] * [1.0, -1.0] / np.linalg.norm(sides, axis=1, keepdims=True)
+        one, other = met @ normals.T, opening @ normals.T
+        return float(np.maximum(one.min(0) - other.max(0), other.min(0) - one.max(0)).max())
 
     @property
     def outlines(self) -> tuple[Outline, Outline]:

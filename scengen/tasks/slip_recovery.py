@@ -26,8 +26,8 @@ and "sliding the object is not allowed":
   keeps it through the slip, and nothing is left to recover. The rule closes this way, it opens none.
 * Placed means: lifted again after the last slip, and released in the region, at rest. An object that falls into the
   region is not placed.
-* The paper names no YCB object. These are proxies, solids of their size, mass and balance (`assets.ycb`), or the scans
-  if `ycb=FOLDER` is given.
+* The paper names no YCB object. These are proxies, solids of their size, mass and balance with printed labels
+  (`assets.ycb`), or the scans if `ycb=FOLDER` is given.
 * Sliding means: pushed by the robot over the table by `MAX_SLIDE` in total, while the robot touches the object and as
   long as it lies afterwards. Its motion after a fall does not count.
 """

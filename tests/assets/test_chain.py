@@ -60,8 +60,16 @@ def test_whatever_is_wrong_the_first_tile_and_the_slab_stand_where_they_do_in_an
     assert len(feet) == len(intact) - (kind == MISSING)
 
 
-@pytest.mark.parametrize(("side", "room"), [(0, 0.050), (1, 0.020)])
-def test_the_room_between_lanes_is_that_of_the_pieces_that_come_nearest_to_each_other(side, room):
-    """90 mm apart, slabs of 40 mm leave 50; a tile of 25 mm, 37.5 mm to the left, leaves 90 - 37.5 - (25 + 40) / 2."""
+@pytest.mark.parametrize(("side", "room"), [(0, 0.065), (1, 0.0275)])
+def test_the_room_between_lanes_is_that_of_the_tiles_that_come_nearest_to_each_other(side, room):
+    """90 mm apart, tiles of 25 mm leave 65; one that stands 37.5 mm to the left leaves 90 - 37.5 - 25."""
     aside = Defect(kind=GAP, offset=1.5, side=side)
     assert Lanes((chain(aside), chain()), 0.09).room == pytest.approx(room)
+
+
+def test_one_slab_stands_across_all_lanes_but_that_of_the_decoy():
+    """Four lanes of 90 mm with slabs of 40 mm: 3 * 90 + 40. Beside it the decoy's leaves 90 - 40."""
+    lanes = Lanes((chain(Defect(kind=DECOY)), *[chain()] * 4), 0.09)
+    assert lanes.slab.width == pytest.approx(0.31)
+    assert lanes.feet["slab"][1] - lanes.feet["decoy"][1] == pytest.approx(2.5 * 0.09)
+    assert lanes.feet["slab"][0] == pytest.approx(lanes.feet["decoy"][0]) and lanes.room == pytest.approx(0.05)

@@ -8,8 +8,9 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
+from scengen.assets.package import Bottle, Can, Carton, Tin
 from scengen.assets.prop import TABLE_TOP, place, table
-from scengen.assets.ycb import ITEMS, Banana, Bottle, Can, Carton, Item, Tin, Ycb, mesh_of
+from scengen.assets.ycb import ITEMS, Banana, Item, Ycb, mesh_of
 from scengen.errors import BadConfig
 from scengen.export.mesh import united
 from scengen.geometry import quat

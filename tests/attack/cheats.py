@@ -124,7 +124,7 @@ def nudge_the_target(self, world: World) -> Plan:
 
 def topple_the_decoy(self, world: World) -> Plan:
     """Topple the chain that leads to the wrong slab."""
-    lane = next(name.split("_")[1] for name in self.feet if name.startswith("decoy"))
+    lane = next(k for k, chain in enumerate(self.lanes.chains) if chain.astray)
     yield from self.topple(world, f"tile_{lane}_0")
     yield from hold(world.arm, 3.0)
 

@@ -138,6 +138,25 @@ def test_an_episode_begins_in_the_certified_state(row, env):
         np.testing.assert_array_equal(getattr(env.world.data, name), getattr(world.data, name), err_msg=name)
 
 
+@pytest.mark.parametrize("hard_reset", [True, False])
+def test_a_jaw_that_holds_a_cube_at_the_start_holds_it_in_robosuite_and_after_a_reset(hard_reset):
+    row = drawn("cube_toss")
+    env, world = made(row, hard_reset=hard_reset, ignore_done=True), World.load(row.scene_xml, row.embodiment)
+    env.reset()
+    for _ in range(50):
+        env.step(np.array([0.0] * 6 + [-1.0]))
+    assert not env.world.touching("robot", "cube")
+    env.reset()
+    for name in ("qpos", "qvel", "qacc_warmstart", "ctrl", "time"):
+        np.testing.assert_array_equal(getattr(env.world.data, name), getattr(world.data, name), err_msg=name)
+    assert env.world.arm.grip == world.arm.grip == 1.0
+    for _ in range(50):
+        env.step(env.world.idle)
+        world.step(world.idle)
+        assert env.world.touching_bodies("cube") == {"robot"}
+    assert env.world.com("cube") == pytest.approx(world.com("cube"), abs=1e-4)
+
+
 # --- the motion ---------------------------------------------------------------------------
 
 

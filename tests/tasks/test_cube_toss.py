@@ -26,6 +26,7 @@ from scengen.episode import Episode
 from scengen.params import values, with_values
 from scengen.physics import GRAVITY, flight
 from scengen.sim.world import IDLE
+from scengen.skills.grip import take
 from scengen.tasks.cube_toss import RAIL, ROBOT_AXIS, CubeToss
 
 TASK = load_task("cube_toss")
@@ -41,7 +42,7 @@ def thrown(scenario):
             scenario.events(world)
         world.apply(action)
         held = world.touching("robot", "cube")
-        if not held and world.com("cube")[2] > 0.9 and world.time > 3.0:
+        if not held and world.com("cube")[2] > 0.9:
             return world
     raise AssertionError("it was never let go")
 
@@ -57,6 +58,34 @@ class NoRim(CubeToss):
 
     def struck_rim(self, world):
         return False
+
+
+# --- the start ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("split", ["id", "big_cube"])
+def test_the_gripper_holds_the_cube_from_the_start_where_the_scene_says(split):
+    """Both pads touch it, and nothing else does, from the first physics step on; it sinks with the hand only."""
+    scenario = TASK.draw(split, 0, 0).scenario
+    world = load(TASK, scenario)
+    hand, cube = world.arm.hand, world.com("cube")
+    place = world.arm.hand_rot.T @ (cube - hand)
+    assert place == pytest.approx([0.0, scenario.held_beside, scenario.held_below], abs=5e-5)
+    for _ in range(100):
+        world.step(world.idle)
+        assert world.touching_bodies("cube") == {"robot"}
+    assert world.com("cube") - cube == pytest.approx(world.arm.hand - hand, abs=3e-4)
+    assert world.arm.gap == pytest.approx(scenario.cube.edge, abs=6e-4)
+
+
+def test_a_gripper_that_opens_lets_the_cube_fall_and_may_pick_it_up_again():
+    world = load(TASK, TOSS)
+    for _ in range(100):
+        world.step(IDLE)
+    assert world.touching_bodies("cube") == {"table"} and TOSS.failure(world) is None
+    for action in take(world.arm, "cube", lift=0.15):
+        world.step(action)
+    assert world.touching_bodies("cube") == {"robot"}
 
 
 # --- the laws of the task -----------------------------------------------------------------
@@ -155,7 +184,10 @@ def test_the_tray_rides_evenly_and_keeps_its_angular_momentum_when_it_takes_the_
 
 
 def test_where_the_tray_is_when_it_is_thrown_it_falls_behind_it():
-    assert play_shortcut(TASK, RIDE, "throw_it_where_the_tray_was").reason == "the cube fell on the floor"
+    lost = {
+        play_shortcut(TASK, TASK.draw("riding", 0, i).scenario, "throw_it_where_the_tray_was").reason for i in range(3)
+    }
+    assert lost <= {"the cube fell on the floor", "the cube struck the rim of the tray"}
 
 
 def test_straight_ahead_the_table_is_in_the_way():
@@ -211,7 +243,7 @@ def test_a_memorised_throw_misses_elsewhere(split):
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     each_refuted_for_its_own_reason(
         [
-            replace(TOSS, x=0.395),
+            replace(TOSS, held_beside=0.015),
             replace(TOSS, opening=0.065, cube=Cube(edge=0.05)),
             replace(TOSS, distance=0.95),
             replace(TOSS, distance=1.2),

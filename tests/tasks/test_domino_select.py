@@ -1,4 +1,4 @@
-"""Only the intact chain reaches a red slab, by physics and not by rule; an unfair choice gets no certificate."""
+"""Only the intact chain reaches the red slab, by physics and not by rule; an unfair choice gets no certificate."""
 
 import math
 from dataclasses import dataclass, replace
@@ -24,13 +24,13 @@ from scengen.assets.box import Domino
 from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Defect
 from scengen.attack.priors import fit
 from scengen.params import with_values
-from scengen.tasks.domino_select import LANES, SLAB_DISPLACEMENT, DominoSelect
+from scengen.tasks.domino_select import LANES, RED_LANES, SLAB_DISPLACEMENT, DominoSelect
 from scengen.validate.rebuilt import rebuild
 from scengen.validate.rollout import AT_REST, REST_TOLERANCE
 
 TASK = load_task("domino_select")
 SPLITS = ["id", *TASK.axes]
-EVERY_KIND = DominoSelect(fourth=Defect(kind=MISSING, place=0.6), count=3)
+EVERY_KIND = DominoSelect(third=Defect(kind=MISSING, place=0.6), count=3)
 """One chain with each kind of defect."""
 
 
@@ -41,7 +41,7 @@ def lane_of(scenario, kind):
 def strike(scenario, k, spin, rest=REST_TOLERANCE):
     """Give the first tile of chain `k` a spin [rad/s], without robot, and simulate until nothing is faster than `rest`.
 
-    Returns how far the red slab that went farthest has gone [m].
+    Returns how far the red slab has gone [m].
     """
     model = mujoco.MjModel.from_xml_string(rebuild(scenario))
     data = mujoco.MjData(model)
@@ -57,28 +57,28 @@ def strike(scenario, k, spin, rest=REST_TOLERANCE):
     lies = data.body(f"tile_{k}_0").xmat[8] < math.cos(math.radians(45))
     low = scenario.starter.height < scenario.tile.height  # may rock back from a tall neighbour that stands near
     assert lies or (low and met), "the first tile has not fallen"
-    return max(math.dist(data.body(slab).xipos[:2], foot[:2]) for slab, foot in scenario.targets.items())
+    return math.dist(data.body("slab").xipos[:2], scenario.feet["slab"][:2])
 
 
 # --- the law of the task ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("split", "speed"), [("subtle", 0.275), *((split, 0.4) for split in SPLITS)])
-def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_a_red_slab(split, speed):
+def test_however_hard_its_first_tile_is_struck_only_the_intact_chain_reaches_the_red_slab(split, speed):
     """The hand strikes the top of a tile with up to 0.4 m/s, 8 rad/s at 50 mm; below 5 rad/s one may rock back."""
     scenario = TASK.draw(split, 0, 1).scenario
     spin = speed / scenario.starter.height
     # three low tiles, fallen on one another, rock by 1.4 mrad/s
     rest = 3 * REST_TOLERANCE if split == "low_tiles" else REST_TOLERANCE
     reached = [k for k in range(LANES) if strike(scenario, k, spin, rest) >= SLAB_DISPLACEMENT]
-    assert reached == [scenario.intact]
+    assert reached == [scenario.intact_lane]
 
 
 @pytest.mark.parametrize("gap_ratio", [0.9, 1.2, 1.5, 1.8])
 def test_a_chain_stays_intact_as_long_as_its_spaces_are_shorter_than_a_tile_is_tall(gap_ratio):
     """The textbook's reach of a falling tile is its height: 50 mm; the widest space here is 45 mm."""
     scenario = DominoSelect(gap_ratio=gap_ratio, count=3)
-    assert strike(scenario, scenario.intact, 6.0) >= SLAB_DISPLACEMENT
+    assert strike(scenario, scenario.intact_lane, 6.0) >= SLAB_DISPLACEMENT
 
 
 @pytest.mark.parametrize(("stretch", "reaches"), [(1.02, True), (1.07, False), (1.15, False)])
@@ -95,8 +95,8 @@ def test_a_push_at_a_wrong_chain_is_watched_until_all_is_still_and_no_rule_ends_
     assert (ended.outcome, ended.reason) == ("timeout", AT_REST) and ended.seconds < TASK.horizon - 2.0
     assert w.tilt(f"tile_{k}_0") > math.radians(45) and np.abs(w.data.qvel).max() < REST_TOLERANCE
     fallen = [name for name in scenario.feet if w.tilt(name) > math.radians(45)]
-    assert {name.split("_")[1] for name in fallen} == {str(k)}
-    assert (f"decoy_{k}" in fallen) == (kind == DECOY)
+    assert {name.split("_")[1] for name in fallen if name.startswith("tile")} == {str(k)}
+    assert ("decoy" in fallen) == (kind == DECOY) and "slab" not in fallen
 
 
 def test_a_wrong_chain_that_falls_beyond_the_time_limit_is_seen_to_its_end():
@@ -108,7 +108,7 @@ def test_a_wrong_chain_that_falls_beyond_the_time_limit_is_seen_to_its_end():
 
 def test_the_witness_of_one_lane_is_lost_in_another():
     one = TASK.draw("id", 0, 0).scenario
-    other = next(s for s in (TASK.draw("id", 0, i).scenario for i in range(1, 20)) if s.intact != one.intact)
+    other = next(s for s in (TASK.draw("id", 0, i).scenario for i in range(1, 20)) if s.intact_lane != one.intact_lane)
     assert not replayed(TASK, one, other).solved
 
 
@@ -121,23 +121,39 @@ def test_without_the_intact_chain_the_push_that_worked_moves_no_slab():
 
 
 def test_no_lane_is_right_more_often_than_another():
-    """The best of 600 draws, on 600 others: 1 of 5, and as much more as chance may give with a probability of 5 %."""
+    """The best of 600 draws, on 600 others: 1 of 4, and as much more as chance may give with a probability of 5 %."""
     scenarios = [TASK.draw("id", 0, i).scenario for i in range(1200)]
     (best,) = fit(scenarios[:600], fresh=scenarios[600:])
-    assert len(best.values) == 1 and 0.15 < best.fresh <= best.bound <= 0.25
+    assert len(best.values) == 1 and 0.20 < best.fresh <= best.bound <= 0.30
 
 
-def test_where_the_decoys_stand_does_not_tell_the_intact_chain():
-    """Red slabs from right to left, and by their distance from a blue one: whichever is chosen, it is 1 of them all."""
-    found, chance = [], []
+def test_the_side_of_the_decoy_does_not_tell_the_intact_chain():
+    """By its distance from the blue slab: whichever of the four lanes is chosen, it is right in 1 of 4."""
+    found = []
     for scenario in (TASK.draw("id", 1, i).scenario for i in range(600)):
-        blue = [k for k, defect in enumerate(scenario.defects) if defect and defect.kind == DECOY]
-        red = [k for k in range(LANES) if k not in blue]
-        away = {k: min(abs(k - other) for other in blue) for k in red}
-        picked = [red[0], red[1], red[-1], min(red, key=away.__getitem__), max(red, key=away.__getitem__)]
-        found.append([k == scenario.intact for k in picked])
-        chance.append(1 / len(red))
-    assert np.abs(np.mean(found, axis=0) - np.mean(chance)).max() < 3 * math.sqrt(0.28 * 0.72 / len(found))
+        (blue,) = (k for k, defect in enumerate(scenario.defects) if defect and defect.kind == DECOY)
+        assert blue in (0, LANES - 1)
+        found.append([abs(scenario.intact_lane - blue) == away for away in range(1, LANES)])
+    assert np.abs(np.mean(found, axis=0) - 1 / RED_LANES).max() < 3 * math.sqrt(0.25 * 0.75 / len(found))
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_there_is_one_red_slab_and_one_blue_one_and_colour_tells_the_chain_that_leads_astray_alone(split):
+    """The red slab stands before all other first tiles; the blue one before none of them."""
+    for scenario in (TASK.draw(split, 2, i).scenario for i in range(5)):
+        model, across = scenario.build().compile(), np.cross([0.0, 0.0, 1.0], scenario.u)
+        slabs = [name for name in scenario.feet if not name.startswith("tile")]
+        assert sorted(slabs) == ["decoy", "slab"]
+        assert model.geom("slab/box").rgba[0] > 0.7 > 0.2 > model.geom("decoy/box").rgba[0]
+        (blue,) = (k for k, chain in enumerate(scenario.lanes.chains) if chain.astray)
+        for name in slabs:
+            reached = [
+                k
+                for k in range(LANES)
+                if abs((scenario.feet[f"tile_{k}_0"] - scenario.feet[name]) @ across)
+                <= (scenario.lanes.piece(name).width - scenario.tile.width) / 2
+            ]
+            assert reached == ([blue] if name == "decoy" else [k for k in range(LANES) if k != blue])
 
 
 # --- what can be seen ---------------------------------------------------------------------
@@ -156,8 +172,8 @@ def test_tiles_of_all_chains_look_the_same():
     assert {look for name, look in looks.items() if not name.endswith("_0")} == {tuple(np.float32(Domino().rgba))}
 
 
-def test_the_orders_deal_four_different_defects_in_24_ways():
-    assert len({replace(EVERY_KIND, order=n).defects for n in range(24)}) == 24
+def test_the_orders_deal_three_different_defects_in_six_ways():
+    assert len({replace(EVERY_KIND, order=n).defects for n in range(6)}) == 6
 
 
 # --- ways around the choice ---------------------------------------------------------------
@@ -208,7 +224,7 @@ class AllBroken(DominoSelect):
 
     def build(self):
         scene = super().build()
-        scene.delete(scene.body(f"tile_{self.intact}_1"))
+        scene.delete(scene.body(f"tile_{self.intact_lane}_1"))
         return scene
 
     def shortcuts(self):
@@ -242,7 +258,7 @@ def test_every_refutation_has_its_own_reason():
             DominoSelect(gap_ratio=2.1),
             DominoSelect(gap_ratio=0.8),
             DominoSelect(count=3, second=Defect(kind=DRIFT, stretch=1.9)),
-            DominoSelect(first=Defect(kind=DECOY), second=Defect(kind=DECOY), fourth=Defect(kind=DECOY)),
+            DominoSelect(first=Defect(kind=DECOY)),
             DominoSelect(lane=0.05),
             DominoSelect(x=0.3),
             DominoSelect(count=3, x=0.28, y=0.15, heading=180.0),
@@ -255,13 +271,13 @@ def test_every_refutation_has_its_own_reason():
     gap_ratio=st.floats(0.2, 2.5),
     lane=st.floats(0.05, 0.15),
     heading=st.floats(-180.0, 180.0),
-    intact=st.integers(0, LANES - 1),
-    kinds=st.tuples(*[st.integers(GAP, MISSING)] * 4),
+    intact=st.integers(0, RED_LANES - 1),
+    kinds=st.tuples(*[st.integers(GAP, MISSING)] * 3),
 )
 @settings(max_examples=40, deadline=None)
 def test_whatever_is_within_bounds_is_refuted_with_numbers_or_can_be_built(
     count, gap_ratio, lane, heading, intact, kinds
 ):
     scenario = DominoSelect(count=count, gap_ratio=gap_ratio, lane=lane, heading=heading, intact=intact)
-    defects = zip(("first", "second", "third", "fourth"), kinds, strict=True)
+    defects = zip(("first", "second", "third"), kinds, strict=True)
     builds_or_is_refuted(with_values(scenario, {f"{name}.kind": kind for name, kind in defects}))
