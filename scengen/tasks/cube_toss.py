@@ -198,8 +198,8 @@ class CubeToss(Scenario):
         while world.time < opened + 0.2:  # the swing goes on for 0.2 s after the jaw opens
             seconds, place = self.predicted(world)
             out = float((world.com("cube") - ROBOT_AXIS) @ self.u)
-            # Measured: the fingers push the cube on from near by, and to the outer side; from far out they hold it back,
-            # and to the inner side, unless one axis alone drives the hand.
+            # Measured: the fingers push the cube on from near by, and outwards; from far out they hold it back, and
+            # push it inwards, unless one axis alone drives the hand.
             lost, straight = 0.05 * (out - 0.84), 0.92 if self._beyond_diagonal else 0.807
             pushed = 0.17 * (out - straight) * math.copysign(1.0, self.bearing)
             miss = self.tray_after(world, seconds) - place + lost * self.u + pushed * self.across
