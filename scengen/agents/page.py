@@ -10,7 +10,7 @@ from ..pictures.report import template
 from ..work.targets import write
 from .calls import CALLS
 from .questioning import ACT, PLAN, UNDERSTAND
-from .tables import GRADES, by_question, lines, lost_in_twins, plan_errors
+from .tables import GRADES, by_question, lines, lost_in_twins, plan_errors, sighted_lines
 
 TITLES = {UNDERSTAND: "Stage 1: understanding", PLAN: "Stage 2: plan", ACT: "Stage 3: action"}
 """Titles of the stages."""
@@ -18,7 +18,9 @@ SHOWN = 200
 """Largest number of results on a page; the files hold all."""
 
 
-def write_page(folder: Path, results: Sequence[Mapping[str, Any]], model: str) -> Path:
+def write_page(
+    folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, float]]
+) -> Path:
     """Write `report.html` into the folder of a run; pictures stay beside it. Returns its path."""
     calls = [json.loads(line) for line in (folder / CALLS).read_text().splitlines()[1:]]
     by_exam: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
@@ -31,7 +33,8 @@ def write_page(folder: Path, results: Sequence[Mapping[str, Any]], model: str) -
             (TITLES[stage], [cells(line) for line in lines(results, stage)], lost_in_twins(results, stage))
             for stage in stages
         ],
-        questions=by_question(results),
+        questions=by_question(results, priors),
+        sighted=[cells(line) for line in sighted_lines(results, priors)],
         grades=GRADES,
         errors=plan_errors(results),
         results=[

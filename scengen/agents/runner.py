@@ -2,7 +2,7 @@
 
 import itertools
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -24,6 +24,7 @@ from .acting import MODES, SEE, act
 from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
 from .facts import Fact, Sheet
 from .models import Endpoint, Model, Turn, made
+from .priors import prior_shares
 from .questioning import ACT, EMPTY, PLAN, UNDERSTAND, Exam, Result, make_plan, plan_turns, understand, understand_turns
 from .scene import observe, streams
 from .standins import STAND_INS, Key
@@ -145,6 +146,8 @@ class Outcome:
     """Number of new calls."""
     tokens: int
     """Tokens of the new calls."""
+    priors: Mapping[str, Mapping[str, float]]
+    """Share of training in which the best fixed answer is right, by task and question, see `priors.prior_shares`."""
     stopped: str
     """Reason why the run ended before all was asked; empty if it did not."""
 
@@ -181,7 +184,9 @@ def run(
         except OutOfBudget as error:
             stopped = str(error)
         write(folder / f"results-{settings.stage}.jsonl", "".join(json.dumps(r) + "\n" for r in results))
-        return Outcome(results, calls.new, calls.tokens, stopped)
+        tasks = {work.task.name: work.task for work in todo}
+        priors = {name: prior_shares(task, facts.load(task, search)) for name, task in tasks.items()}
+        return Outcome(results, calls.new, calls.tokens, priors, stopped)
 
 
 def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv) -> list[Result]:

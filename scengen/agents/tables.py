@@ -21,13 +21,29 @@ def result_of(plain: Mapping[str, Any]) -> Result:
 
 def lines(results: Sequence[Mapping[str, Any]], stage: int) -> list[TableLine]:
     """The paper's table for one stage, see `evaluate.table.table`: an answer counts as a rollout of its scenario."""
+    found = [(plain, result_of(plain).outcomes) for plain in results if plain["stage"] == stage]
+    return table([_episode(plain, success) for plain, outcomes in found for success in outcomes])
+
+
+MOST_PRIOR = 0.6
+"""Largest share of training in which the best fixed answer may be right for a question to test sight."""
+
+
+def sighted_lines(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Mapping[str, float]]) -> list[TableLine]:
+    """The table of stage 1 for the questions that need a look: a fixed answer is right in at most `MOST_PRIOR` of
+    training. Tasks without such questions have no line; the list is empty if there are none."""
     episodes = [
-        {**{name: plain[name] for name in ("task", "category", "split", "seed", "index")}, "success": success}
+        _episode(plain, grade == "right")
         for plain in results
-        if plain["stage"] == stage
-        for success in result_of(plain).outcomes
+        if plain["stage"] == UNDERSTAND
+        for question, grade in plain["grades"].items()
+        if priors.get(plain["task"], {}).get(question, 1.0) <= MOST_PRIOR
     ]
-    return table(episodes)
+    return table(episodes) if episodes else []
+
+
+def _episode(plain: Mapping[str, Any], success: bool) -> dict[str, Any]:
+    return {**{name: plain[name] for name in ("task", "category", "split", "seed", "index")}, "success": success}
 
 
 @dataclass(frozen=True)
@@ -40,16 +56,21 @@ class QuestionLine:
     """Id of the question."""
     counts: Mapping[str, int]
     """Number of replies by grade."""
+    prior: float | None
+    """Share of training in which the best fixed answer is right; None for hidden state and the simplest plan."""
 
 
-def by_question(results: Sequence[Mapping[str, Any]]) -> list[QuestionLine]:
+def by_question(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Mapping[str, float]]) -> list[QuestionLine]:
     """Grades of stage 1 by question."""
     counts: dict[tuple[str, str], Counter[str]] = {}
     for plain in results:
         if plain["stage"] == UNDERSTAND:
             for question, grade in plain["grades"].items():
                 counts.setdefault((plain["task"], question), Counter())[grade] += 1
-    return [QuestionLine(task, question, dict(found)) for (task, question), found in counts.items()]
+    return [
+        QuestionLine(task, question, dict(found), priors.get(task, {}).get(question))
+        for (task, question), found in counts.items()
+    ]
 
 
 def plan_errors(results: Sequence[Mapping[str, Any]]) -> Counter[str]:

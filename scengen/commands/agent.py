@@ -8,8 +8,9 @@ from pathlib import Path
 from rich.table import Table
 
 from ..agents.page import TITLES, write_page
+from ..agents.questioning import UNDERSTAND
 from ..agents.runner import AgentSettings, Outcome, earlier, prompts, run
-from ..agents.tables import lines, lost_in_twins, markdown, plan_errors
+from ..agents.tables import lines, lost_in_twins, markdown, plan_errors, sighted_lines
 from ..errors import BadConfig
 from ..evaluate.table import cells, plain
 from ..runs.progress import ProgressBar
@@ -56,18 +57,24 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         for row in rows:
             shown.add_row(*cells(row))
         out.print(shown)
+        if stage == UNDERSTAND and (sighted := sighted_lines(found.results, found.priors)):
+            line = sighted[-1]
+            _, _, inside, outside, _ = cells(line)
+            say(f"questions that need a look: ID {inside}, OOD {outside}")
         lost, known = lost_in_twins(found.results, stage)
         if known:
             say(f"right in training, not in the twin: {lost} of {known}")
         write(folder / f"table-{stage}.md", markdown(title, rows))
         told[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
+        if stage == UNDERSTAND:
+            told[stage]["need_a_look"] = plain(sighted_lines(found.results, found.priors))
     if errors := plan_errors(found.results):
         say("plans with errors: " + ", ".join(f"{kind} {count}" for kind, count in sorted(errors.items())))
     formats = Counter(result["stage"] for result in found.results if result["format_error"])
     for stage, count in sorted(formats.items()):
         say(f"{TITLES[stage]}: {count} replies had no valid form")
     write_json(str(folder / f"table-{settings.stage}.json"), {"model": settings.model, "stages": told})
-    page = write_page(folder, found.results, settings.model)
+    page = write_page(folder, found.results, settings.model, found.priors)
     say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")
     if found.stopped:
         remark(f"stopped early: {found.stopped}")

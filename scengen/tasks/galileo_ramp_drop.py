@@ -203,13 +203,12 @@ class GalileoRampDrop(Scenario):
         }
 
     def facts(self) -> Mapping[str, float | str]:
+        release = self.ramp.height(self.release_place)
         return {
             "way": spoken(self.heading),
             "patch": self.ramp.goal,
-            "release": self.ramp.height(self.release_place),
-            "relation": "clearly higher"
-            if self.ramp.height(self.release_place) > 1.15 * self.ramp.goal
-            else "about as high",
+            "release": release,
+            "relation": "clearly higher" if release > 1.15 * self.ramp.goal else "about as high",
         }
 
     # --- geometry ---------------------------------------------------------------------------

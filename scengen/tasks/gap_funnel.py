@@ -240,12 +240,9 @@ class GapFunnel(Scenario):
         }
 
     def facts(self) -> Mapping[str, float | str]:
+        side = "on the left" if self.offset > 0.0 else "on the right"
         return {
-            "side": "on the line"
-            if abs(self.offset) < 0.01
-            else "on the left"
-            if self.offset > 0.0
-            else "on the right",
+            "side": "on the line" if abs(self.offset) < 0.01 else side,
             "aside": abs(self.offset),
             "gap": self.wall.gap,
             "run": self.run,

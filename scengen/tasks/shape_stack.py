@@ -219,13 +219,10 @@ class ShapeStack(Scenario):
         }
 
     def facts(self) -> Mapping[str, float | str]:
+        aside = float(self.cone_spot[1])
         return {
             "shapes": self.count,
-            "cone": "before it"
-            if abs(self.cone_spot[1]) < 0.06
-            else "on its left"
-            if self.cone_spot[1] > 0.0
-            else "on its right",
+            "cone": "before it" if abs(aside) < 0.06 else "on its left" if aside > 0.0 else "on its right",
             "distance": math.dist(self.cone_spot[:2], BASE[:2]),
             "height": sum(piece.shape.height for piece in self.pieces.values()),
         }

@@ -37,7 +37,7 @@ def test_stand_ins_get_what_they_must(tmp_path, model, right, forms):
     outcomes = [outcome for plain in found.results for outcome in runner_outcomes(plain)]
     assert set(outcomes) == {right} and len(found.results) == 6 and not found.stopped
     assert sum(bool(plain["format_error"]) for plain in found.results) == forms
-    grades = {grade for line in by_question(found.results) for grade in line.counts}
+    grades = {grade for line in by_question(found.results, found.priors) for grade in line.counts}
     assert grades <= {"facts": {"right"}, "wrong": {"wrong", "forbidden"}}.get(model, {"format"})
 
 
@@ -48,7 +48,7 @@ def runner_outcomes(plain):
 
 def test_a_blind_model_admits_what_is_hidden_and_learns_from_training_alone(tmp_path):
     found = played(tmp_path, "blind", stage=1)
-    counts = {line.question: line.counts for line in by_question(found.results)}
+    counts = {line.question: line.counts for line in by_question(found.results, found.priors)}
     assert counts["mass"] == {"right": 3} and counts["simplest_plan"] == {"right": 3}
     assert counts["dominoes"].get("right", 0) < 3, "the number of dominoes differs between the three"
 
@@ -102,7 +102,7 @@ def test_a_run_through_an_endpoint_counts_tokens_and_is_graded_again_for_nothing
     with serving([answer]) as (url, requests):
         found = played(tmp_path, "m", url=url, stage=1)
         assert len(requests) == 3 and found.tokens == 3 * 110
-    assert {line.question: line.counts for line in by_question(found.results)}["mass"] == {"right": 3}
+    assert {line.question: line.counts for line in by_question(found.results, found.priors)}["mass"] == {"right": 3}
     capsys.readouterr()
     assert cli.run(["agent", "report", f"to={tmp_path}"]) == 0
     assert "0 new calls" in capsys.readouterr().out
