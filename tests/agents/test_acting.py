@@ -1,0 +1,110 @@
+"""Stage 3: primitives solve tasks through the filter and the controller, and what cannot be carried out is told."""
+
+import json
+from types import SimpleNamespace
+
+import by_hand
+import numpy as np
+import pytest
+from helpers import REFERENCE
+
+from scengen.agents import runner
+from scengen.agents.models import Call, Reply
+from scengen.agents.primitives import BadCall, primitive, tools
+from scengen.agents.runner import AgentSettings, run
+from scengen.envs.gym import PoolEnv
+
+
+def played(folder, monkeypatch, model, seeds=1, mode="poses", pool=REFERENCE):
+    monkeypatch.setattr(runner, "made", lambda name: model)
+    settings = AgentSettings(
+        model="my:model", pool=str(pool), stage=3, seeds=seeds, pictures=False, mode=mode, to=str(folder)
+    )
+    return run(settings, lambda *_: None).results
+
+
+class Scripted:
+    """A model that goes through a list of calls and keeps the prompts."""
+
+    def __init__(self, *calls):
+        self.calls, self.prompts = list(calls), []
+
+    def reply(self, turns, tools, schema, temperature, seed):
+        self.prompts.append(turns[-1].text)
+        call = self.calls.pop(0) if self.calls else ("Done", {"reason": "over"})
+        return Reply("") if call is None else Reply("", (Call(call[0], json.dumps(call[1])),))
+
+
+def test_a_list_written_by_hand_from_the_poses_topples_every_chain(tmp_path, monkeypatch):
+    found = played(tmp_path, monkeypatch, by_hand.Domino(), seeds=5)
+    assert sum(result["grades"]["right"] for result in found) >= 3, [r["grades"]["reason"] for r in found]
+
+
+def test_refused_calls_are_told_and_after_four_of_them_the_robot_holds(tmp_path, monkeypatch):
+    model = Scripted(None, ("Fly", {}), ("Lift", {}), ("Lift", {"dz": "high"}))
+    (result,) = played(tmp_path, monkeypatch, model)
+    first, *again = model.prompts
+    assert "was refused" not in first and len(again) == 4
+    told = ("0 tools were called", "there is no tool 'Fly'", "Lift lacks dz", "Hold(ticks=50): finished")
+    assert all(fault in prompt for fault, prompt in zip(told, again, strict=True))
+    assert result["grades"]["refused"] == 4 and result["grades"]["seconds"] == pytest.approx(0.5)
+    assert result["grades"]["reason"] == "the model says that it is done" and not result["grades"]["right"]
+
+
+def test_the_memory_says_why_a_primitive_stopped_with_neutral_names(tmp_path, monkeypatch):
+    model = Scripted(("CloseGripper", {}), ("Descend", {"z": 0.70}))
+    played(tmp_path, monkeypatch, model)
+    last = model.prompts[-1]
+    assert "Descend(z=0.7): the hand stayed" in last and "touching" in last and "CloseGripper(): finished" in last
+    assert "tile_" not in last and "slab" not in last.replace("red slab", "")
+
+
+def test_poses_are_told_only_in_their_modes(tmp_path, monkeypatch):
+    prompts = {}
+    for mode in ("see", "poses"):
+        model = Scripted()
+        played(tmp_path / mode, monkeypatch, model, mode=mode)
+        (prompts[mode],) = model.prompts
+    assert by_hand.poses(prompts["see"]) == {}
+    things = by_hand.poses(prompts["poses"])
+    position, _, size = things["red slab"]
+    assert position[2] == pytest.approx(0.8, abs=0.002) and size[2] == pytest.approx(0.12, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "says"),
+    [
+        ("MoveEEF", {"pos": [0.0, 0.0]}, "expected 3 finite numbers"),
+        ("MoveEEF", {"pos": [9.0, 0.0, 1.0]}, "from the shoulder"),
+        ("MoveEEF", {"pos": [-0.3, 0.0, 0.45]}, "at least 0.50 m"),
+        ("MoveEEF", {"pos": [0.0, 0.0, 1.0], "quat": [0, 0, 0, 0]}, "length 0"),
+        ("MoveEEF", {"pos": [0.0, 0.0, float("nan")]}, "finite"),
+        ("AtomicAction", {"action": [2.0] * 7, "ticks": 5}, r"in \[-1, 1\]"),
+        ("Hold", {"ticks": 0}, "from 1 to 1000"),
+        ("Hold", {"ticks": True}, "whole number"),
+        ("Lift", {"dz": 0.1, "speed": 3}, "no argument 'speed'"),
+        ("Lift", [], "not a JSON object"),
+    ],
+)
+def test_a_call_out_of_bounds_is_one_line(name, arguments, says):
+    arm = SimpleNamespace(hand=np.array([0.0, 0.0, 1.0]), number=0)
+    arm.world = SimpleNamespace(arms=[arm])
+    with pytest.raises(BadCall, match=says):
+        primitive(Call(name, json.dumps(arguments)), arm.world)
+
+
+def test_all_eight_primitives_are_tools_and_two_arms_are_named():
+    names = [tool.name for tool in tools(1)]
+    paper = ["MoveEEF", "Lift", "Descend", "OpenGripper", "CloseGripper", "AtomicAction", "Hold", "Done"]
+    assert names == paper
+    assert "arm" in tools(2)[0].schema["required"] and "arm" not in tools(1)[0].schema["properties"]
+
+
+def test_the_gripper_keeps_its_last_command():
+    env = PoolEnv("domino_single", str(REFERENCE), action_filter="teleop")
+    env.reset(seed=0)
+    for name, given in (("CloseGripper", {}), ("Lift", {"dz": 0.05})):
+        for action in primitive(Call(name, json.dumps(given)), env.world).plan():
+            env.step(action)
+    assert env.world.arm.grip == 1.0 and env.world.arm.gap < 0.005
+    env.close()
