@@ -15,6 +15,7 @@ import numpy as np
 from PIL import Image
 
 from scengen import list_tasks, load_task
+from scengen.agents import facts
 from scengen.pictures.film import Take, strip
 from scengen.pictures.render import Picture, camera
 from scengen.samplers.axis import spell
@@ -80,6 +81,7 @@ def page(task: Task, certified: Certified, seconds: float) -> str:
             f"*Witness of training scenario {SCENARIO}: {seconds:g} s, from the upper left to the lower right.*",
             "",
             *_facts(task),
+            *_understanding(task),
             *_parameters(task),
             *_axes(task),
             *_plans(certified),
@@ -102,6 +104,35 @@ def _facts(task: Task) -> Iterator[str]:
     yield f"Paper: {task.code}, category {task.category}. Time limit {task.horizon:g} s. Robot: `{task.embodiment}`. "
     yield f"Family: `{task.family.__module__}.{task.family.__name__}`; distributions: `conf/task/{task.name}.yaml`."
     yield ""
+
+
+def _understanding(task: Task) -> Iterator[str]:
+    """Sub-goals in one of the right orders, and the questions with their answers in the scenario that is shown."""
+    sheet, told = facts.load(task), task.draw(ID, 0, SCENARIO).scenario.facts()
+    yield from ("## What it takes", "")
+    rows = []
+    for name, subgoal in sheet.order.items():
+        before = [f"`{one}`" for one, giver in sheet.order.items() if set(giver.gives) & set(subgoal.needs)]
+        notes = [note for note in ("senses", "optional", "repeats") if getattr(subgoal, note)]
+        rows.append((f"`{name}`", subgoal.outcome, ", ".join(before), ", ".join(notes)))
+    yield from _table(("sub-goal", "outcome", "after", "notes"), rows)
+    yield f"What a model is asked ([how](../agents.md)), and the answers in training scenario {SCENARIO}:"
+    yield ""
+    rows = []
+    for name, question in sheet.facts.items():
+        rows.append((question.kind, facts.spoken_question(name, question), _answer(name, question, told)))
+    yield from _table(("kind", "question", "answer"), rows)
+
+
+def _answer(name: str, question: facts.Question, told: Mapping[str, float | str]) -> str:
+    if question.kind == "hidden state":
+        return "cannot be seen"
+    if name in told:
+        value = told[name]
+        return value if isinstance(value, str) else f"{value:.3g} {question.unit}".removesuffix(" 1")
+    if question.shortcut:
+        return question.stuck or f"the reason of `{question.shortcut}` below"
+    return question.right if isinstance(question.right, str) else ", ".join(question.right)
 
 
 def _parameters(task: Task) -> Iterator[str]:

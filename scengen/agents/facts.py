@@ -163,7 +163,7 @@ class Sheet:
         return tuple(self._fact(id_, question, told, shortcuts) for id_, question in self.facts.items())
 
     def _fact(self, id_: str, asked: Question, told: Mapping[str, float | str], shortcuts: Mapping[str, Any]) -> Fact:
-        options, question = _options(asked), asked.ask
+        options, question = _options(asked), spoken_question(id_, asked)
         right: Answer | None = _listed(asked.right)
         if asked.kind == "hidden state":
             right = None
@@ -172,8 +172,6 @@ class Sheet:
             right = (value,) if isinstance(value, str) else float(value)
         elif id_ == SIMPLEST_PLAN:
             right = (_recorded(asked, shortcuts),)
-        if id_ == SIMPLEST_PLAN:
-            question = f"The simplest plan is to {question}. Why does it fail?"
         if isinstance(right, tuple) and id_ == SIMPLEST_PLAN:
             options = tuple(dict.fromkeys((*options, *right)))
         if isinstance(right, tuple) and (strange := [option for option in right if option not in options]):
@@ -204,6 +202,11 @@ def load(task: Task, search: Sequence[str] = ()) -> Sheet:
     sheet = typed("", Sheet, plain)
     sheet.check(task)
     return sheet
+
+
+def spoken_question(id_: str, question: Question) -> str:
+    """A question in full."""
+    return f"The simplest plan is to {question.ask}. Why does it fail?" if id_ == SIMPLEST_PLAN else question.ask
 
 
 def _by_family(id_: str, question: Question) -> bool:
