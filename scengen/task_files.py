@@ -173,6 +173,12 @@ def certified() -> dict[str, dict[str, dict[str, Any]]]:
     return found
 
 
+def paper_lengths() -> dict[str, float]:
+    """Mean lengths of the paper's demonstrations by task [s]: conf/paper_lengths.yaml."""
+    found: dict[str, float] = yaml.safe_load((conf_dir() / "paper_lengths.yaml").read_text())
+    return found
+
+
 def _files(search: tuple[str, ...]) -> dict[str, Path]:
     """The file of each task. Among files of the same name, the one that Hydra uses."""
     named = [_plain(each) for text in search_path(search) for each in text.partition("=")[2].strip("[]").split(",")]

@@ -1,6 +1,5 @@
 """Checks of the rows of one episode. Thresholds are those of lerobot-lint where it has the rule."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import ACTION
-from ..control.osc import STEP
 from ..control.teleop import LARGEST_CHANGE, MOTION
 from ..envs.observations import proprioception
 from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT, STATE
 from ..robots.panda import Names
-from ..skills.motion import RATE
 from .dataset import EpisodeData, Recording
 from .findings import Finding, Severity
 
@@ -28,9 +25,9 @@ FROZEN_FRAMES = 15
 """Number of identical rows, one after the other, beyond which a moving arm's state is frozen (lerobot-lint)."""
 MOVING_ACTION = 0.1
 """Mean action of the motion channels above which the hand must move."""
-MAX_SPEED = math.sqrt(3) * STEP * RATE
-"""Speed limit of a hand: that of an action of 1 in all three directions [m/s]. Twice that is a jump: a hand that also
-turns was seen at 0.83 m/s."""
+MAX_SPEED = 1.7
+"""Speed limit of a hand [m/s], Franka's Cartesian limit for the Panda. Hands were seen at 0.9 m/s here; the replay
+finds smaller jumps."""
 MAX_BODY_JUMP = 0.03
 """Largest displacement of a body between two rows that its velocities do not explain [m]."""
 BLOW_SHARE = 1.0
@@ -165,7 +162,7 @@ def states(subject: Subject) -> Iterator[Finding]:
         arm = Names(number).arm
         place = subject.column(f"{arm}eef_pos")
         jumps = np.linalg.norm(np.diff(place, axis=0), axis=1)
-        limit = 2.0 * MAX_SPEED * period
+        limit = MAX_SPEED * period
         if len(wrong := np.flatnonzero(jumps > limit)):
             yield found(
                 "DISCONTINUITY", f"the hand of {arm}jumps".replace("_", " "), wrong, largest=jumps.max(), limit=limit
@@ -190,7 +187,7 @@ def forces(subject: Subject) -> Iterator[Finding]:
 
 
 def bodies(subject: Subject) -> Iterator[Finding]:
-    """Whether bodies are where their velocities take them."""
+    """Whether bodies are where their velocities take them. An event of the scene may move a body: the replay knows."""
     if ENVIRONMENT not in subject.episode.columns:
         return
     names = subject.recording.info["features"][ENVIRONMENT]["names"]
@@ -206,7 +203,8 @@ def bodies(subject: Subject) -> Iterator[Finding]:
         jumps = np.linalg.norm(np.diff(place, axis=0), axis=1)
         limit = MAX_BODY_JUMP + (1.0 + BLOW_SHARE) * fastest * period
         if len(wrong := np.flatnonzero(jumps > limit)):
-            yield found("TELEPORT", f"{body} moves farther than its velocity takes it", wrong, largest=jumps.max())
+            why = f"{body} moves farther than its velocity takes it, as by an event"
+            yield found("TELEPORT", why, wrong, "warning", largest=jumps.max())
 
 
 CHECKS: Mapping[str, Check] = {

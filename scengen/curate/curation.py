@@ -22,6 +22,7 @@ import numpy as np
 
 from .. import compose
 from ..errors import BadConfig, PoolError, cut
+from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT
 from ..pool.files import replace_file, sha256
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
 from .checks import Subject, check_rows, found
@@ -119,14 +120,14 @@ def _examined(
             findings += _videos(episode, recording)
             made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
             content = sha256(
-                np.ascontiguousarray(episode.columns["control.actions"]).tobytes()
-                + episode.about["scengen/id"].encode()
+                np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + episode.about["scengen/id"].encode()
             )
             if (twin := twins.setdefault(content, episode.number)) != episode.number:
                 findings.append(found("DUPLICATE", f"it repeats episode {twin}", (), "error", episode=twin))
             if settings.replay:
                 task = compose.load_task(episode.task, search)
-                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns))
+                entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
+                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns, entries))
                 made = (*made, "replay")
         about = episode.about
         style = str(about.get("scengen/style", ""))

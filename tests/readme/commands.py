@@ -39,6 +39,7 @@ APART = {
     "scengen demos task=domino_single,packing": "40 demonstrations: a minute",
     "scengen verify pool=generated/domino_single-id-demos": "the demonstrations are not made",
     "scengen curate": "the recording is not made",
+    "scengen stats": "the recording is not made",
     "scengen probe": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
