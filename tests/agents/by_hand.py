@@ -59,3 +59,32 @@ class Block(Listed):
         over, low = {"pos": [x, y, z + 0.15], "quat": turn}, {"pos": [x, y, z + 0.65 * height], "quat": turn}
         reach = [("OpenGripper", {}), ("MoveEEF", over), ("MoveEEF", low)]
         return [*reach, ("CloseGripper", {}), ("Lift", {"dz": 0.12}), ("Hold", {"ticks": 60})]
+
+
+class Carry:
+    """Take the object across its narrow side, go to where the square is now, look again, put it down."""
+
+    def reply(self, turns, tools, schema, temperature, seed):
+        text = turns[-1].text
+        done = 24 - int(re.search(r"(\d+) primitives are left", text)[1])
+        things = poses(text)
+        (x, y, z), quat, (along, across, height) = things["object"]
+        yaw = 2 * math.atan2(quat[2], quat[3]) + (math.pi / 2 if across < along else 0.0)
+        yaw = math.remainder(yaw - math.pi / 2, math.pi) + math.pi / 2  # the way that joint 7 can turn
+        turn = [math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0]
+        square = things["green square"][0]
+        take = [
+            ("OpenGripper", {}),
+            ("MoveEEF", {"pos": [x, y, z + height + 0.10], "quat": turn}),
+            ("MoveEEF", {"pos": [x, y, max(0.812, z + height - 0.03)], "quat": turn}),
+            ("CloseGripper", {}),
+            ("Lift", {"dz": 0.12}),
+        ]
+        over = ("MoveEEF", {"pos": [*square[:2], 0.92 + height / 2]})
+        put = [over] * 8 + [
+            ("Descend", {"z": max(0.814, 0.802 + height - 0.03)}),
+            ("OpenGripper", {}),
+            ("Lift", {"dz": 0.1}),
+        ]
+        name, arguments = [*take, *put, *[("Hold", {"ticks": 50})] * 3, *[("Done", {"reason": "placed"})] * 24][done]
+        return Reply("", (Call(name, json.dumps({**arguments, "reasoning": "by hand"})),))

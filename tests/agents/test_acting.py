@@ -1,6 +1,7 @@
 """Stage 3: primitives solve tasks through the filter and the controller, and what cannot be carried out is told."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import by_hand
@@ -13,6 +14,9 @@ from scengen.agents.models import Call, Reply
 from scengen.agents.primitives import BadCall, primitive, tools
 from scengen.agents.runner import AgentSettings, run
 from scengen.envs.gym import PoolEnv
+
+BASE = Path(__file__).parents[1] / "checker" / "base"
+"""Stored pools of the checker, with one scenario each."""
 
 
 def played(folder, monkeypatch, model, seeds=1, mode="poses", pool=REFERENCE):
@@ -38,6 +42,12 @@ class Scripted:
 def test_a_list_written_by_hand_from_the_poses_topples_every_chain(tmp_path, monkeypatch):
     found = played(tmp_path, monkeypatch, by_hand.Domino(), seeds=5)
     assert sum(result["grades"]["right"] for result in found) >= 3, [r["grades"]["reason"] for r in found]
+
+
+@pytest.mark.parametrize(("model", "pool"), [(by_hand.Block, "mirror_id"), (by_hand.Carry, "ycb_id")])
+def test_lists_written_by_hand_lift_the_block_and_follow_the_square(tmp_path, monkeypatch, model, pool):
+    (result,) = played(tmp_path, monkeypatch, model(), pool=BASE / pool)
+    assert result["grades"]["right"], result["grades"]
 
 
 def test_refused_calls_are_told_and_after_four_of_them_the_robot_holds(tmp_path, monkeypatch):
