@@ -1,12 +1,19 @@
-"""Versions of installed packages, read without importing the packages."""
+"""Versions of the packages that the physics depends on, read without importing the packages."""
 
 import importlib.metadata
 import platform
 from functools import cache
 
+ROBOSUITE = "1.5.2"
+"""Release of robosuite whose Panda is the robot, and whose environments run certified scenarios."""
+
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of every package that the physics depends on, and the platform."""
-    packages = {p: importlib.metadata.version(p) for p in ("scengen", "mujoco", "robosuite", "numpy")}
+    """Versions of every package that the physics depends on, and the platform.
+
+    robosuite's is that of the robot's files (`robots.panda.ASSETS`), whether or not robosuite is installed.
+    """
+    scengen, mujoco, numpy = (importlib.metadata.version(package) for package in ("scengen", "mujoco", "numpy"))
+    packages = {"scengen": scengen, "mujoco": mujoco, "robosuite": ROBOSUITE, "numpy": numpy}
     return {**packages, "platform": f"{platform.system()}-{platform.machine()}"}

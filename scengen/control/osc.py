@@ -49,7 +49,7 @@ PLACES = np.dtype(
         ("qvel", np.int64),
         ("ctrl", np.int64),
         ("ctrlrange", np.int64),
-        ("qM", np.int64),
+        ("M", np.int64),
         ("qfrc_bias", np.int64),
         ("cdof", np.int64),
         ("subtree_com", np.int64),
@@ -66,8 +66,8 @@ PLACES = np.dtype(
     ]
 )
 """Locations in memory. Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first arm
-joint on; qM whole; subtree_com of the robot; position and rotation of the grip site and of the controller's base site.
-Indices: joint angles in qpos, arm rows in qM, arm motors, jaw motors and suction cup in ctrl, first of the cup's four
+joint on; M whole; subtree_com of the robot; position and rotation of the grip site and of the controller's base site.
+Indices: joint angles in qpos, arm rows in M, arm motors, jaw motors and suction cup in ctrl, first of the cup's four
 pads among the geoms."""
 
 STATE = np.dtype(
@@ -128,7 +128,7 @@ def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[
     if model.dof_parentid[dofs[0]] != -1 or (np.diff(dofs) != 1).any():
         raise ValueError("the arm must stand on the ground with consecutive joints; use panda.attach(scene)")
     first = dofs[0]
-    for name in ("qpos", "ctrl", "qM"):
+    for name in ("qpos", "ctrl", "M"):
         found[name] = getattr(data, name).ctypes.data
     found["ctrlrange"] = model.actuator_ctrlrange.ctypes.data
     found["qvel"] = data.qvel[first:].ctypes.data
@@ -138,7 +138,7 @@ def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[
     found["grip_pos"], found["grip_rot"] = data.site_xpos[grip].ctypes.data, data.site_xmat[grip].ctypes.data
     found["base_pos"], found["base_rot"] = data.site_xpos[base].ctypes.data, data.site_xmat[base].ctypes.data
     found["angle"] = [joint.qposadr[0] for joint in joints]
-    found["row"] = model.dof_Madr[dofs]
+    found["row"] = model.M_rowadr[dofs]
     return found
 
 
@@ -271,11 +271,11 @@ def _jacobian(at: np.record, J: NDArray[np.float64]) -> None:
 
 @njit
 def _joint_inertia(at: np.record, M: NDArray[np.float64]) -> None:
-    """The arm's block of the inertia matrix [kg m^2], shape (7, 7). Row i of qM lists joints i to 0."""
+    """The arm's block of the inertia matrix [kg m^2], shape (7, 7). Row i of data.M lists joints 0 to i."""
     for i in range(JOINTS):
-        row = float64s(at.qM + 8 * at.row[i], i + 1)
+        row = float64s(at.M + 8 * at.row[i], i + 1)
         for k in range(i + 1):
-            M[i, i - k] = M[i - k, i] = row[k]
+            M[i, k] = M[k, i] = row[k]
 
 
 @njit

@@ -4,15 +4,39 @@ import logging
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compat import ROBOSUITE_RUNS
+from ..errors import ScengenError
 from ..robots import panda, suction
 from ..sim import scene_text
+from ..versions import ROBOSUITE
 
+
+class NoRobosuite(ScengenError, ImportError):
+    """robosuite's Python code is missing, is another release, or does not run with the installed MuJoCo."""
+
+
+def _check_installed() -> None:
+    """Raise `NoRobosuite` unless robosuite's environments can run here."""
+    remedy = "run pip install 'scengen[robosuite]', in an environment of its own"
+    try:
+        found = version("robosuite")
+    except PackageNotFoundError:
+        raise NoRobosuite(f"no robosuite for its environments; {remedy}") from None
+    if found != ROBOSUITE:
+        raise NoRobosuite(f"certified scenarios run in robosuite {ROBOSUITE}, this is {found}; {remedy}")
+    if not ROBOSUITE_RUNS:
+        raise NoRobosuite(f"robosuite {found} does not run with mujoco {mujoco.__version__}; {remedy}")
+
+
+_check_installed()
 _log = logging.getLogger("robosuite_logs")
 _log.disabled = True  # on import, robosuite recommends packages that are not needed here
 from robosuite.models.base import MujocoXML  # noqa: E402

@@ -11,6 +11,7 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from ..certificate import StoredCertificate, as_json
 from ..sim.world import EMBODIMENTS, action_size
@@ -180,7 +181,7 @@ def arrow_type(kind: Any, size: int) -> pa.DataType:
         return pa.string()
     if origin is tuple:
         return pa.list_(arrow_type(inner[0], size))
-    if origin is np.ndarray:
+    if origin in (np.ndarray, NDArray):  # the latter from numpy 2.5 on
         return pa.list_(pa.list_(pa.float32(), size))
     if origin is UnionType:
         return arrow_type(inner[0], size)

@@ -1,11 +1,10 @@
-"""robosuite's Panda on its mount, composed with MjSpec from the files of the installed robosuite package.
+"""robosuite's Panda on its mount, composed with MjSpec from robosuite's own files, which this package holds.
 
-robosuite itself is never imported: its import is slow and needs GL libraries. Names, masses, poses and everything that
-robosuite sets in Python instead of XML are the same as in its compiled environments. A test compares them all.
+robosuite itself is not needed. Names, masses, poses and everything that robosuite sets in Python instead of XML are the
+same as in its compiled environments. A test compares them all, and the files with those of an installed robosuite.
 """
 
 import functools
-import importlib.util
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..compat import set_damping
 from .jaw import OVERLAP
+
+ASSETS = Path(__file__).parent / "robosuite_assets"
+"""Folder of robosuite's MJCF files and meshes: those of the Panda, its jaw and its mount, under their paths in
+robosuite/models/assets of release `versions.ROBOSUITE`, unchanged."""
 
 JOINTS = 7
 """Number of joints of the arm."""
@@ -223,7 +227,7 @@ def _arm(visual: bool) -> mujoco.MjSpec:
         joint = arm.joint(f"joint{i + 1}")
         joint.armature = ARMATURE[i]
         joint.frictionloss = FRICTIONLOSS
-        joint.damping = DAMPING[i]
+        set_damping(joint, DAMPING[i])
     return arm
 
 
@@ -247,20 +251,11 @@ def _jaw(visual: bool) -> mujoco.MjSpec:
 
 def _load(path: str, visual: bool) -> mujoco.MjSpec:
     """Parse one of robosuite's asset files, in radians, because robosuite includes all of them in radians."""
-    spec = mujoco.MjSpec.from_file(str(_assets() / path))
+    spec = mujoco.MjSpec.from_file(str(ASSETS / path))
     spec.compiler.degree = False
     if not visual:
         strip_visual(spec)
     return spec
-
-
-@functools.cache
-def _assets() -> Path:
-    """The folder of MJCF files inside the installed robosuite package."""
-    found = importlib.util.find_spec("robosuite")
-    if found is None or not found.submodule_search_locations:
-        raise RuntimeError("robosuite, whose files are the robot, is missing: pip install robosuite==1.5.2")
-    return Path(next(iter(found.submodule_search_locations))) / "models" / "assets"
 
 
 FOLDERS = {
@@ -268,7 +263,7 @@ FOLDERS = {
     for names in map(Names, range(MAX_ARMS))
     for prefix, folder in ((names.hand, "grippers"), (names.mount, "bases"), (names.arm, "robots/panda"))
 }
-"""Folder of the meshes of each part inside robosuite's asset folder, by the prefix of their names."""
+"""Folder of the meshes of each part inside `ASSETS`, by the prefix of their names."""
 
 
 def mesh_file(name: str, file: str) -> Path:
@@ -279,7 +274,7 @@ def mesh_file(name: str, file: str) -> Path:
         file: the file that its MJCF names.
     """
     folder = next(folder for prefix, folder in FOLDERS.items() if name.startswith(prefix))
-    return _assets() / folder / file
+    return ASSETS / folder / file
 
 
 def strip_visual(spec: mujoco.MjSpec) -> None:

@@ -40,6 +40,7 @@ import numpy as np
 
 from ..assets.pendulum import Pendulum
 from ..assets.prop import TABLE_TOP, place, table
+from ..compat import set_damping
 from ..control.loop import Loop
 from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar
 from ..params import param
@@ -224,7 +225,7 @@ class PendulumGrasp(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """In an axle with critical damping the bob sinks to the lowest point and stays there."""
         damped = self.build()
-        damped.joint(HINGE).damping = 2.0 * self.pendulum.pace * self.pendulum.inertia
+        set_damping(damped.joint(HINGE), 2.0 * self.pendulum.pace * self.pendulum.inertia)
         return {"no_swing": damped}
 
     def answer(self) -> Answer:

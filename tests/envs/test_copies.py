@@ -7,11 +7,10 @@ import pickle
 import gymnasium
 import numpy as np
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, env_class
 
 import scengen.envs.gym  # noqa: F401  (registers the tasks)
 from scengen.envs.lerobot import LeRobotNames
-from scengen.envs.robosuite import env_class
 from scengen.pool import Pool
 from scengen.sim.world import World
 

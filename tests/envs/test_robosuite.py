@@ -18,12 +18,8 @@ from scengen.assets.prop import servo
 from scengen.certificate import Certificate
 from scengen.cli.program import run as scengen
 from scengen.control.teleop import LARGEST_CHANGE
-from scengen.envs import agreement
-from scengen.envs.agreement import Comparison, compare, compare_all
 from scengen.envs.gym import PoolEnv
 from scengen.envs.object_state import RESOLUTION
-from scengen.envs.robosuite import RobosuiteEnv, env_class
-from scengen.envs.robosuite_models import SceneModel
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
@@ -36,10 +32,15 @@ from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
 from scengen.versions import versions
 
-# isort: split
-import robosuite
+robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+# ruff: noqa: E402
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.wrappers import DataCollectionWrapper, GymWrapper, VisualizationWrapper
+
+from scengen.envs import agreement
+from scengen.envs.agreement import Comparison, compare, compare_all
+from scengen.envs.robosuite import RobosuiteEnv, env_class
+from scengen.envs.robosuite_models import SceneModel
 
 BLIND = {"use_camera_obs": False, "has_offscreen_renderer": False}
 LOOKS = {"geom_group", "geom_rgba", "mesh_polynormal", "mesh_pathadr", "narena", "nbuffer", "nconmax", "njmax"}

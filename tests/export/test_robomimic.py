@@ -6,15 +6,16 @@ import sys
 import h5py
 import numpy as np
 import pytest
-import robosuite
 from helpers import REFERENCE, pictures_are_possible
-from robosuite.environments.base import REGISTERED_ENVS
 
 from scengen import cli
 from scengen.errors import BadConfig
 from scengen.export.recording import RecordSettings, record
 from scengen.pool import Pool
 from scengen.sim.world import World
+
+robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+from robosuite.environments.base import REGISTERED_ENVS  # noqa: E402
 
 PROPRIOCEPTION = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")
 """What robomimic's policies without eyes see by default, besides `object`."""

@@ -14,13 +14,12 @@ from controls import (
     play_shortcut,
     replayed,
 )
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, env_class, pictures_are_possible
 
 from scengen import load_task
 from scengen.assets.bar import Bar
 from scengen.certificate import Certificate
 from scengen.envs.gym import PoolEnv
-from scengen.envs.robosuite import env_class
 from scengen.errors import BadConfig
 from scengen.export import recording
 from scengen.export.lerobot import DatasetWriter
@@ -34,9 +33,6 @@ from scengen.skills.jaw import release
 from scengen.tasks.mirror_pick_place import LIFT_HEIGHT, MIN_PICTURE_OFFSET, VIEWS, MirrorPickPlace
 from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
-
-# isort: split
-from robosuite import macros
 
 TASK = load_task("mirror_pick_place")
 NOMINAL = MirrorPickPlace()
@@ -112,7 +108,7 @@ def test_robosuite_turns_colour_and_depth_bit_by_bit_whichever_row_comes_first(m
             assert not (seen[name] == plain[name]).all()
         assert (seen["cube_pos"] == plain["cube_pos"]).all() and (seen["object-state"] == plain["object-state"]).all()
         assert seen["seen_cube_pos"] == pytest.approx(VIEWS[view].seen_at(plain["cube_pos"]))
-    monkeypatch.setattr(macros, "IMAGE_CONVENTION", "opencv")
+    monkeypatch.setattr("robosuite.macros.IMAGE_CONVENTION", "opencv")
     (colour,), _ = env._create_camera_sensors("agentview", cam_w=48, cam_h=48, cam_d=False, cam_segs=None)
     assert (colour({}) == seen["agentview_image"][::-1]).all()
     env.close()

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from gymnasium.utils.env_checker import check_env
-from helpers import pictures_are_possible
+from helpers import env_class, pictures_are_possible
 from pools import QUICKLY, rewritten
 
 from scengen import cli, compose, conformance, load_task
@@ -19,10 +19,8 @@ from scengen.attack.player import Attempt, Player
 from scengen.attack.retries import retries
 from scengen.attack.variations import rest
 from scengen.control.teleop import Filter
-from scengen.envs.agreement import compare
 from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import cameras_of, proprioception, streams_of
-from scengen.envs.robosuite import env_class
 from scengen.errors import BadConfig, PoolError
 from scengen.evaluate import policies
 from scengen.evaluate.rollouts import BadPolicy, PolicyPlayer, RolloutId
@@ -134,6 +132,8 @@ def test_every_camera_is_in_the_model(rows, embodiment):
 
 def test_robosuite_makes_both_arms_and_comes_to_the_same_verdict(rows):
     made = env_class("push_pair", SEARCH)
+    from scengen.envs.agreement import compare
+
     blind = {"use_camera_obs": False, "has_offscreen_renderer": False}
     env = made(robots=["Panda", "Panda"], scenario=rows[0], **blind)
     assert env.action_dim == 14 and "robot1_eef_pos" in env.reset()
