@@ -5,15 +5,13 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify axes attacks drift docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample axes attacks drift docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)] and "scengen needs Python 3.11 or 3.12; say make PYTHON=...")'
 	$(PYTHON) -m venv $(ENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r constraints.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	@sh tools/install.sh $(BIN)/python
 	@sh tools/opengl.sh
 	$(BIN)/python -c "from scengen.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
 	@touch $(READY)
@@ -35,6 +33,7 @@ ci:
 	$(MAKE) slow
 	$(MAKE) readme
 	$(MAKE) wheel
+	$(MAKE) stack-sample
 	$(MAKE) certify N=1 SPLITS="$(OOD_SPLITS)" TASKS="$(OOD_TASKS)"
 
 test: setup
@@ -90,6 +89,16 @@ TASKS ?=
 certify: setup
 	$(BIN)/python tools/certify_all.py $(N) $(TASKS) $(SPLITS)
 
+# Runs the quick tests and certifies one scenario of each task under other versions of Python, MuJoCo and numpy (hours).
+# STACKS=mujoco4-python3.13 selects stacks.
+STACKS ?=
+stacks: setup
+	$(BIN)/python tools/stacks.py all $(STACKS)
+
+# A sample on MuJoCo 4 with numpy 2 and the Python of make setup (3 minutes).
+stack-sample: setup
+	$(BIN)/python tools/stacks.py sample
+
 # Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
@@ -100,11 +109,12 @@ BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
 
-# Compares verdicts under other versions of MuJoCo and writes docs/drift.md (hours). Uses N scenarios of the pools in POOLS and makes
-# missing ones. TASKS=packing selects tasks. The environments come from the package index.
+# Compares verdicts under several VERSIONS of MuJoCo and writes docs/drift.md (hours). Uses N scenarios of the pools in POOLS and makes
+# missing ones. TASKS=packing selects tasks. An interrupted comparison is continued. The environments come from the package index.
 POOLS ?= generated/drift
+VERSIONS ?= 3.5.0,4.0.0
 drift: setup
-	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(TASKS)
+	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
 
 # Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
 docs: setup

@@ -79,6 +79,13 @@ def quat(axis: str, angle: float) -> list[float]:
     return q
 
 
+def compound(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+    """The rotation `second` followed by `first`, both about fixed axes, as a quaternion (wxyz)."""
+    product = np.empty(4)
+    mujoco.mju_mulQuat(product, np.asarray(first, float), np.asarray(second, float))
+    return product
+
+
 def between(here: Mat3, there: Mat3) -> Vec3:
     """Rotation vector in world axes [rad] that turns `here` into `there`."""
     q, turn = np.empty(4), np.empty(3)

@@ -1,7 +1,10 @@
 """What several tests need."""
 
+import json
+import os
 from pathlib import Path
 
+import mujoco
 import pytest
 from hypothesis import strategies as st
 
@@ -9,7 +12,14 @@ from scengen.params import parameters, with_values
 from scengen.pictures import render
 from scengen.pool import Pool
 
-REFERENCE = Path(__file__).parents[1] / "generated" / "reference"
+ROOT = Path(__file__).parents[1]
+REFERENCE = Path(os.environ.get("SCENGEN_REFERENCE", ROOT / "generated" / "reference"))
+"""The small pool that tests read. Under another MuJoCo than that of the repository's, `make stacks` makes one."""
+STORED_MUJOCO = json.loads((ROOT / "generated" / "reference" / "manifest.json").read_text())["versions"]["mujoco"]
+of_stored_pools = pytest.mark.skipif(
+    mujoco.__version__ != STORED_MUJOCO, reason=f"the pools of the repository were made with mujoco {STORED_MUJOCO}"
+)
+"""Mark of tests that certify or verify with the stored pools."""
 
 
 def anywhere(cls):

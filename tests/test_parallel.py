@@ -1,6 +1,7 @@
 """Workers end when they must, and what they worked on is named."""
 
 import errno
+import math
 import os
 import shlex
 import signal
@@ -15,8 +16,9 @@ from faults import lost, work
 from scengen.commands.settings import read
 from scengen.commands.verify import VerifySettings
 from scengen.errors import BadConfig
-from scengen.work import parallel
-from scengen.work.parallel import Limits, WorkerDied, cores, each
+from scengen.work import machine
+from scengen.work.machine import cores
+from scengen.work.parallel import Limits, WorkerDied, each
 
 LIMITS = Limits(0.5, 200)
 ROOT = Path(__file__).parents[1]
@@ -101,10 +103,10 @@ def test_whoever_leaves_early_waits_for_nobody():
     [("max 100000", 8, 8), ("250000 100000", 8, 2), ("50000 100000", 8, 1), ("800000 100000", 2, 2), (None, 3, 3)],
 )
 def test_no_more_cores_are_used_than_a_container_is_given(quota, bound, told, tmp_path, monkeypatch):
-    monkeypatch.setattr(parallel, "QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(bound)))
     if quota:
-        parallel.QUOTA.write_text(quota)
+        machine.QUOTA.write_text(quota)
     assert cores() == told
 
 
@@ -150,7 +152,7 @@ def test_pictures_in_a_small_address_space_are_refused_in_one_line(kilobytes, tm
 
 def test_a_lack_of_memory_that_comes_from_outside_is_not_the_fault_of_an_item(monkeypatch):
     """Under `ulimit -v` a worker has less than its limit: what does not fit then says nothing about the item."""
-    monkeypatch.setattr(parallel, "_bound_memory", lambda megabytes: False)
+    monkeypatch.setattr(machine, "bound_memory", lambda megabytes: False)
     with pytest.raises(MemoryError):
         list(each(hungry, [1], 1, LIMITS, lost))
     monkeypatch.undo()
@@ -159,3 +161,14 @@ def test_a_lack_of_memory_that_comes_from_outside_is_not_the_fault_of_an_item(mo
 
 def hungry(item):
     raise MemoryError
+
+
+def test_without_what_only_linux_has_work_is_done_all_the_same(monkeypatch):
+    """As on macOS and Windows, where none of it was tried: no copies of processes, no /proc, no limits of memory."""
+    monkeypatch.setattr(machine, "LINUX", False)
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert cores() >= 1 and machine.free_address_space() == math.inf and machine.bound_memory(200)
+    assert sorted(each(work, ["a", "b", "c"], 2, Limits(60, 2000))) == ["a", "b", "c"]
+    with machine.memory_bounded(1):
+        assert len(bytes(10_000_000)) == 10_000_000

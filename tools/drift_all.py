@@ -1,7 +1,10 @@
-"""Every task under other versions of MuJoCo, and docs/drift.md. `python tools/drift_all.py 10 POOLS [task ...]`
+"""Every task under several versions of MuJoCo, and docs/drift.md.
 
-Pools are in POOLS/<task>; missing ones are generated. Results are stored in records/drift. Tasks that were never
-compared have no line.
+    python tools/drift_all.py 2 POOLS 3.5.0,4.0.0 [task ...]
+
+Pools are in POOLS/<task>; missing ones are generated. Results are stored in records/drift, in one folder for each set
+of versions. A task whose pool has been compared is left out: the command can be interrupted and repeated. Tasks that
+were never compared have no line.
 """
 
 import json
@@ -13,20 +16,19 @@ from typing import Any
 from scengen import cli, list_tasks
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
+from scengen.pool import Pool
 from scengen.pool.manifest import MANIFEST
 
-VERSIONS = ("3.3.7", "3.4.0", "3.5.0")
-"""Compared versions of MuJoCo."""
 LEVEL = "recheck"
 """Level of the checks."""
 FOLDER = Path("records/drift")
-"""Folder of the results."""
+"""Folder of the results: a folder for each set of versions, `3.5.0+4.0.0`, with a file for each task."""
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
 Written by `make drift`: the results of `scengen drift` on training scenarios of every task. Each version of MuJoCo has
 an environment of its own, made by venv and pip and kept in `~/.cache/scengen`. Everything else in it (Python, numpy,
-numba, robosuite's files, scengen itself) is that of the running environment, so only MuJoCo differs.
+numba, scengen itself) is that of the running environment, so only MuJoCo differs.
 
 * **same bits**: the witness ends in the same bits, and every repeated check agrees with the certificate.
 * **same verdict**: every repeated check agrees with the certificate; the witness ends in other bits.
@@ -54,31 +56,45 @@ requires packages that scengen does not use). A run that was begun with other pa
 """
 
 
-def main(n: str, pools: str, *tasks: str) -> None:
+def main(n: str, pools: str, versions: str, *tasks: str) -> None:
     """Compare all tasks, or some, and write the page."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    missing = [task for task in tasks or list_tasks() if not compared(task, n, Path(pools, task))]
-    told = [json.loads(path.read_text()) for task in list_tasks() if (path := FOLDER / f"{task}.json").is_file()]
-    PAGE.write_text(page(told))
+    folder = FOLDER / versions.replace(",", "+")
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = []
+    for task in tasks or list_tasks():
+        if not compared(task, n, Path(pools, task), versions, folder / f"{task}.json"):
+            missing.append(task)
+        PAGE.write_text(page(stored()))
     sys.exit(f"not compared: {', '.join(missing)}" if missing else 0)
 
 
-def compared(task: str, n: str, pool: Path) -> bool:
-    """Compare one task, and store the part of the result that the page needs.
+def stored() -> dict[str, list[dict[str, Any]]]:
+    """All stored results, by the set of versions."""
+    return {
+        folder.name: [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
+        for folder in sorted(FOLDER.iterdir())
+    }
+
+
+def compared(task: str, n: str, pool: Path, versions: str, record: Path) -> bool:
+    """Compare one task, and store the part of the result that the page needs, unless it is there.
 
     Returns:
         Whether there is a result.
     """
     if not (pool / MANIFEST).is_file():
         cli.run(("generate", f"task={task}", f"n={n}", f"pool={pool}"))
+    if not (pool / MANIFEST).is_file():
+        return False
+    known = json.loads(record.read_text()) if record.is_file() else {"pools": [], "scenarios": []}
+    if len(known["scenarios"]) == int(n) and Pool.open(pool).sha256 in [one["sha256"] for one in known["pools"]]:
+        return True
     with TemporaryDirectory() as folder:
         found = Path(folder, "drift.json")
-        cli.run(
-            ("drift", f"pool={pool}", f"mujoco=[{','.join(VERSIONS)}]", f"level={LEVEL}", f"n={n}", f"json={found}")
-        )
+        cli.run(("drift", f"pool={pool}", f"mujoco=[{versions}]", f"level={LEVEL}", f"n={n}", f"json={found}"))
         if found.is_file():
             told = json.dumps(shortened(json.loads(found.read_text())), indent=1, sort_keys=True)
-            (FOLDER / f"{task}.json").write_text(f"{told}\n")
+            record.write_text(f"{told}\n")
         return found.is_file()
 
 
@@ -91,29 +107,36 @@ def shortened(result: dict[str, Any]) -> dict[str, Any]:
     return {**result, "pools": list(result["pools"].values())}
 
 
-def page(told: list[dict[str, Any]]) -> str:
-    """The page on the results of some tasks."""
+def page(told: dict[str, list[dict[str, Any]]]) -> str:
+    """The page on the results of some tasks, by the set of versions."""
+    return HEAD + "\n".join(table(results) for results in told.values() if results) + LOCK
+
+
+def table(told: list[dict[str, Any]]) -> str:
+    """The section on the results of some tasks under the same versions."""
     rows = [(task, row, len(one["scenarios"])) for one in told for task, row in one["tasks"].items()]
-    every = {version: total([row[version] for _, row, _ in rows]) for version in VERSIONS}
+    versions = list(told[0]["mujoco"])
+    every = {version: total([row[version] for _, row, _ in rows]) for version in versions}
     count = sum(n for *_, n in rows)
     lines = [
+        f"## MuJoCo {', '.join(versions)}\n",
         f"{count} scenarios of {len(rows)} tasks; `same bits / same verdict / flipped`:\n",
-        f"| task | scenarios | {' | '.join(f'MuJoCo {version}' for version in VERSIONS)} |",
-        "|---|---|" + "---|" * len(VERSIONS),
-        *(_row(task, n, [cell(row[version]) for version in VERSIONS]) for task, row, n in rows),
-        _row("**all**", count, [cell(every[version]) for version in VERSIONS]),
-        _row("flipped, 95 % bound", count, [f"< {_bound(every[version]):.1%}" for version in VERSIONS]),
+        f"| task | scenarios | {' | '.join(f'MuJoCo {version}' for version in versions)} |",
+        "|---|---|" + "---|" * len(versions),
+        *(_row(task, n, [cell(row[version]) for version in versions]) for task, row, n in rows),
+        _row("**all**", count, [cell(every[version]) for version in versions]),
+        _row("flipped, 95 % bound", count, [f"< {_bound(every[version]):.1%}" for version in versions]),
     ]
     if any(each[FLIPPED] for each in every.values()):
         lines += [
-            "\n## What flipped, with its margins\n",
+            "\n### What flipped, with its margins\n",
             "The last column shows the margins of the certificate: successful jittered runs of the oracle, the time at",
             "which the witness reached the goal, and other numerics under which the witness failed.\n",
             "| MuJoCo | scenario | check | now | the certificate |",
             "|---|---|---|---|---|",
             *(f"| {' | '.join(each)} |" for one in told for each in flips(one)),
         ]
-    return HEAD + "\n".join(lines) + "\n" + LOCK
+    return "\n".join(lines) + "\n"
 
 
 def _row(task: str, count: int, told: list[str]) -> str:

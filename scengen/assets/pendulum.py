@@ -27,7 +27,7 @@ from ..geometry import quat
 from ..params import param
 from ..physics import GRAVITY
 from .ball import STEEL_DENSITY
-from .prop import Prop, Rgba, show, shown, solid
+from .prop import Prop, Rgba, carry, show, shown, solid
 
 ROD_RADIUS = 0.002
 """Radius of the rod [m]."""
@@ -87,9 +87,8 @@ class Pendulum(Prop):
             rgba=FRAME_COLOUR,
         )
         along, at = self.length * math.sin(self.angle), self.height - self.length * math.cos(self.angle)
-        frame = body.add_frame(quat=quat("z", self.turn))
         bob = body.add_body(name="bob", pos=[along, 0, at], quat=quat("y", -self.angle))
-        bob.set_frame(frame)
+        carry(bob, (0.0, 0.0, 0.0), quat("z", self.turn))
         self._fill_bob(bob)
 
     def _fill_bob(self, bob: mujoco.MjsBody) -> None:

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry import UP, about_y, axes, quat
+from ..compat import set_multiccd
+from ..geometry import UP, about_y, axes, compound, quat
 from ..params import check_bounds
 from ..robots.panda import HOME_HAND, HOME_TILT, IN_HAND
 from ..robots.suction import LEAKY
@@ -129,6 +130,7 @@ def table() -> mujoco.MjSpec:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 20.0
     option.density, option.viscosity = 1.2, 2e-5
+    set_multiccd(scene, False)
     scene.compiler.degree = False
     scene.compiler.autolimits = True
     _add_visuals(scene)
@@ -200,10 +202,9 @@ def place(
         free: whether the body gets a free joint, named `<name>_free`; else it is fixed.
         turn: orientation (wxyz), in place of `yaw`.
     """
-    orientation = quat("z", yaw) if turn is None else np.asarray(turn).tolist()
-    frame = scene.worldbody.add_frame(pos=np.asarray(pos).tolist(), quat=orientation)
-    body = frame.attach_body(asset.spec().body("body"), f"{name}/", "")
+    body = scene.worldbody.add_frame().attach_body(asset.spec().body("body"), f"{name}/", "")
     body.name = name
+    carry(body, pos, quat("z", yaw) if turn is None else turn)
     if free:
         body.add_freejoint(name=f"{name}_free")
 
@@ -218,6 +219,20 @@ def place_in_hand(scene: mujoco.MjSpec, asset: Prop, name: str, width: float, of
     pos = HOME_HAND + about_y(-HOME_TILT) @ np.asarray(offset, float)
     place(scene, asset, name, pos, turn=quat("y", -HOME_TILT))
     scene.add_numeric(name=IN_HAND, data=[width], size=1)
+
+
+def carry(body: mujoco.MjsBody, pos: ArrayLike, turn: ArrayLike) -> None:
+    """Turn a body about the origin of its parent, then shift it.
+
+    A frame would do the same, but MuJoCo 3 writes the pose of the body into the scene's text and MuJoCo 4 the frame.
+
+    Args:
+        pos: shift [m].
+        turn: rotation (wxyz).
+    """
+    moved = np.empty(3)
+    mujoco.mju_rotVecQuat(moved, body.pos, np.asarray(turn, float))
+    body.pos, body.quat = moved + np.asarray(pos, float), compound(turn, body.quat)
 
 
 def servo(scene: mujoco.MjSpec, joint: str, stiffness: float) -> None:

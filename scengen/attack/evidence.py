@@ -18,13 +18,13 @@ from ..pool.columns import ID, witness
 from ..pool.files import open_plain
 from ..pool.untrusted import (
     MAX_HORIZON,
+    READING_MEMORY,
     SHORT_HASH,
     WORD,
     check_mapping,
     check_match,
     check_text,
     demand,
-    memory_bounded,
     read_json,
 )
 from ..samplers.task import Task
@@ -33,6 +33,7 @@ from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
+from ..work.machine import memory_bounded
 from ..work.targets import write
 from .player import SETTLE_TIME, Attempt, Node, Played, Player
 from .signature import ContactPair, pairs
@@ -115,7 +116,7 @@ class Hit:
         try:
             with (
                 open_plain(path.resolve()) as file,
-                memory_bounded(),
+                memory_bounded(READING_MEMORY),
                 np.load(file, allow_pickle=False) as stored,
             ):
                 about, actions = _plain_hit(read_json(str(stored["about"]))), witness("witness", stored["actions"])

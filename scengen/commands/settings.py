@@ -10,7 +10,8 @@ from ..task_files import groups
 from ..typed import typed
 from ..validate.settings import CertifySettings
 from ..work.cluster import AUTO, Cluster
-from ..work.parallel import Workers, cores
+from ..work.machine import cores
+from ..work.parallel import Workers
 
 T = TypeVar("T")
 

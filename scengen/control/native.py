@@ -8,9 +8,10 @@ have fixed addresses, except those in its arena (contacts, constraints), which m
 
 import ctypes
 import functools
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 import mujoco
@@ -20,17 +21,23 @@ from numba.core.types import ExternalFunction
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+LIBRARIES = {"linux": "libmujoco.so*", "darwin": "libmujoco*.dylib", "win32": "mujoco.dll"}
+"""Names of MuJoCo's library in its wheels, by platform. Only that of Linux was tried."""
+
 
 def _library() -> Path:
     """Path of the shared library that the bindings have already loaded."""
-    found = sorted(Path(mujoco.__file__).parent.glob("libmujoco.so*"))
+    name = LIBRARIES.get(sys.platform, LIBRARIES["linux"])
+    found = sorted(Path(mujoco.__file__).parent.glob(name))
     if not found:
-        raise RuntimeError("mujoco has no libmujoco.so beside it; install its Linux wheel, mujoco==3.5.0")
+        raise RuntimeError(f"mujoco has no {name} beside it; install its wheel: pip install 'mujoco>=3.5,<5'")
     return found[0]
 
 
 llvm.load_library_permanently(str(_library()))
 
+ALIGNMENT = 64
+"""Alignment of MuJoCo's allocations [bytes]: mju_malloc."""
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
 """Signature of two pointers passed as integers: the same registers in the C ABI of x86-64 and aarch64."""
 step = ExternalFunction("mj_step", _MODEL_AND_DATA)
@@ -122,14 +129,16 @@ def warnings(address, stride, kinds):
 
 def silence() -> None:
     """Stop MuJoCo, process-wide, from printing warnings and writing MUJOCO_LOG.TXT. The warnings stay counted."""
-    # The handler takes a C string and its result is ignored: strlen fits and has no side effect.
-    handler = ctypes.cast(ctypes.CDLL(None).strlen, ctypes.c_void_p)
-    ctypes.c_void_p.in_dll(ctypes.CDLL(str(_library())), "mju_user_warning").value = handler.value
+    # The handler takes a C string and its result is ignored: mju_str2Type fits and has no side effect.
+    library = ctypes.CDLL(str(_library()))
+    handler = ctypes.cast(library.mju_str2Type, ctypes.c_void_p)
+    ctypes.c_void_p.in_dll(library, "mju_user_warning").value = handler.value
 
 
 def _unknown(detail: str) -> str:
     """Message of the error for an unknown memory layout."""
-    return f"no contacts found in mjData of mujoco {mujoco.__version__} ({detail}); install mujoco==3.5.0"
+    tried = "install a version that was tried, 3.5.0 or 4.0.0"
+    return f"no contacts found in mjData of mujoco {mujoco.__version__} ({detail}); {tried}"
 
 
 def _sunken_balls(n: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -174,10 +183,20 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
 
 def _words(data: mujoco.MjData, kind: np.dtype) -> NDArray:
     """View of the struct mjData itself as an array of words, as long as its allocation."""
-    usable = ctypes.CDLL(None).malloc_usable_size
-    usable.argtypes, usable.restype = [ctypes.c_void_p], ctypes.c_size_t
-    size = usable(data._address) // kind.itemsize * kind.itemsize
-    return np.frombuffer((ctypes.c_char * size).from_address(data._address), kind)
+    size = _allocated(data._address) // kind.itemsize * kind.itemsize
+    struct: Any = (ctypes.c_char * size).from_address(data._address)
+    return np.frombuffer(struct, kind)
+
+
+def _allocated(address: int) -> int:
+    """Size of an allocation of MuJoCo [bytes]. Only that of Linux was tried."""
+    if sys.platform == "win32":
+        size, more = ctypes.CDLL("ucrtbase")._aligned_msize, (ctypes.c_size_t(ALIGNMENT), ctypes.c_size_t(0))
+    else:
+        libc = ctypes.CDLL(None)
+        size, more = libc.malloc_size if sys.platform == "darwin" else libc.malloc_usable_size, ()
+    size.restype = ctypes.c_size_t
+    return size(ctypes.c_void_p(address), *more)
 
 
 def _followed(words: NDArray, plausible: NDArray, change: int, seen: Callable[[], bool]) -> int:

@@ -16,6 +16,7 @@ import tempfile
 import venv
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -133,12 +134,22 @@ def _make(folder: Path, mujoco: str, shared: str) -> None:
     venv.EnvBuilder(symlinks=True, with_pip=True).create(folder)
     python = folder / "bin" / "python"
     asked = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
-    done = subprocess.run([python, "-m", "pip", *asked, f"mujoco=={mujoco}"], capture_output=True, text=True)
-    if done.returncode:
-        raise BadConfig(_why_not(mujoco, done.stderr))
     (packages,) = (folder / "lib").glob("python*/site-packages")
+    wanted = [f"mujoco=={mujoco}"]
+    while wanted:
+        done = subprocess.run([python, "-m", "pip", *asked, *wanted], capture_output=True, text=True)
+        if done.returncode:
+            raise BadConfig(_why_not(mujoco, done.stderr))
+        wanted = _missing_parts(packages)
     (packages / SHARED).write_text(shared)
     (folder / READY).write_text("")
+
+
+def _missing_parts(packages: Path) -> list[str]:
+    """The distributions into which MuJoCo 4 is divided, `mujoco-core==4.0.0` and others, that are not installed yet."""
+    found = {dist.name: dist for dist in distributions(path=[str(packages)])}
+    parts = [line for line in found["mujoco"].requires or () if line.startswith("mujoco-") and ";" not in line]
+    return [part for part in parts if part.partition("==")[0] not in found]
 
 
 def _why_not(mujoco: str, said: str) -> str:

@@ -23,14 +23,15 @@ from ..fingerprint import fingerprint
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..sim.world import World
 from ..validate.certify import Trial
 from ..validate.claims import wrong_names
-from ..validate.rebuilt import difference
 from ..validate.recheck import BEFORE_WITNESS, WITH_WITNESS
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
 from ..validate.stored import settings_of_manifest, task_of_manifest
 from ..work.parallel import Limits, each
+from .models import model_difference
 
 ORACLES = ("shortcuts", "solved", "robust")
 """Checks of the shortcuts and the oracle, which do not use the witness."""
@@ -65,7 +66,7 @@ class Judgement:
     same_bits: bool
     """Whether the witness ends in the state that the certificate states."""
     scene: str
-    """Difference between the scene that the family builds and that of the pool, beyond rounding; empty if none."""
+    """Difference between the physics of the pool's scene and of that which the family builds; empty if none."""
     checks: tuple[RepeatedCheck, ...] = ()
     """Checks in the order in which they were made."""
     unknown: str = ""
@@ -99,7 +100,7 @@ class Judge:
             found.append(_checked(trial, name))
             if name == "compiles" and not found[-1].passed:
                 return Judgement(row.id, str(row.name), "", False, "", _compared(found, stored))
-        scene = difference(row.scene_xml, trial.text, exact=False)
+        scene = model_difference(World.load(row.scene_xml, row.embodiment).model, trial.world.model)
         witness = replay(scenario, trial.world, row.witness, row.horizon, self.settings.settle)
         numbers = {"outcome": witness.outcome, "seconds": witness.seconds}
         found.append(Check("witness", witness.solved, witness.reason, {"horizon": row.horizon}, numbers))

@@ -4,6 +4,7 @@ Both sides of a ratio work by turns in short slices, of which only the processor
 slows both alike then.
 """
 
+import functools
 import os
 import statistics
 import tempfile
@@ -116,16 +117,14 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     """Measure everything `repeats` times and take the medians of the ratios.
 
     Returns:
-        Tables, the result, and why the machine was not quiet; an empty text if it was.
-
-    Raises:
-        ImportError: robosuite's Python code does not run on this machine.
+        Tables, the result, and why the machine was not quiet; an empty text if it was. Measures of robosuite are
+        missing where it is not installed.
     """
     load, begin = os.getloadavg()[0], _scheduled()
     found = {
         "rollout_to_raw": rollout_to_raw(repeats),
         **two_arms(repeats),
-        "robosuite_to_ours": robosuite_to_ours(repeats),
+        **({} if _no_robosuite() else {"robosuite_to_ours": robosuite_to_ours(repeats)}),
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
         **gym_costs(repeats),
     }
@@ -286,7 +285,7 @@ def gym_costs(repeats: int) -> dict[str, Measure]:
 def costs(repeats: int) -> dict[str, float]:
     """Cost of a control period of 10 ms in each environment with the same scenario and actions, by name [ms].
 
-    Environments with a camera of 256 x 256 pixels are missing if there is no OpenGL.
+    Environments with a camera of 256 x 256 pixels are missing if there is no OpenGL, and those of robosuite without it.
     """
     with _pool() as pool:
         row = next(pool.rows())
@@ -295,16 +294,33 @@ def costs(repeats: int) -> dict[str, float]:
         seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     brief = actions[:CAMERA_PERIODS]
     world = stored_world(row)
-    sides = [_bare(world, actions), _steps_of(bare, actions), _steps_of(_robosuite(row, False), actions)]
-    names = ("MuJoCo: five bare mj_step", "scengen in Gymnasium: proprioception", "robosuite: proprioception")
-    spent = zip(*alternated(sides, repeats), strict=True)
-    found = {name: statistics.median(times) / len(actions) for name, times in zip(names, spent, strict=True)}
+    missing = _no_robosuite()
+    sides = {
+        "MuJoCo: five bare mj_step": _bare(world, actions),
+        "scengen in Gymnasium: proprioception": _steps_of(bare, actions),
+        **({} if missing else {"robosuite: proprioception": _steps_of(_robosuite(row, False), actions)}),
+    }
+    spent = zip(*alternated(list(sides.values()), repeats), strict=True)
+    found = {name: statistics.median(times) / len(actions) for name, times in zip(sides, spent, strict=True)}
+    if missing:
+        found[f"({missing})"] = float("nan")
     try:
         found["scengen in Gymnasium: and one camera"] = _stepping(seeing, brief)
-        found["robosuite: and one camera"] = _stepping(_robosuite(row, True), brief)
+        if not missing:
+            found["robosuite: and one camera"] = _stepping(_robosuite(row, True), brief)
     except NoPictures as error:
         found[f"(no cameras: {error})"] = float("nan")
     return {name: 1000 * seconds for name, seconds in found.items()}
+
+
+@functools.cache
+def _no_robosuite() -> str:
+    """Reason why robosuite's environments do not run here; empty if they do."""
+    try:
+        from ..envs import robosuite_models  # noqa: F401  # here, because robosuite takes seconds
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
 from ..robots.panda import arms
 from ..sim.world import World
-from ..work.parallel import free_address_space
+from ..work.machine import free_address_space
 from . import opengl
 
 Picture = NDArray[np.uint8]

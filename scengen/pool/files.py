@@ -112,7 +112,7 @@ def open_plain(path: Path) -> BufferedReader:
         OSError: it cannot be opened.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, _FLAGS)
     except OSError as error:
         if error.errno == errno.ENOENT:
             raise ValueError(f"it {_MISSING}") from None
@@ -125,6 +125,8 @@ def open_plain(path: Path) -> BufferedReader:
     return open(descriptor, "rb")
 
 
+_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+"""How files are opened. Each platform has some of these flags; Windows follows links."""
 _MISSING = "is missing"
 _NOT_PLAIN = "is not a plain file"
 

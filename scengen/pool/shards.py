@@ -15,12 +15,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..errors import PoolError
+from ..work.machine import memory_bounded
 from . import columns
 from .columns import ID, check_robot
 from .files import MAX_JSON, Identity, open_plain
 from .manifest import FORMAT
 from .row import Layout, PoolRow, layout
-from .untrusted import memory_bounded
+from .untrusted import READING_MEMORY
 
 BATCH_ROWS = 20
 """Number of rows that are read at a time; each may have a scene of some MB."""
@@ -255,7 +256,7 @@ def _batches(
     """Some rows at a time, each read with a bound on memory: what a file says about its sizes may be false."""
     batches = file.iter_batches(rows, groups, columns=list(names), use_threads=False)
     while True:
-        with memory_bounded():
+        with memory_bounded(READING_MEMORY):
             batch = next(batches, None)
         if batch is None:
             return

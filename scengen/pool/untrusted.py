@@ -3,10 +3,7 @@
 import json
 import math
 import re
-import resource
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 from ..certificate import from_json
@@ -154,20 +151,3 @@ def check_versions(value: Any) -> None:
         check_text(f"the version of {name[:40]!r}", version, 100)
     for name in ("mujoco", "robosuite"):
         demand(name in value, f"versions lacks {name}")
-
-
-@contextmanager
-def memory_bounded(more: int = READING_MEMORY) -> Iterator[None]:
-    """Limit the memory that this process may take in addition to what it has, while unknown data is unpacked.
-
-    Args:
-        more: the limit [bytes].
-    """
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    bound = taken + more if soft == resource.RLIM_INFINITY else min(soft, taken + more)
-    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

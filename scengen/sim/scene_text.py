@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 
 import mujoco
 
+from ..compat import from_mjcf, to_mjcf
 from ..errors import BadConfig
 
 COUNTED_KINDS = (
@@ -33,9 +34,9 @@ def emit(spec: mujoco.MjSpec) -> tuple[str, dict[str, str]]:
         ValueError: MuJoCo cannot compile the scene.
     """
     spec.compile()
-    text = spec.to_xml()
+    text = to_mjcf(spec)
     check(text)
-    again = mujoco.MjSpec.from_string(text)
+    again = from_mjcf(text)
     counts = {kind: (len(getattr(spec, kind)), len(getattr(again, kind))) for kind in COUNTED_KINDS}
     return text, {kind: f"{a} -> {b}" for kind, (a, b) in counts.items() if a != b}
 

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..compat import from_mjcf
 from ..control.loop import ACTION, Loop
 from ..control.teleop import Filter
 from ..errors import NoEvent, UnknownName, Unstable
@@ -82,7 +83,7 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
     The text is parsed anew, so that exactly the scene on disk is simulated.
     """
     scene_text.check(scene_xml)
-    scene = mujoco.MjSpec.from_string(scene_xml)
+    scene = from_mjcf(scene_xml)
     if not visual:
         panda.strip_visual(scene)
     named = all_hands(embodiment)

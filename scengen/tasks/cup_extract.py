@@ -38,6 +38,7 @@ from ..assets.box import Block
 from ..assets.cup import Cup
 from ..assets.patch import Patch
 from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
+from ..compat import set_multiccd
 from ..geometry import UP, Vec3, about_y, about_z, heading, polar, spoken, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -94,7 +95,7 @@ class CupExtract(Scenario):
     def _scene(self, cup: Cup) -> mujoco.MjSpec:
         scene, turn = table(), math.radians(self.handle)
         # An edge that lies on the wall by one point rocks, and creeps down at 10 mm/s far from the angle of friction.
-        scene.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
+        set_multiccd(scene, True)
         place(scene, cup, "cup", self.foot, turn)
         place(scene, self.block, "block", self.foot + cup.floor * UP, turn)
         place(scene, self.patch, "patch", self.goal, free=False)

@@ -38,7 +38,7 @@ from ..assets.box import Block
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.seesaw import Seesaw, standing
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_z, heading, quat, spoken
+from ..geometry import UP, Mat3, Vec3, about_z, compound, heading, quat, spoken
 from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
@@ -95,8 +95,8 @@ class SeesawBalance(Scenario):
         scene.option.solver = mujoco.mjtSolver.mjSOL_CG
         place(scene, replace(self.seesaw, tilt=tilt), "seesaw", self.foot, yaw, free=False)
         place(scene, self.weight, "weight", self.start, yaw + math.radians(self.weight_yaw))
-        place(scene, self.target, "target", self.on_deck(self.offset, tilt), yaw)
-        scene.body("target").quat = np.array(quat("y", tilt))
+        turn = compound(quat("z", yaw), quat("y", tilt))
+        place(scene, self.target, "target", self.on_deck(self.offset, tilt), turn=turn)
         return scene
 
     # --- goal -----------------------------------------------------------------------------

@@ -1,22 +1,20 @@
 """Work in multiple processes with limits on time and memory; results come as they are ready."""
 
-import ctypes
 import math
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 
 from ..control import native
 from ..errors import ScengenError
+from . import machine
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -49,19 +47,6 @@ class Limits:
 
 UNTRUSTED_LIMITS = Limits(300.0, 4000)
 """Limits on showing, exporting or recording one scenario of a pool, which is not trusted. Seconds usually suffice."""
-
-
-QUOTA = Path("/sys/fs/cgroup/cpu.max")
-"""File with the processor time of a container: microseconds in a period of microseconds, or `max`."""
-
-
-def cores() -> int:
-    """Number of cores that this process may use: those that it is bound to, and at most the quota of its container."""
-    allowed = len(os.sched_getaffinity(0))
-    with suppress(OSError, ValueError):  # not in a container, or in one with cgroups of version 1
-        quota, period = QUOTA.read_text().split()
-        allowed = allowed if quota == "max" else min(allowed, int(quota) // int(period))
-    return max(1, allowed)
 
 
 @runtime_checkable
@@ -103,7 +88,8 @@ def each(
     Args:
         function: can be pickled, like items and results. It is sent once to each worker: it may be large, and what it
             stores between items stays in the process of the worker.
-        limits: limits on each item. Workers are then copies of this process, which start in milliseconds (see `fork`).
+        limits: limits on each item. On Linux workers are then copies of this process, which start in milliseconds (see
+            `fork`).
         lost: makes the result of an item that has crashed its worker, or has reached a limit, from the reason.
         fork: whether workers with limits are copies of this process; a process with threads must not be copied.
 
@@ -116,7 +102,7 @@ def each(
     if workers == 1 and limits is None:
         yield from map(function, items)
         return
-    method = "fork" if fork and limits is not None else "spawn"
+    method = "fork" if fork and limits is not None and machine.LINUX else "spawn"
     remaining, crew = iter(items), [_Worker(function, limits, method) for _ in range(max(1, workers))]
     try:
         while busy := _busy(crew, remaining):
@@ -245,13 +231,8 @@ class _Worker:
         self._kill()
 
     def _processor_time(self) -> tuple[float, bool]:
-        """Processor time that the process has used [s], and whether it is suspended. Both are 0 if it has ended."""
-        try:
-            state, *numbers = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            return 0.0, False
-        user, system = int(numbers[10]), int(numbers[11])  # utime and stime in proc(5), which counts from 1
-        return (user + system) / os.sysconf("SC_CLK_TCK"), state in "Tt"
+        """Processor time that the process has used [s], and whether it is suspended."""
+        return machine.processor_time(self._process.pid)
 
     def _begin(self) -> None:
         if self._process is None:
@@ -272,15 +253,13 @@ class _Worker:
         with theirs:
             arguments = (theirs, self._function, self._limits, os.getpid())
             process = self._context.Process(target=_serve, args=arguments, daemon=True)
-            # Inherited: Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-            try:
-                process.start()
-            except BaseException:
-                ours.close()
-                raise
-            finally:
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+            # Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
+            with machine.interrupts_blocked():
+                try:
+                    process.start()
+                except BaseException:
+                    ours.close()
+                    raise
         self.connection, self._process = ours, process
         if self._limits:  # an item does not pay for the start of a process
             with suppress(EOFError, OSError):
@@ -296,7 +275,7 @@ class _Worker:
             return None
         self.busy = False
         how = f"was ended by {signal.Signals(-code).name}" if code is not None and code < 0 else f"ended with {code}"
-        if free_address_space() < math.inf:
+        if machine.free_address_space() < math.inf:
             how += ", in an address space that is limited from outside (ulimit -v)"
         return _Lost(self._item, f"died: it {how}")
 
@@ -330,16 +309,11 @@ def _answers(busy: Sequence[_Worker], limits: Limits | None) -> Iterator[_Result
 
 def _serve(orders: Connection, function: Callable[[Any], Any], limits: Limits | None, parent: int) -> None:
     """Run a worker process: items in, results out, until the parent closes the connection or dies."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles interrupts
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
+    machine.leave_interrupts_to(parent)
     counted = limits
     if limits is not None:
-        _close_all_but(orders.fileno())
-        if not _bound_memory(limits.megabytes):  # then a lack of memory is the machine's, and not the item's
+        machine.close_all_but(orders.fileno())
+        if not machine.bound_memory(limits.megabytes):  # then a lack of memory is the machine's, and not the item's
             counted = None
     native.silence()
     if limits is not None:
@@ -375,40 +349,3 @@ def portable(error: Exception) -> bytes:
 
 _READY = b"ready"
 """First message of a process with limits."""
-_PR_SET_PDEATHSIG = 1
-"""Option of prctl: the signal that a process gets when its parent dies (linux/prctl.h)."""
-
-
-def _close_all_but(kept: int) -> None:
-    """Close the files that a copied process inherits from its parent: locks, the journal, ends of other pipes."""
-    for name in os.listdir("/proc/self/fd"):
-        if int(name) > 2 and int(name) != kept:
-            try:
-                os.close(int(name))
-            except OSError:
-                pass
-
-
-def free_address_space() -> float:
-    """Address space that this process may still take [bytes]: infinite unless it is limited (`ulimit -v`)."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return math.inf if soft == resource.RLIM_INFINITY else soft - _address_space()
-
-
-def _bound_memory(megabytes: int) -> bool:
-    """Limit the address space of this process to what it has now and `megabytes` more.
-
-    Returns:
-        Whether it has this room. It has less if the command was started under a lower limit (`ulimit -v`).
-    """
-    room = free_address_space()
-    if wide_enough := room >= megabytes * 1_000_000:
-        bound = _address_space() + megabytes * 1_000_000
-        resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    return wide_enough
-
-
-def _address_space() -> int:
-    """Address space of this process [bytes]."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

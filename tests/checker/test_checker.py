@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from checkers import CONTROLS, EASY
+from helpers import of_stored_pools
 from make_base import BASE, KEPT, POOLS, expired
 from make_corpus import cases, write
 
@@ -57,6 +58,7 @@ def test_the_whole_corpus_can_be_made(tmp_path):
 
 
 @pytest.mark.slow
+@of_stored_pools
 def test_every_pool_gets_the_verdict_that_it_deserves_and_the_reason(report):
     wrong = {o["name"]: (o["why"], o["text"][-400:]) for o in report["outcomes"]["scengen"] if o["why"]}
     assert not wrong
@@ -64,6 +66,7 @@ def test_every_pool_gets_the_verdict_that_it_deserves_and_the_reason(report):
 
 
 @pytest.mark.slow
+@of_stored_pools
 def test_no_control_does_well(report):
     """Else the corpus would not test what verification is for."""
     scores = {score["checker"]: score for score in report["scores"]}

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, of_stored_pools
 from pools import certificate_of
 
 from scengen import cli, compose, load_task
@@ -31,6 +31,7 @@ from scengen.validate.stored import settings_of_manifest, task_of_manifest
 from scengen.validate.verify import Examiner, Options, _Run, verify
 from scengen.work.parallel import Limits
 
+pytestmark = of_stored_pools
 SHARD = "scenarios-00000.parquet"
 BASE = Path(__file__).parents[1] / "checker" / "base"
 SOURCES = {"single": REFERENCE, "cage": BASE / "cage_id", "tool": BASE / "tool_id"}

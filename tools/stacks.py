@@ -1,0 +1,172 @@
+"""The tests and certificates under several versions of Python, MuJoCo and numpy, and docs/stacks.md's table.
+
+    python tools/stacks.py sample                    # one small sample on MuJoCo 4, for CI
+    python tools/stacks.py all [STACK ...]           # quick tests, and one scenario of each task
+
+Each stack has an environment below build/stacks, into which pip resolves scengen without overrides. A stack whose
+Python is missing is reported as not tried. Results are stored in records/stacks.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "build" / "stacks"
+RECORDS = ROOT / "records" / "stacks"
+TESTS = (
+    "pytest",
+    "pytest-xdist",
+    "hypothesis",
+    "av",
+    "h5py",
+    "trimesh",
+    "rtree",
+    "coacd",
+    "scikit-learn",
+    "markdown-it-py",
+)
+"""Packages that the tests need."""
+SAMPLE_TASKS = ("domino_single", "cup_extract")
+"""Tasks of the sample: the smallest one, and the one whose scene depends on a flag that MuJoCo 4 has inverted."""
+SAMPLE_TESTS = ("tests/control", "tests/sim", "tests/robots", "tests/skills", "tests/drift")
+
+
+@dataclass(frozen=True)
+class Stack:
+    """An environment."""
+
+    name: str
+    python: str
+    """Version of Python; empty for that of this process."""
+    requirements: tuple[str, ...]
+    """Requirements beside scengen."""
+
+
+STACKS = (
+    Stack("mujoco4", "", ("mujoco==4.0.0", "numpy>=2")),
+    Stack("mujoco4-python3.12-lerobot", "3.12", ("mujoco==4.0.0", "numpy>=2", "lerobot>=0.6,<0.7")),
+    Stack("mujoco4-python3.13", "3.13", ("mujoco==4.0.0", "numpy>=2")),
+    Stack("mujoco4-python3.14", "3.14", ("mujoco==4.0.0", "numpy>=2")),
+)
+"""Stacks beside that of `make setup`, which `make ci` tests."""
+
+
+def main(what: str = "", *names: str) -> None:
+    """Try stacks, and end with status 1 if one fails."""
+    known = {stack.name: stack for stack in STACKS}
+    if what not in ("sample", "all") or set(names) - set(known):
+        sys.exit(f"say stacks.py sample, or stacks.py all [{' | '.join(known)}]")
+    failed = []
+    for stack in STACKS[:1] if what == "sample" else [known[name] for name in names or known]:
+        interpreter = found_python(stack.python)
+        if not interpreter:
+            print(f"{stack.name}: not tried: no python{stack.python} on this machine", flush=True)
+        elif not (sampled if what == "sample" else tried)(made(stack, interpreter), stack):
+            failed.append(stack.name)
+    sys.exit(f"failed: {', '.join(failed)}" if failed else 0)
+
+
+def found_python(version: str) -> str:
+    """Path of an interpreter: on the path, or one of pyenv's; empty if there is none."""
+    if not version:
+        return sys.executable
+    own = sorted((Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python"))
+    return shutil.which(f"python{version}") or (str(own[-1]) if own else "")
+
+
+def made(stack: Stack, interpreter: str) -> Path:
+    """The interpreter of a stack's environment, which is made if it is missing."""
+    folder = FOLDER / stack.name
+    python = folder / "bin" / "python"
+    wanted = "\n".join([interpreter, *stack.requirements, *TESTS, (ROOT / "pyproject.toml").read_text()])
+    ready = folder / "ready"
+    if not ready.is_file() or ready.read_text() != wanted:
+        shutil.rmtree(folder, ignore_errors=True)
+        subprocess.run([interpreter, "-m", "venv", folder], check=True)
+        told = ["--quiet", "--disable-pip-version-check"]
+        subprocess.run([python, "-m", "pip", "install", *told, "-e", ROOT, *stack.requirements, *TESTS], check=True)
+        ready.write_text(wanted)
+    return python
+
+
+def runner(python: Path, stack: Stack) -> Callable[..., bool]:
+    """A function that runs a module of Python in an environment, and returns whether it succeeded."""
+    places = {
+        "NUMBA_CACHE_DIR": str(FOLDER / f"{stack.name}-numba"),
+        "SCENGEN_REFERENCE": str(FOLDER / f"{stack.name}-pool"),
+    }
+    environment = {**os.environ, **places}
+
+    def run(*words: str) -> bool:
+        print(f"{stack.name}: {' '.join(words)}", flush=True)
+        return subprocess.run([python, "-m", *words], cwd=ROOT, env=environment).returncode == 0
+
+    return run
+
+
+def fresh(stack: Stack, name: str) -> str:
+    """Folder for a pool of a stack, which is not there yet."""
+    folder = FOLDER / f"{stack.name}-{name}"
+    for path in (folder, folder.with_name(f"{folder.name}.run")):
+        shutil.rmtree(path, ignore_errors=True)
+    return str(folder)
+
+
+def sampled(python: Path, stack: Stack) -> bool:
+    """Tests of control, simulation and moves; pools of two tasks, verified here and compared under MuJoCo 3.5."""
+    run, good = runner(python, stack), True
+    for task in SAMPLE_TASKS:
+        pool = fresh(stack, task)
+        good &= run("scengen", "generate", f"task={task}", "n=1", f"pool={pool}") and run(
+            "scengen", "verify", f"pool={pool}"
+        )
+    good &= run("scengen", "drift", f"pool={FOLDER / f'{stack.name}-{SAMPLE_TASKS[0]}'}", "mujoco=[3.5.0,4.0.0]")
+    return good & run("pytest", "-q", "-p", "no:cacheprovider", *SAMPLE_TESTS)
+
+
+def tried(python: Path, stack: Stack) -> bool:
+    """The quick tests, and one scenario of each task, certified and verified. The result is stored."""
+    run = runner(python, stack)
+    made = run("scengen", "generate", "task=domino_single", "n=6", "workers=2", f"pool={fresh(stack, 'pool')}")
+    tests = made and run("pytest", "-q", "-p", "no:cacheprovider", "-n", "2", "--dist", "loadfile")
+    verdicts = dict(certified(run, stack))
+    about = json.loads(subprocess.run([python, "-c", ABOUT], capture_output=True, text=True, check=True).stdout)
+    RECORDS.mkdir(parents=True, exist_ok=True)
+    record = {**about, "quick tests": tests, "tasks": verdicts}
+    (RECORDS / f"{stack.name}.json").write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+    return tests and all(verdicts.values())
+
+
+ABOUT = """
+import json, platform
+from importlib.metadata import PackageNotFoundError, version
+found = {"python": platform.python_version()}
+for name in ("mujoco", "numpy", "numba", "pyarrow", "robosuite", "lerobot", "torch"):
+    try:
+        found[name] = version(name)
+    except PackageNotFoundError:
+        pass
+print(json.dumps(found))
+"""
+"""Program that prints the versions of an environment."""
+
+
+def certified(run: Callable[..., bool], stack: Stack) -> Iterator[tuple[str, bool]]:
+    """Every task, and whether its first scenario was certified and verified."""
+    for task in sorted(path.stem for path in (ROOT / "conf" / "task").glob("*.yaml")):
+        pool = fresh(stack, task)
+        yield (
+            task,
+            run("scengen", "generate", f"task={task}", "n=1", f"pool={pool}")
+            and run("scengen", "verify", f"pool={pool}"),
+        )
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
