@@ -34,7 +34,7 @@ TESTS = (
 """Packages that the tests need."""
 SAMPLE_TASKS = ("domino_single", "cup_extract")
 """Tasks of the sample: the smallest one, and the one whose scene depends on a flag that MuJoCo 4 has inverted."""
-SAMPLE_TESTS = ("tests/control", "tests/sim", "tests/robots", "tests/skills", "tests/drift")
+SAMPLE_TESTS = ("tests/control", "tests/sim", "tests/robots", "tests/skills")
 
 
 @dataclass(frozen=True)
