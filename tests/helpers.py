@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 from hypothesis import strategies as st
 
@@ -26,6 +27,13 @@ def anywhere(cls):
     """Any instance within its own bounds."""
     values = {p.name: (st.integers if p.integer else st.floats)(p.low, p.high) for p in parameters(cls())}
     return st.fixed_dictionaries(values).map(lambda drawn: with_values(cls(), drawn))
+
+
+def shift(body, offset):
+    """Move a body of a scene by an offset in its own axes [m]."""
+    turned = np.empty(3)
+    mujoco.mju_rotVecQuat(turned, np.asarray(offset, float), body.quat)
+    body.pos = body.pos + turned
 
 
 def env_class(task, search=()):

@@ -4,6 +4,7 @@ It repeats what the manifest says, which counts, and adds the packages that the 
 may be of unknown origin: only its lines about packages that the code of a verdict imports are ever used.
 """
 
+import importlib.metadata
 import platform
 import re
 from collections.abc import Mapping
@@ -48,8 +49,16 @@ def lock_text(family: type[Scenario], versions: Mapping[str, str], fingerprint: 
         f"processor {binding.get_host_cpu_name()}: {able}",
         f"rounds as {fingerprint}",
     ]
-    lines = [f"{name}=={told}" for name, told in needed(family, versions).items()]
+    lines = [f"{name}=={told}" for name, told in needed(family, versions).items() if _installed(name)]
     return "\n".join([*(f"# {line}" for line in about), *lines]) + "\n"
+
+
+def _installed(name: str) -> bool:
+    """Whether a package is installed. robosuite need not be: the manifest names the release of the robot's files."""
+    try:
+        return bool(importlib.metadata.version(name))
+    except importlib.metadata.PackageNotFoundError:
+        return False
 
 
 def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -> str:

@@ -195,8 +195,7 @@ class Outside(BallCageEscape):
 
     def build(self):
         scene = super().build()
-        start = self.foot + np.array([self.ball_x, self.ball_y, self.cage.wall + self.ball.radius])
-        scene.body("ball").pos = [0.2, 0.0, TABLE_TOP + self.ball.radius] - start
+        scene.body("ball").pos = [0.2, 0.0, TABLE_TOP + self.ball.radius]
         return scene
 
 

@@ -16,6 +16,7 @@ from controls import (
     replayed,
     unguarded,
 )
+from helpers import shift
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -205,7 +206,7 @@ class Mended(DominoSelect):
         scene, k = super().build(), lane_of(self, GAP)
         defect = self.defects[k]
         tile = scene.body(f"tile_{k}_{defect.broken(self.count)}")
-        tile.pos = [0.0, -(2 * defect.side - 1) * defect.offset * self.tile.width, 0.0]  # in the frame of its place
+        shift(tile, [0.0, -(2 * defect.side - 1) * defect.offset * self.tile.width, 0.0])
         return scene
 
 

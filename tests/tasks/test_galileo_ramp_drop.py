@@ -196,7 +196,7 @@ class ReleasedBefore(GalileoRampDrop):
 
     def build(self):
         scene = super().build()
-        scene.body("ball").pos = self.resting(self.release_place) - self.tray
+        scene.body("ball").pos = self.resting(self.release_place)
         return scene
 
 

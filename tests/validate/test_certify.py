@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from helpers import shift
 
 from scengen import load_task
 from scengen.certificate import CHECKS
-from scengen.geometry import UP
+from scengen.geometry import UP, compound, quat
 from scengen.sim.world import ROBOT, World
 from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
@@ -59,7 +60,7 @@ class SlabAway(DominoSingle):
 
     def build(self):
         scene = super().build()
-        scene.body("slab").pos = [SLAB_DISPLACEMENT + 0.01, 0, 0]  # in the frame that it was placed with
+        shift(scene.body("slab"), [SLAB_DISPLACEMENT + 0.01, 0, 0])
         return scene
 
 
@@ -81,8 +82,8 @@ class Leaning(DominoSingle):
         scene = super().build()
         angle = -1.3 * self.tile.tipping_angle
         tile = scene.body("tile_2")
-        tile.quat = [math.cos(angle / 2), 0, math.sin(angle / 2), 0]
-        tile.pos = self.tile.thickness / 2 * math.sin(-angle) * UP
+        tile.quat = compound(tile.quat, quat("y", angle))
+        tile.pos = tile.pos + self.tile.thickness / 2 * math.sin(-angle) * UP
         return scene
 
 
@@ -100,7 +101,7 @@ class Overlapping(DominoSingle):
 
     def build(self):
         scene = super().build()
-        scene.body("tile_2").pos = [-self.gap - 0.004, 0, 0]
+        shift(scene.body("tile_2"), [-self.gap - 0.004, 0, 0])
         return scene
 
 

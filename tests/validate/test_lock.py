@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 from pools import QUICKLY, make
@@ -47,7 +48,7 @@ def other(folder, package, version):
 def test_the_file_names_what_is_installed_and_what_the_manifest_says(made):
     opened, locked = Pool.open(made), lock.read_lock(made)
     assert {name: told for name, told in opened.manifest.versions.items() if name in locked} == {
-        name: versions()[name] for name in ("mujoco", "robosuite", "numpy")
+        name: versions()[name] for name in ("mujoco", "robosuite", "numpy") if name != "robosuite" or find_spec(name)
     }
     assert {"numba", "llvmlite", "scipy"} < set(locked)
     for line in (opened.manifest.source_sha256, opened.manifest.fingerprint, "python 3."):
