@@ -1,10 +1,8 @@
-"""Holed cuboid cage: a thin-walled box with one round hole, two low sills on its floor, and a trap under its end.
+"""Holed cuboid cage: a thin-walled box with one round hole in one of its faces.
 
        ________________
-      |     _          |      side view; the hole is where the floor ends near +x
-      |    (_)|        |      the sills are the low bars on the floor; the trap is the pit under the end at -x,
-      |   |___|____   _|      as wide as the cage
-      |___|
+      |    _           |      side view; the hole is where the floor ends near +x
+      |___(_)_____   __|
 
 Collision geometry is an exact convex decomposition. Plates are boxes. Rays from the hole's centre cut the part of the
 holed plate around the hole into wedges, whose inner faces touch the circle from outside. So the hole is a regular
@@ -20,7 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geometry import UP, Mat3, Vec3
+from ..geometry import Mat3, Vec3
 from ..params import param
 from .prop import BOX, Prop, Rgba, show, shown, solid
 
@@ -34,10 +32,7 @@ SEGMENTS = 64
 """Number of sides of the circle in pictures, which is within 0.02 mm of the true one at the nominal radius."""
 
 MIN_SIZE = 1e-6
-"""Size below which sills and strips of plate are left out [m]: MuJoCo refuses boxes without extent."""
-
-TRAP_COLOUR: Rgba = (0.30, 0.12, 0.45, 0.45)
-"""Colour of the trap: violet, which no other thing has."""
+"""Size below which strips of plate are left out [m]: MuJoCo refuses boxes without extent."""
 
 BOTTOM = 0
 """Value of `face` for a hole in the bottom."""
@@ -60,8 +55,7 @@ class HoledCage(Prop):
     """A closed box with one round hole. x is the long axis; the origin is the centre of the base.
 
     The paper gives no lengths (App. C: "one circular hole on a configurable face"). Ours fit the task's hand: the
-    width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of the box without its trap in 3 mm acrylic
-    (86 cm^3 at 1.19 g/cm^3).
+    width leaves 30 mm of the Panda's 80 mm jaw. The mass is that of the box in 3 mm acrylic (86 cm^3 at 1.19 g/cm^3).
     """
 
     length: float = param(0.130, "m", 0.08, 0.20)
@@ -73,16 +67,6 @@ class HoledCage(Prop):
     """Radius of the hole."""
     offset: float = param(0.043, "m", -0.08, 0.08)
     """Position of the hole's centre, from the middle of its face, along x (on an end: along y)."""
-    sill: float = param(0.0041, "m", 0.0, 0.015)
-    """Height of the sill across the floor, which is as thick as the walls. At 0 there is none."""
-    sill_x: float = param(-0.004, "m", -0.08, 0.08)
-    """Position of the sill along x, from the middle of the floor."""
-    trap: float = param(0.016, "m", 0.002, 0.03)
-    """Depth of the trap below the floor, at the end at -x."""
-    trap_x: float = param(-0.0285, "m", -0.08, 0.08)
-    """Position of the trap's inner wall along x, from the middle of the floor. It is as thick as the other walls."""
-    trap_sill: float = param(0.0012, "m", 0.0, 0.015)
-    """Height above the floor of the sill on that wall."""
     mass: float = param(0.100, "kg", 0.02, 0.5)
     friction: float = param(0.6, "1", 0.05, 1.5)
     closed: bool = False
@@ -93,7 +77,7 @@ class HoledCage(Prop):
 
     @property
     def size(self) -> Vec3:
-        """Outer edges along x, y and z, without the trap [m]."""
+        """Outer edges along x, y and z [m]."""
         return np.array([self.length, self.width, self.height])
 
     @property
@@ -103,7 +87,7 @@ class HoledCage(Prop):
 
     @property
     def cavity(self) -> Vec3:
-        """Inner edges along x, y and z, without the trap [m]."""
+        """Inner edges along x, y and z [m]."""
         return self.size - 2 * self.wall
 
     @property
@@ -120,74 +104,39 @@ class HoledCage(Prop):
 
     @property
     def margin(self) -> float:
-        """Smallest distance from the rim of the hole to walls and sills on its face [m]; negative: it does not fit."""
+        """Smallest distance from the rim of the hole to the walls beside its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]
-        free = [self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2]
-        if self.face == BOTTOM:
-            free += [abs(self.offset - x) - self.wall / 2 for x in (self.sill_x, self.trap_x)]
-        return min(free) - self.hole
+        return min(self.cavity[along] / 2 - abs(self.offset), self.cavity[3 - axis - along] / 2) - self.hole
 
-    @property
-    def trap_length(self) -> float:
-        """Inner edge of the trap along x [m]; negative: its wall stands outside the cage."""
-        return self.trap_x - self.wall / 2 + self.cavity[0] / 2
+    def rim_tilt(self, radius: float) -> float:
+        """Tilt at which a ball rolls over the rim of a hole in an upright wall [rad]; 0 for holes in bottom and top.
 
-    def tilt_over_sill(self, radius: float) -> float:
-        """Tilt of the floor at which a ball that lies against the sill rolls over it, towards the hole [rad]."""
-        return _tilt_over(self.sill, radius)
-
-    def tilt_into_trap(self, radius: float) -> float:
-        """Tilt, the other way, at which a ball that lies against the trap's sill rolls into the trap [rad]."""
-        return _tilt_over(self.trap_sill, radius)
-
-    def tilt_out_of_trap(self, radius: float) -> float:
-        """Tilt at which a ball rolls out of the trap [rad]."""
-        return _tilt_over(self.trap + self.trap_sill, radius)
-
-    def least_tilt(self, radius: float) -> float:
-        """Smallest tilt at which a ball rolls over the sill and over the rim of a hole in an upright wall [rad]."""
-        over_sill = self.tilt_over_sill(radius)
-        if self.face in (BOTTOM, TOP):
-            return over_sill
-        rim = self.cavity[2] / 2 - self.hole
-        return max(over_sill, math.acos(max(-1.0, 1 - rim / radius)))
-
-    def pocket(self, radius: float) -> tuple[float, float]:
-        """Smallest and largest x of the centre of a ball between the sills [m]."""
-        return self.trap_x + self.beside(self.trap_sill, radius), self.sill_x - self.beside(self.sill, radius)
-
-    def traps(self, place: Vec3, radius: float) -> bool:
-        """Whether a ball with its centre at `place` has sunk into the trap by half of its radius."""
-        low, high = -self.length / 2, self.trap_x
-        inside = bool(low < place[0] < high and abs(place[1]) < self.width / 2)
-        return inside and -self.trap < place[2] < self.wall + radius / 2
-
-    def on_sill(self, place: Vec3, radius: float) -> bool:
-        """Whether a ball in the cage is above the sill: nearer to it than half its distance when it touches the sill.
-
-        A ball slower than 1 m/s stays there for at least 10 ms.
+        The ball lies against the wall and turns about the lowest point of the rim, once the vertical through its centre
+        passes that point: cos(tilt) = 1 - height / radius. If the rim is as high as the centre, it is a right angle.
         """
-        within = bool(np.all(np.abs(place - self.middle) < self.size / 2))
-        return within and abs(place[0] - self.sill_x) < self.beside(self.sill, radius) / 2
+        height = self.cavity[2] / 2 - self.hole if self.face in (END, SIDE) else 0.0
+        return math.acos(min(1.0, max(0.0, 1 - height / radius)))
 
-    def beside(self, sill: float, radius: float) -> float:
-        """Distance along x from the middle of a sill to a ball that touches floor and sill [m]."""
-        height = min(sill, radius)
-        return self.wall / 2 + math.sqrt(2 * radius * height - height**2)
+    def passes(self, place: Vec3, radius: float) -> bool:
+        """Whether a ball with its centre at `place` is on its way out: in the hole, with its centre beyond the wall's.
+
+        A ball slower than 1.5 m/s is there for at least 10 ms.
+        """
+        away = place - self.hole_centre
+        depth = float(away @ self.normal)
+        return 0.0 <= depth < radius and float(away @ away) - depth**2 < self.hole**2
 
     # --- mass -----------------------------------------------------------------------------
 
     def inertial(self) -> tuple[Vec3, Mat3]:
         """Centre of mass [m] and inertia about it [kg m^2].
 
-        The body is cuboid - cavity - hole + sills at uniform density; cuboid and cavity include those of the trap.
+        The body is cuboid - cavity - hole at uniform density:
         inertia = density * sum over the parts of +-(own + volume * (|d|^2 - d d^T)), d from the common centre of mass.
         For a cuboid with edges e, own = volume / 12 * (|e|^2 - e e^T, diagonal only). For the hole, a disc of radius R
         and thickness w, own is volume * R^2 / 2 about its axis and volume * (3 R^2 + w^2) / 12 across it.
         """
-        pit, hollow = self._trap()
-        parts = [_cuboid(*box, 1.0) for box in [(self.middle, self.size), pit, *self._sills()]]
-        parts += [_cuboid(*box, -1.0) for box in [(self.middle, self.cavity), hollow]]
+        parts = [_cuboid(self.middle, self.size, 1.0), _cuboid(self.middle, self.cavity, -1.0)]
         if not self.closed:
             axis = FACES[self.face][0]
             own = np.full(3, (3 * self.hole**2 + self.wall**2) / 12)
@@ -210,10 +159,9 @@ class HoledCage(Prop):
             for sign in (-1, 1):
                 if self.closed or FACES[self.face][:2] != (axis, sign):
                     low, high = -self.size / 2, self.size / 2
-                    low[0] = self._plate_from(axis, sign)
                     low[axis], high[axis] = sorted((sign * self.size[axis] / 2, sign * self.cavity[axis] / 2))
                     plates.append(_box(self.middle + low, self.middle + high))
-        return plates + self._sills() + ([] if self.closed else self._beside_patch()) + self._trap_plates()
+        return plates + ([] if self.closed else self._beside_patch())
 
     def wedges(self) -> list[NDArray[np.float64]]:
         """Corners of the convex prisms around the hole [m], each of shape (n, 3)."""
@@ -230,51 +178,19 @@ class HoledCage(Prop):
             prisms.append(points)
         return prisms
 
-    def _sills(self) -> list[Box]:
-        bars = [(self.sill_x, self.sill), (self.trap_x, self.trap_sill)]
-        return [
-            (np.array([x, 0, self.wall + height / 2]), np.array([self.wall, self.cavity[1], height]))
-            for x, height in bars
-            if height >= MIN_SIZE
-        ]
-
-    def _trap(self) -> tuple[Box, Box]:
-        """Outer cuboid of the trap below the cage, and its cavity, up to the floor."""
-        w, end, stop = self.wall, -self.length / 2, self.trap_x + self.wall / 2
-        out, within = self.size[1] / 2, self.cavity[1] / 2
-        hollow = _box([end + w, -within, w - self.trap], [stop - w, within, w])
-        return _box([end, -out, -self.trap], [stop, out, 0.0]), hollow
-
-    def _trap_plates(self) -> list[Box]:
-        """Plates of the trap: floor, ends and sides, up to the upper side of the cage's floor."""
-        w, end, stop, out = self.wall, -self.length / 2, self.trap_x + self.wall / 2, self.size[1] / 2
-        plates = [_box([end, -out, -self.trap], [stop, out, w - self.trap])]
-        plates += [_box([x, -out, -self.trap], [x + w, out, w]) for x in (end, stop - w)]
-        return plates + [_box([end, y, -self.trap], [stop, y + w, w]) for y in (-out, out - w)]
-
-    def _plate_from(self, axis: int, sign: int) -> float:
-        """Lower end of a plate along x [m]: the floor begins at the wall of the trap, others at the end of the cage."""
-        return self.trap_x - self.wall / 2 if (axis, sign) == FACES[BOTTOM][:2] else -self.length / 2
-
     def _patch(self) -> tuple[float, float, float]:
         """Both ends and half width of the rectangle that is cut into wedges, from the hole's centre [m]."""
         axis, _, along = FACES[self.face]
-        (first, last), reach = self._holed_plate(), self.hole / math.cos(math.pi / WEDGES) + self.wall
-        ends = max(first - self.offset, -reach), min(last - self.offset, reach)
+        half, reach = self.size[along] / 2, self.hole / math.cos(math.pi / WEDGES) + self.wall
+        ends = max(-half - self.offset, -reach), min(half - self.offset, reach)
         return *ends, self.size[3 - axis - along] / 2
-
-    def _holed_plate(self) -> tuple[float, float]:
-        """Both ends of the holed plate along the axis of `offset` [m]."""
-        axis, sign, along = FACES[self.face]
-        half = self.size[along] / 2
-        return (self._plate_from(axis, sign) if along == 0 else -half), half
 
     def _beside_patch(self) -> list[Box]:
         """Parts of the holed plate beside the patch."""
         axis, _, along = FACES[self.face]
         start, stop, _ = self._patch()
-        (first, last), boxes = self._holed_plate(), []
-        for low, high in ((first - self.offset, start), (stop, last - self.offset)):
+        half, boxes = self.size[along] / 2, []
+        for low, high in ((-half - self.offset, start), (stop, half - self.offset)):
             if high - low > MIN_SIZE:
                 centre, size = self.hole_centre.copy(), self.size.copy()
                 centre[along] += (low + high) / 2
@@ -306,17 +222,12 @@ class HoledCage(Prop):
         def block(centre: Vec3, size: Vec3) -> Manifold:
             return Manifold.cube(size.tolist(), True).translate(centre.tolist())
 
-        (pit, size), hollow = self._trap()
-        body = block(self.middle, self.size) + block(pit + self.wall / 4 * UP, size + self.wall / 2 * UP)
-        body = body - block(self.middle, self.cavity) - block(*hollow)
-        for centre, size in self._sills():  # extended into floor and walls by half a wall, to be one part with them
-            body += block(centre - self.wall / 4 * UP, size + self.wall * np.array([0, 1, 0.5]))
+        body = block(self.middle, self.size) - block(self.middle, self.cavity)
         if self.closed:
             return body
         bore = Manifold.cylinder(2 * self.wall, self.hole, circular_segments=SEGMENTS, center=True)
         turn = {BOTTOM: (0, 0, 0), END: (0, 90, 0), SIDE: (90, 0, 0), TOP: (0, 0, 0)}[self.face]
-        outwards = self.hole_centre + self.wall / 2 * self.normal  # the bore begins at the cavity, not at the sill
-        return body - bore.rotate(turn).translate(outwards.tolist())
+        return body - bore.rotate(turn).translate(self.hole_centre.tolist())
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         com, inertia = self.inertial()
@@ -327,15 +238,13 @@ class HoledCage(Prop):
         for i, corners in enumerate(self.wedges()):
             spec.add_mesh(name=f"wedge_{i}", uservert=corners.ravel().tolist())
             self._add_collider(body, f"wedge_{i}", MESH).meshname = f"wedge_{i}"
-        above, below = self.manifold().split_by_plane(UP.tolist(), 0.0)
-        for name, part, rgba in (("look", above, self.rgba), ("trap", below, TRAP_COLOUR)):
-            look = part.to_mesh()
-            spec.add_mesh(
-                name=name,
-                uservert=np.asarray(look.vert_properties, float)[:, :3].ravel().tolist(),
-                userface=np.asarray(look.tri_verts).ravel().tolist(),
-            )
-            shown(body, name, rgba, type=MESH).meshname = name
+        look = self.manifold().to_mesh()
+        spec.add_mesh(
+            name="look",
+            uservert=np.asarray(look.vert_properties, float)[:, :3].ravel().tolist(),
+            userface=np.asarray(look.tri_verts).ravel().tolist(),
+        )
+        shown(body, "look", self.rgba, type=MESH).meshname = "look"
 
     def _add_collider(
         self, body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom, size: ArrayLike = (), pos: ArrayLike = (0, 0, 0)
@@ -347,20 +256,6 @@ class HoledCage(Prop):
 def lowered(tilt: float) -> Vec3:
     """Unit vector down, in the axes of a cage whose end at +x is lowered by `tilt` [rad]."""
     return np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
-
-
-def lean(rot: Mat3) -> float:
-    """Angle by which the end at +x of a cage is lowered, for a ball that is free to roll along the cage [rad]."""
-    return math.atan2(-rot[2, 0], rot[2, 2])
-
-
-def _tilt_over(height: float, radius: float) -> float:
-    """Tilt of the floor at which a ball that lies against a sill or a step rolls over it [rad].
-
-    The ball turns about the edge of the sill, once the vertical through its centre passes that edge:
-    cos(tilt) = 1 - height / radius. If the sill is as high as the centre, the tilt is a right angle.
-    """
-    return math.acos(max(0.0, 1 - height / radius))
 
 
 def _box(low: ArrayLike, high: ArrayLike) -> Box:

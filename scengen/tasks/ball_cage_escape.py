@@ -1,26 +1,25 @@
 """T22 ball-cage-escape: get a ball out of a cage whose only hole is blocked by the stool on which the cage stands.
 
       ________________
-     |    (_)         |    seen from the side: the ball lies between two sills. Beyond one is the hole, in the floor,
-     |   |___|___ _ _|     on the stool; beyond the other one, which is lower, a trap
-     |___|[==========]
-            |     |
+     |     (_)        |    seen from the side: the hole is in the floor, near one end, on the stool
+     |___________[ ]__|
+         [=========]
+           |     |
 
-Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted. The sill holds the ball, so that
-no lift helps before the cage is tilted past the angle at which the ball rolls over it: cos(tilt) = 1 - sill / radius
-(43.4 deg nominally). Over the other sill it rolls at 23.1 deg, into a pit deeper than its radius, out of which no tilt
-leads. The robot must see at which end the hole is; of two ends, a guess is right in half of the scenes.
+Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted. The lifted cage must be tilted
+towards the hole, past the angle at which the ball rolls: tan(tilt) = rolling resistance (5.7 deg nominally). The robot
+must see on which side of the ball the hole is; of two ends, a guess is right in half of the scenes.
 
-Decisions. The paper gives the story, no numbers. (1) Sills and trap are ours. On a bare floor the ball lies wherever
-the last jerk has left it, lifting alone empties the cage, and a wrong tilt costs nothing. The ball has 5 mm of
-clearance between the sills: with more it takes a run-up and jumps at half the angle. (2) The cage must be tilted, not
-shaken. A sill holds the ball up to an acceleration of g tan(tilt), 4.2 m/s^2 before the trap and 9.3 before the hole. A
-blind shake fills the trap first; a shake to one side, or of a half tilted cage, may free the ball. So the ball must
-pass the sill while the floor has the tilt of the law, less `TILT_TOLERANCE`. (3) The jaw holds the cage across its
-width, the one edge that it can span; walls are translucent so that cameras see the ball. (4) The stool is fixed: a
-tipping one would be another task. (5) The ball must come to rest on the table. Its rolling resistance is that of felt
-(coefficient 0.04); a steel ball would leave the table. (6) The cage may not touch the table: knocked off its stool, it
-would tilt without a plan.
+Decisions. The paper gives the story, no numbers. (1) The ball resists rolling like one of soft foam: a tenth of its
+load. So it stays where it is in a cage that is lifted and carried level, by up to 1 m/s^2, and comes to rest on the
+table. (2) The jaw holds the cage across its width, the one edge that it can span; walls are translucent so that
+cameras see the ball. (3) The stool is fixed: a tipping one would be another task. (4) The paper lets a policy try until
+the ball falls out. The strict rules do not. A ball that rolls to the end without the hole is lost, so that it does not
+help to tilt the cage both ways. When the ball leaves the cage, the hand must hold the cage off stool and table:
+otherwise the cage could be knocked off its stool, or slid until the hole is beside it. The cage must then be tilted
+towards the hole, by `SHAKE_TILT` more than the ball needs to roll: otherwise a shake, or a stop, would do. A tilt
+slower than 12 deg/s may let the ball out below that angle. With the hole in the middle (`ball_beyond`), a cage that is
+slid off its stool in the hand is as good as lifted.
 """
 
 import math
@@ -32,7 +31,7 @@ import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
-from ..assets.cage import BOTTOM, SIDE, TOP, HoledCage, lean, lowered
+from ..assets.cage import BOTTOM, END, SIDE, TOP, HoledCage, lowered
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
 from ..geometry import UP, Mat3, Vec3, about_z, shortest, spoken
@@ -40,7 +39,7 @@ from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import Arm, World
+from ..sim.world import ROBOT, Arm, World
 from ..skills.jaw import pick, poke
 from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, turn_about_vertical, turn_to, wait
 
@@ -49,35 +48,39 @@ REST_SPEED = 0.02
 MAX_HAND_TILT = math.radians(72.0)
 """Tilt that the hand reaches at every heading that `present` may choose [rad], tried for x from -0.2 to 0 m."""
 TILT_MARGIN = math.radians(10.0)
-"""Angle by which the oracle exceeds the least tilt [rad]: the ball must roll, not creep, and the grip gives some
-degrees."""
-TILT_TOLERANCE = math.radians(6.0)
-"""Angle below the law's at which the ball may still pass the sill [rad]. If the floor turns at up to 2 rad/s the ball
-passes at 1.2 deg above that angle or more (120 rollouts, filtered and raw); at 3 rad/s, 5 of 40 pass 6 to 8 deg
-below."""
+"""Angle by which the oracle exceeds the least tilt over a rim [rad]: the grip gives some degrees."""
+STEEP = math.radians(35.0)
+"""Tilt of a cage in which the ball cannot pass the hole [rad]."""
+GENTLE = math.radians(9.0)
+"""Angle by which the oracle exceeds the rolling tilt if the ball can pass the hole [rad]: it must roll, but slowly."""
+SHAKE_TILT = math.radians(6.5)
+"""Angle above the rolling tilt up to which a cage counts as level [rad]. A hand that shakes a cage tilted by 5 deg
+tilts it by up to 9.8 deg (48 rollouts, filtered and raw, periods from 0.2 to 1 s), one that jerks it, by up to 11.8."""
+END_MARGIN = 0.001
+"""Distance from the wall at which a ball has come to an end of the cage [m]."""
 GRIP_HEIGHT = 0.030
 """Height of the grip site above the foot of the cage [m]: the finger tips, 9 mm lower, stay 21 mm above the stool."""
-CARRY_PACE = Pace(0.20, 0.01)  # pace with the cage in the hand: slow enough for the sill to hold the ball
+CARRY_PACE = Pace(0.15, 0.01)  # pace with the cage in the hand: slow enough for the ball to stay where it is
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallCageEscape(Scenario):
-    """A cage on a stool, the ball between two sills. Lengths are along the cage's axes."""
+    """A cage on a stool, with a ball in it. Lengths are along the cage's axes."""
 
     HOLD: ClassVar[float] = 0.3
 
     x: float = param(-0.08, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -120.0, 240.0, period=360.0)
-    """Direction of the end with the hole; 0 is straight away from the robot."""
-    ball_x: float = param(-0.0195, "m", -0.1, 0.1)
+    """Direction of the cage's x axis, at whose end the hole is; 0 is straight away from the robot."""
+    ball_x: float = param(-0.010, "m", -0.1, 0.1)
     ball_y: float = param(0.0, "m", -0.04, 0.04)
     stool_x: float = param(0.022, "m", -0.1, 0.1)
-    """Middle of the stool; 22 mm leave 0.5 mm of plate beyond the hole, and a gap of 10 mm before the trap."""
-    rolling: float = param(0.04, "1", 0.0, 0.2)  # rolling resistance of the felt-covered ball, as a share of the load
+    """Middle of the stool; 22 mm leave 1.5 mm of plate beyond the hole."""
+    rolling: float = param(0.1, "1", 0.0, 0.2)  # rolling resistance of the ball, as a share of the load
     cage: HoledCage = HoledCage()
     ball: Ball = Ball(radius=0.015, density=1400.0, friction=0.5, rgba=(0.85, 0.20, 0.15, 1.0))
-    stool: Stool = Stool()
+    stool: Stool = Stool(length=0.080)
 
     # --- scene ----------------------------------------------------------------------------
 
@@ -100,12 +103,24 @@ class BallCageEscape(Scenario):
             return "the ball fell off the table"
         if fallen(world, "cage", below=0.0):
             return "the cage fell off the table"
-        at, r = world.rot("cage").T @ (world.pos("ball") - world.pos("cage")), self.ball.radius
-        if self.cage.traps(at, r):
-            return "the ball fell into the trap"
-        if self.cage.on_sill(at, r) and lean(world.rot("cage")) < self.cage.tilt_over_sill(r) - TILT_TOLERANCE:
-            return Strict("the ball was shaken over the sill")
-        return Strict("the cage was dropped or set down") if world.touched("cage", "table") else None
+        at = world.rot("cage").T @ (world.pos("ball") - world.pos("cage"))
+        if self.cage.passes(at, self.ball.radius):
+            if not world.touching(ROBOT, "cage") or not world.touching_bodies("cage") <= {ROBOT, "ball"}:
+                return Strict("the ball left a cage that was not lifted")
+            if self.lean(world) < self.rolling_tilt + SHAKE_TILT:
+                return Strict("the ball was shaken out of the cage")
+        return Strict("the ball rolled to the end without the hole") if self.at_wrong_end(at) else None
+
+    def at_wrong_end(self, at: Vec3) -> bool:
+        """Whether a ball in the cage, at a place in its axes, has come to the end on the other side than the hole."""
+        within = bool(np.all(np.abs(at - self.cage.middle) < self.cage.size / 2))
+        return within and -self.way * at[0] > self.cage.cavity[0] / 2 - self.ball.radius - END_MARGIN
+
+    def lean(self, world: World) -> float:
+        """Angle by which the cage is tilted in the direction in which the ball must leave [rad]."""
+        axis, sign = (1, 1.0) if self.cage.face == SIDE else (0, self.way)
+        rot = world.rot("cage")
+        return math.atan2(-sign * rot[2, axis], rot[2, 2])
 
     def out(self, world: World) -> bool:
         """Whether the whole ball is outside the cuboid that the cage fills."""
@@ -118,8 +133,7 @@ class BallCageEscape(Scenario):
         """Lift the cage, carry it aside, and tip it until the ball is over the sill and out."""
         yield from self.pick_up(world)
         yield from self.present(world, self.tilts()[-1])
-        back = [lowered(math.radians(tilt)) for tilt in (10.0, -5.0) * 3]  # for a ball that has passed the hole
-        for down in [*self.tilts(), *back]:
+        for down in self.tilts():
             if self.out(world):
                 break
             yield from self.tip(world, down)
@@ -129,12 +143,16 @@ class BallCageEscape(Scenario):
 
     def tilts(self) -> list[Vec3]:
         """Unit vectors in the cage's axes that must point down, one after the other."""
-        steep = self.least_tilt + TILT_MARGIN
-        if self.cage.face != SIDE:
-            return [lowered(steep)]
-        # For a hole in a side, 0.25 times gravity keeps the ball at the hole's end meanwhile.
-        sideways = np.array([0.25, math.sin(steep), -math.cos(steep)])
-        return [lowered(self.cage.tilt_over_sill(self.ball.radius) + TILT_MARGIN), sideways / np.linalg.norm(sideways)]
+        if self.cage.face == SIDE:
+            # 0.25 times gravity keeps the ball at the hole's end meanwhile.
+            steep = self.least_tilt + TILT_MARGIN
+            sideways = np.array([self.way * 0.25, math.sin(steep), -math.cos(steep)])
+            return [lowered(self.way * STEEP), sideways / np.linalg.norm(sideways)]
+        if self.cage.face == END:
+            return [lowered(self.least_tilt + TILT_MARGIN)]
+        if self.room_beyond < -self.ball.radius / 2:
+            return [lowered(self.way * STEEP)]
+        return [lowered(self.way * (self.rolling_tilt + GENTLE + math.radians(more))) for more in (0.0, 3.0, 6.0)]
 
     def pick_up(self, world: World) -> Plan:
         """Take the cage by its width and lift it clear of the stool."""
@@ -176,7 +194,7 @@ class BallCageEscape(Scenario):
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
-        half, steep = self.least_tilt / 2, self.least_tilt + TILT_MARGIN
+        half, steep = self.way * self.rolling_tilt / 2, self.way * STEEP
         return {
             "lift_it_off_the_stool": Shortcut(lambda world: self.tip_only(world, 0.0)),
             "tip_it_half_as_far": Shortcut(lambda world: self.tip_only(world, half)),
@@ -214,10 +232,10 @@ class BallCageEscape(Scenario):
         """Heading in which the cage is tilted [deg], chosen without looking which end has the hole."""
 
         def right(heading: float) -> bool:
-            return math.cos(math.radians(heading - self.yaw)) > 0
+            return self.way * math.cos(math.radians(heading - self.yaw)) > 0
 
         def act(world: World, heading: float) -> Plan:
-            yield from self.tip_only(world, math.copysign(self.least_tilt + TILT_MARGIN, right(heading) - 0.5))
+            yield from self.tip_only(world, self.way * math.copysign(STEEP, right(heading) - 0.5))
 
         return Answer(tuple(map(float, range(-90, 270, 15))), act, right, tries=1)
 
@@ -231,36 +249,26 @@ class BallCageEscape(Scenario):
         # The ball can leave.
         yield require(cage.margin >= 0, "the hole does not fit into its face", hole=cage.hole, margin=cage.margin)
         yield require(r < cage.hole, "the ball is wider than the hole", ball=r, hole=cage.hole)
-        near = cage.offset - cage.hole
-        beyond = cage.face not in (BOTTOM, SIDE) or near >= cage.sill_x + cage.wall / 2
-        yield require(beyond, "the hole is not beyond the sill", hole=near, sill=cage.sill_x)
         yield require(cage.face != TOP, "the hole looks up, and the hand cannot turn over", steepest=MAX_HAND_TILT)
         tilt, steepest = self.least_tilt + TILT_MARGIN, MAX_HAND_TILT
         yield require(tilt <= steepest, "the ball stays in at every tilt of the hand", tilt=tilt, steepest=steepest)
 
-        # It stays in until the cage is tilted, and a wrong tilt costs it.
+        # It stays in until the cage is tilted.
         fits = 2 * r <= cage.cavity[2] and r + abs(self.ball_y) <= cage.cavity[1] / 2
         yield require(fits, "the ball does not fit between the walls", radius=r, y=self.ball_y)
-        low, high = cage.pocket(r)
-        behind = low <= self.ball_x <= high
-        yield require(behind, "the ball does not lie between the sills", x=self.ball_x, least=low, largest=high)
-        tilt, other = cage.tilt_over_sill(r), cage.tilt_into_trap(r)
-        # A hand that carries the cage level tilts it by up to 3 deg, and brakes at up to 2 m/s^2, which tilts the
-        # apparent gravity by 12 deg.
-        least = math.radians(20.0)
-        yield require(other >= least, "the sill does not hold the ball", tilt=other, least=least)
-        yield require(other < tilt, "the trap does not fill before the ball is free", trap=other, hole=tilt)
-        length, tilt = cage.trap_length, cage.tilt_out_of_trap(r)
-        yield require(2 * r <= length, "the trap does not take the ball", length=length, radius=r)
-        yield require(tilt > MAX_HAND_TILT, "the ball rolls out of the trap again", tilt=tilt, steepest=MAX_HAND_TILT)
+        room, least = cage.cavity[0] / 2 - r + self.way * self.ball_x, 0.004  # [m]; starts are jittered by 2 mm
+        yield require(room >= least, "the ball is at the end without the hole", room=room, least=least)
+        away, least = abs(cage.offset - self.ball_x), cage.hole + 0.005
+        beside = cage.face in (END, SIDE) or away >= least
+        yield require(beside, "the ball lies over the hole", away=away, least=least)
+        # A hand that carries the cage level tilts it by up to 3 deg.
+        least = math.radians(4.5)
+        yield require(self.rolling_tilt >= least, "the ball rolls in a level cage", tilt=self.rolling_tilt, least=least)
 
         # The cage stands by itself, in reach.
         half, far = stool.length / 2, abs(cage.offset - self.stool_x) + cage.hole
         covered = cage.face != BOTTOM or (far <= half and cage.hole <= stool.width / 2)
         yield require(covered, "the stool does not cover the hole", far=far, hole=cage.hole, width=stool.width)
-        beside = min(self.stool_x - half - cage.trap_x - cage.wall / 2, stool.height - cage.trap)
-        least = 0.004  # [m]; the robot places a cage to 2 mm
-        yield require(beside >= least, "the trap has no room beside the stool", room=beside, least=least)
         moment = cage.mass * cage.inertial()[0][0] + self.ball.mass * self.ball_x
         lever = abs(moment / (cage.mass + self.ball.mass) - self.stool_x)
         yield require(lever < half, "the cage tips off the stool by itself", lever=lever, half=half)
@@ -268,8 +276,12 @@ class BallCageEscape(Scenario):
         yield within_reach("the cage", self.handle)
 
     def features(self) -> Mapping[str, float]:
-        """Least tilt that frees the ball [rad], and clearance of the ball in the hole over its radius."""
-        return {"least_tilt": self.least_tilt, "air_over_radius": self.cage.hole / self.ball.radius - 1}
+        """Least tilt that frees the ball [rad], its clearance in the hole over its radius, room beyond the hole [m]."""
+        return {
+            "least_tilt": self.least_tilt,
+            "air_over_radius": self.cage.hole / self.ball.radius - 1,
+            "room_beyond": self.room_beyond,
+        }
 
     def facts(self) -> Mapping[str, float | str]:
         return {
@@ -297,6 +309,21 @@ class BallCageEscape(Scenario):
         return self.foot + GRIP_HEIGHT * UP
 
     @property
+    def way(self) -> float:
+        """1 if the ball must roll towards +x in the cage's axes, -1 if towards -x."""
+        return math.copysign(1.0, self.cage.offset - self.ball_x) if self.cage.face in (BOTTOM, SIDE) else 1.0
+
+    @property
+    def room_beyond(self) -> float:
+        """Length on which the ball can lie beyond a hole in the bottom [m]; negative: it ends over the hole."""
+        return self.cage.cavity[0] / 2 - self.ball.radius - (self.way * self.cage.offset + self.cage.hole)
+
+    @property
+    def rolling_tilt(self) -> float:
+        """Tilt of the floor at which the ball begins to roll by itself [rad]."""
+        return math.atan(self.rolling)
+
+    @property
     def least_tilt(self) -> float:
         """Tilt that lets the ball out [rad]."""
-        return self.cage.least_tilt(self.ball.radius)
+        return max(self.rolling_tilt, self.cage.rim_tilt(self.ball.radius))

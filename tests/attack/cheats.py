@@ -18,7 +18,7 @@ from scengen.robots.jaw import TIP_BELOW
 from scengen.scenario import Plan, Shortcut
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, grasp, pick, release
-from scengen.skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to
+from scengen.skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, until
 
 Cheat = Callable[..., Plan]
 
@@ -93,6 +93,33 @@ def hop(self, world: World) -> Plan:
         yield np.array([0.0, 0.0, sign, 0.0, 0.0, 0.0, CLOSED])
 
 
+def slide_beside_the_stool(self, world: World) -> Plan:
+    """Grasp the cage, slide it on the stool until the hole is beside it, and lower that end."""
+    yield from until(self.pick_up(world), lambda: world.arm.grip == CLOSED)
+    yield from grasp(world.arm)
+    yield from go_to(world.arm, world.arm.hand + 0.05 * self.way * self.axes[:, 0], pace=Pace(0.05, 0.004))
+    yield from self.tip(world, lowered(self.way * 0.6), rate=0.5)
+
+
+def rock(self, world: World, amplitude: float = math.radians(8.0)) -> Plan:
+    """Rock the cage to and fro about the level, so that the ball gets a little farther each time."""
+    yield from self.pick_up(world)
+    yield from self.present(world, lowered(amplitude))
+    for tilt in (amplitude, -amplitude) * 6:
+        with suppress(GaveUp):
+            yield from turn_to(world.arm, shortest(world.rot("cage") @ lowered(tilt), -UP) @ world.arm.hand_rot)
+
+
+def jerk_back(self, world: World) -> Plan:
+    """Carry the cage slowly along, then jerk it back under the ball, and again."""
+    yield from self.pick_up(world)
+    along = self.way * self.axes[:, 0]
+    for _ in range(8):
+        for velocity, seconds in ((0.08, 1.0), (-0.6, 0.2)):
+            with suppress(GaveUp):
+                yield from push(world.arm, velocity * along, lambda: False, give_up=seconds)
+
+
 def hold_the_weight_down(self, world: World) -> Plan:
     """Put the counterweight in the mirror image and press on it, or on the target, until the deck is level."""
     yield from self.put_at(world, self.mirror)
@@ -145,7 +172,7 @@ CHEATS: Mapping[str, Mapping[str, Cheat]] = {
     "domino_single": {f.__name__: f for f in (knock_slab_with_starter, strike_last_tile_with_starter)},
     "domino_select": {f.__name__: f for f in (topple_the_decoy,)},
     "galileo_ramp_drop": {"staircase": staircase},
-    "ball_cage_escape": {f.__name__: f for f in (snap, hop)},
+    "ball_cage_escape": {f.__name__: f for f in (snap, hop, rock, jerk_back, slide_beside_the_stool)},
     "seesaw_balance": {f.__name__: f for f in (hold_the_weight_down, nudge_the_target)},
     "tool_retrieve": {f.__name__: f for f in (only_draw_it_in, take_it_by_hand)},
 }

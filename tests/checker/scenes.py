@@ -164,7 +164,7 @@ OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
     "cage_id": {
         "lighter_cage": (lambda d: d.scene('(<inertial [^>]*mass=)"0.1"', r'\1"0.09"'), SAME),
         "rolling_ball": (_attribute("ball/ball", "friction", "0.5 0.005 0.0005"), SAME),
-        "lower_sill": (_scaled("cage/box_5", "size", 0.97), SAME),
+        "thinner_plate": (_scaled("cage/box_5", "size", 0.97), SAME),
     },
     "seesaw_id": {
         "stiff_axle": (lambda d: d.scene('frictionloss="0.002"', 'frictionloss="0.01"'), SAME),

@@ -1,4 +1,4 @@
-"""The ball leaves once the stool is gone and the right sill is low; over the other one it is lost."""
+"""The ball leaves once the cage is lifted and tilted towards the hole; at the other end, or shaken out, it is lost."""
 
 import math
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 import pytest
+from attack.cheats import CHEATS
 from controls import (
     ablated,
     each_refuted_for_its_own_reason,
@@ -21,11 +22,12 @@ from controls import (
 
 from scengen import load_task
 from scengen.assets.ball import Ball
-from scengen.assets.cage import SIDE, TOP, HoledCage
+from scengen.assets.cage import SIDE, TOP, HoledCage, lowered
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.stool import Stool
 from scengen.episode import Episode
-from scengen.tasks.ball_cage_escape import MAX_HAND_TILT, REST_SPEED, TILT_MARGIN, BallCageEscape
+from scengen.skills.motion import hold
+from scengen.tasks.ball_cage_escape import REST_SPEED, BallCageEscape
 
 TASK = load_task("ball_cage_escape")
 NOMINAL = BallCageEscape()
@@ -34,47 +36,43 @@ NOMINAL = BallCageEscape()
 # --- what keeps the ball in -------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("more", "outcome"), [(-6.0, "timeout"), (13.0, "success")])
-@pytest.mark.parametrize("sill", [0.004, 0.006])
-def test_the_ball_stays_behind_the_sill_below_the_angle_and_leaves_above_it(sill, more, outcome):
-    """42.8 and 53.1 deg; a held cage gives up to 5 deg."""
-    scenario = BallCageEscape(cage=HoledCage(sill=sill))
-    tilt = scenario.least_tilt + math.radians(more)
-    assert play(TASK, scenario, lambda world: scenario.tip_only(world, tilt)).outcome == outcome
+def tipped(scenario, *degrees, rate=0.5):
+    """Plan that lifts the cage and tilts it by each of some angles from the level."""
+
+    def plan(world):
+        yield from scenario.pick_up(world)
+        yield from scenario.present(world, lowered(math.radians(degrees[-1])))
+        for tilt in degrees:
+            yield from scenario.tip(world, lowered(math.radians(tilt)), rate)
+            yield from hold(world.arm, 1.0)
+
+    return plan
 
 
-@pytest.mark.parametrize(("more", "reason"), [(-6.0, ""), (6.0, "the ball fell into the trap")])
-def test_the_trap_takes_the_ball_at_its_own_angle(more, reason):
-    """23.1 deg, to the other end."""
-    tilt = NOMINAL.cage.tilt_into_trap(NOMINAL.ball.radius) + math.radians(more)
-    rollout = play(TASK, NOMINAL, lambda world: NOMINAL.tip_only(world, -tilt))
-    assert (rollout.reason if rollout.outcome == "failure" else "") == reason
+@pytest.mark.parametrize(("degrees", "outcome"), [(3.0, "timeout"), (16.0, "success")])
+def test_the_ball_stays_below_its_rolling_tilt_and_leaves_above_it(degrees, outcome):
+    """It is 5.7 deg; a hand is exact to 3 deg."""
+    assert math.degrees(NOMINAL.rolling_tilt) == pytest.approx(5.71, abs=0.01)
+    assert play(TASK, NOMINAL, tipped(NOMINAL, degrees)).outcome == outcome
 
 
-@pytest.mark.parametrize("name", ["tip_it_to_the_wrong_end", "tip_it_to_both_ends", "shake_it_level"])
-def test_blind_tilts_and_shakes_fill_the_trap(name):
-    assert play_shortcut(TASK, NOMINAL, name).reason == "the ball fell into the trap"
+@pytest.mark.parametrize("name", ["tip_it_to_the_wrong_end", "tip_it_to_both_ends"])
+def test_a_tilt_to_the_wrong_end_loses_the_ball(name):
+    assert play_shortcut(TASK, NOMINAL, name).reason == "the ball rolled to the end without the hole"
 
 
-@pytest.mark.parametrize("first", [-1.0, 1.0])
-def test_no_tilt_of_the_hand_brings_the_ball_out_of_the_trap(first):
-    """Without the rule that ends the episode there: physics alone keeps it, for all that is done afterwards."""
-    scenario = unguarded(BallCageEscape)()
-    world, steep = load(TASK, scenario), MAX_HAND_TILT - 0.02
-    wrong = NOMINAL.least_tilt
-    rollout = play(
-        TASK, scenario, lambda world: scenario.tip_only(world, -wrong, steep, first * steep, -first * steep), world
-    )
-    place = world.rot("cage").T @ (world.pos("ball") - world.pos("cage"))
-    assert not rollout.solved and scenario.cage.traps(place, scenario.ball.radius)
+def test_only_a_rule_forbids_to_tilt_the_cage_both_ways():
+    wrong_first = tipped(NOMINAL, -20.0, 35.0)
+    outcomes = [play(TASK, scenario, wrong_first).solved for scenario in (NOMINAL, unguarded(BallCageEscape)())]
+    assert outcomes == [False, True]
 
 
 def half_tipped_and_thrown(world):
-    """Tip the cage half as far as the law asks for, then shake it without the teleoperation filter."""
+    """Tip the cage half as far as the ball needs to roll, then shake it without the teleoperation filter."""
     yield from NOMINAL.shortcuts()["shake_it_half_tipped"].plan(world)
 
 
-def test_a_ball_that_is_shaken_over_the_sill_is_lost_and_only_the_rule_forbids_it():
+def test_a_ball_that_is_shaken_out_is_lost_and_only_the_rule_forbids_it():
     outcomes = []
     for scenario in (NOMINAL, unguarded(BallCageEscape)()):
         episode = Episode(scenario, world := load(TASK, scenario), TASK.horizon)
@@ -84,18 +82,40 @@ def test_a_ball_that_is_shaken_over_the_sill_is_lost_and_only_the_rule_forbids_i
         while episode.outcome is None:
             episode.step(world.idle.astype(np.float32))
         outcomes.append(episode.reason or episode.outcome)
-    assert outcomes == ["the ball was shaken over the sill", "success"]
+    assert outcomes == ["the ball was shaken out of the cage", "success"]
 
 
-@pytest.mark.parametrize("rate", [0.5, 1.0, 2.0])
+def test_a_cage_that_is_not_lifted_frees_no_ball_and_only_the_rule_forbids_it():
+    plan = CHEATS["ball_cage_escape"]["slide_beside_the_stool"]
+    reasons = [
+        play(TASK, scenario, lambda world, s=scenario: plan(s, world)).reason
+        for scenario in (NOMINAL, unguarded(BallCageEscape)())
+    ]
+    assert reasons[0] == "the ball left a cage that was not lifted" != reasons[1]
+
+
+@pytest.mark.parametrize("cheat", ["hop", "rock", "jerk_back", "slide_beside_the_stool"])
+def test_written_cheats_free_no_ball(cheat):
+    plan = CHEATS["ball_cage_escape"][cheat]
+    for index in range(3):
+        scenario = TASK.draw("id", 3, index).scenario
+        rollout = play(TASK, scenario, lambda world, s=scenario: plan(s, world))
+        assert not rollout.solved
+
+
+@pytest.mark.parametrize("rate", [0.25, 0.5, 1.0, 2.0])
 def test_a_tilt_does_not_count_as_a_shake(rate):
-    def lean_over(world):
-        down = np.array([math.sin(NOMINAL.least_tilt + TILT_MARGIN), 0.0, -math.cos(NOMINAL.least_tilt + TILT_MARGIN)])
-        yield from NOMINAL.pick_up(world)
-        yield from NOMINAL.present(world, down)
-        yield from NOMINAL.tip(world, down, rate)
+    assert play(TASK, NOMINAL, tipped(NOMINAL, 35.0, rate=rate)).solved
 
-    assert play(TASK, NOMINAL, lean_over).solved
+
+@pytest.mark.parametrize("split", ["id", *TASK.axes])
+def test_a_cage_that_is_carried_level_keeps_the_ball_where_it_is(split):
+    """Off the hole and off the wrong end: 5 and 4 mm are what the constraints leave."""
+    scenario = TASK.draw(split, 0, 0).scenario
+    world = load(TASK, scenario)
+    play(TASK, scenario, lambda world: scenario.tip_only(world, 0.0), world)
+    place = world.rot("cage").T @ (world.pos("ball") - world.pos("cage"))
+    assert abs(place[0] - scenario.ball_x) < 0.012 and not scenario.at_wrong_end(place)
 
 
 def test_one_fixed_answer_is_right_in_half_of_the_draws():
@@ -118,8 +138,9 @@ def test_without_the_hole_the_ball_is_still_in_the_cage_when_the_witness_has_end
     assert not episode.solved and not NOMINAL.out(world)
 
 
-def test_a_cage_that_is_knocked_off_its_stool_is_lost():
-    assert play_shortcut(TASK, NOMINAL, "knock_it_off_the_stool").reason == "the cage was dropped or set down"
+def test_a_cage_that_is_knocked_off_its_stool_keeps_the_ball_or_is_lost():
+    episode = play_shortcut(TASK, NOMINAL, "knock_it_off_the_stool")
+    assert not episode.solved
 
 
 @pytest.mark.parametrize("name", ["lift_it_off_the_stool", "tip_it_half_as_far"])
@@ -176,10 +197,11 @@ def test_the_ball_is_out_when_all_of_it_is(beyond, is_out):
     ("body", "place", "reason"),
     [
         ("ball", [0.5, 0.0, 0.3], "the ball fell off the table"),
-        ("cage", [0.2, 0.0, TABLE_TOP - 1e-5], "the cage was dropped or set down"),
+        ("cage", [0.5, 0.0, 0.3], "the cage fell off the table"),
+        ("ball", [-0.08 - 0.0465, 0.0, TABLE_TOP + 0.08 + 0.018], "the ball rolled to the end without the hole"),
     ],
 )
-def test_a_ball_on_the_floor_and_a_cage_on_the_table_are_lost(body, place, reason):
+def test_what_is_lost_is_lost_for_its_own_reason(body, place, reason):
     world = load(TASK, NOMINAL)
     assert NOMINAL.failure(world) is None
     put(world, body, place)
@@ -209,10 +231,10 @@ class Lifted(BallCageEscape):
 
 @dataclass(frozen=True, kw_only=True)
 class Timid(BallCageEscape):
-    """The oracle does not reckon with the sill."""
+    """The oracle tilts less than the ball needs to roll."""
 
     def oracle(self, world):
-        yield from self.tip_only(world, math.radians(30.0))
+        yield from self.tip_only(world, math.radians(3.0))
 
 
 TOPPLES = {"stool_x": 0.045, "cage": HoledCage(face=SIDE)}
@@ -239,16 +261,12 @@ def test_every_constraint_refutes_for_its_own_reason():
         [
             BallCageEscape(cage=HoledCage(hole=0.024)),
             BallCageEscape(cage=HoledCage(hole=0.0145)),
-            BallCageEscape(cage=HoledCage(face=SIDE, offset=-0.005)),
             BallCageEscape(cage=HoledCage(face=TOP)),
-            BallCageEscape(cage=HoledCage(sill=0.010)),
+            BallCageEscape(cage=HoledCage(face=SIDE, height=0.056, hole=0.0165)),
             BallCageEscape(ball_y=0.02),
-            BallCageEscape(ball_x=0.01),
-            BallCageEscape(cage=HoledCage(trap_sill=0.0005)),
-            BallCageEscape(cage=HoledCage(sill=0.0012)),
-            BallCageEscape(cage=HoledCage(trap_x=-0.031)),
-            BallCageEscape(cage=HoledCage(trap=0.008)),
-            BallCageEscape(cage=HoledCage(trap=0.018), stool=Stool(height=0.02)),
+            BallCageEscape(ball_x=-0.045),
+            BallCageEscape(ball_x=0.022),
+            BallCageEscape(rolling=0.05),
             BallCageEscape(stool_x=0.0),
             BallCageEscape(**TOPPLES),
             BallCageEscape(y=-0.33),
