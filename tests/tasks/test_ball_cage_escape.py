@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 import pytest
-from attack.cheats import CHEATS
 from controls import (
     ablated,
     each_refuted_for_its_own_reason,
@@ -26,7 +25,8 @@ from scengen.assets.cage import SIDE, TOP, HoledCage, lowered
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.stool import Stool
 from scengen.episode import Episode
-from scengen.skills.motion import hold
+from scengen.skills.jaw import grasp
+from scengen.skills.motion import CLOSED, Pace, go_to, hold, until
 from scengen.tasks.ball_cage_escape import REST_SPEED, BallCageEscape
 
 TASK = load_task("ball_cage_escape")
@@ -85,22 +85,16 @@ def test_a_ball_that_is_shaken_out_is_lost_and_only_the_rule_forbids_it():
     assert outcomes == ["the ball was shaken out of the cage", "success"]
 
 
-def test_a_cage_that_is_not_lifted_frees_no_ball_and_only_the_rule_forbids_it():
-    plan = CHEATS["ball_cage_escape"]["slide_beside_the_stool"]
-    reasons = [
-        play(TASK, scenario, lambda world, s=scenario: plan(s, world)).reason
-        for scenario in (NOMINAL, unguarded(BallCageEscape)())
-    ]
-    assert reasons[0] == "the ball left a cage that was not lifted" != reasons[1]
+def slid(world):
+    """Grasp the cage, slide it on the stool until the hole is beside it, and lower that end."""
+    yield from until(NOMINAL.pick_up(world), lambda: world.arm.grip == CLOSED)
+    yield from grasp(world.arm)
+    yield from go_to(world.arm, world.arm.hand + 0.05 * NOMINAL.axes[:, 0], pace=Pace(0.05, 0.004))
+    yield from NOMINAL.tip(world, lowered(0.6), rate=0.5)
 
 
-@pytest.mark.parametrize("cheat", ["hop", "rock", "jerk_back", "slide_beside_the_stool"])
-def test_written_cheats_free_no_ball(cheat):
-    plan = CHEATS["ball_cage_escape"][cheat]
-    for index in range(3):
-        scenario = TASK.draw("id", 3, index).scenario
-        rollout = play(TASK, scenario, lambda world, s=scenario: plan(s, world))
-        assert not rollout.solved
+def test_a_ball_that_leaves_a_cage_on_its_stool_is_lost():
+    assert play(TASK, NOMINAL, slid).reason == "the ball left a cage that was not lifted"
 
 
 @pytest.mark.parametrize("rate", [0.25, 0.5, 1.0, 2.0])
