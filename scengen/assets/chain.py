@@ -126,11 +126,17 @@ class Lanes:
                     ends.append(foot + across)
         return {**feet, "slab": np.mean(ends, axis=0)}
 
+    @property
+    def slab_width(self) -> float:
+        """Width of the slab that counts [m]: that of one chain's, and the distance of the outermost lanes."""
+        one, *others = (chain.slab for chain in self.chains if not chain.astray)
+        return one.width + len(others) * self.spacing
+
     @cached_property
     def slab(self) -> Domino:
-        """The slab that counts: wider than that of one chain by the distance of the outermost lanes."""
-        one, *others = (chain.slab for chain in self.chains if not chain.astray)
-        return replace(one, width=one.width + len(others) * self.spacing)
+        """The slab that counts. A width beyond the bounds of `Domino` is an error."""
+        one = next(chain.slab for chain in self.chains if not chain.astray)
+        return replace(one, width=self.slab_width)
 
     def defects(self, *kinds: int) -> list[Defect]:
         """Defects of the given kinds."""

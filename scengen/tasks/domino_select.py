@@ -58,6 +58,8 @@ SLAB_DISPLACEMENT = 0.05
 """Displacement along the table at which a slab counts as knocked over [m] (paper, App. B, T17; T18 gives no number)."""
 MIN_CLEARANCE = 0.002
 """Free space across the chains that neighbouring chains must leave [m]: the jitter of the robustness check."""
+MAX_SLAB_WIDTH = 0.60
+"""Largest width of the red slab [m]: the bound of `Domino`, and less than that of the table."""
 CARRY_TOLERANCE = 0.01
 """Distance that a first tile's foot may move while the robot touches it [m]; a topple moves it by less than 1 mm."""
 
@@ -180,6 +182,8 @@ class DominoSelect(Scenario):
         yield require(beyond > height or not broken, "a falling tile reaches across the gap", gap=beyond, height=height)
         widest = max((drift.stretch * height for drift in self.lanes.defects(DRIFT)), default=0.0)
         yield require(widest < spaces, "the drift takes more space than the chain has", widest=widest, spaces=spaces)
+        width = self.lanes.slab_width
+        yield require(width <= MAX_SLAB_WIDTH, "the red slab is too wide", width=width, largest=MAX_SLAB_WIDTH)
         astray, room = len(self.lanes.defects(DECOY)), self.lanes.room
         yield require(astray == 1 and self.decoy_side != 0, "not one chain leads astray, at one side", chains=astray)
         yield require(room >= MIN_CLEARANCE, "a piece stands in a neighbouring chain", room=room, needed=MIN_CLEARANCE)

@@ -144,7 +144,7 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
     takes_task = "task" in task_files.groups(verb)
     assert takes_task == ("stout_starter turned_slab" in text) == ("+task.axes.NAME" in text)
     assert ("certify.robust.runs=4" in text) == ("certify" in task_files.groups(verb))
-    assert ("hydra.searchpath=" in text) == (takes_task or bool(re.search("^(pool|hits):", text, re.M)))
+    assert ("hydra.searchpath=" in text) == (takes_task or bool(re.search("^(pool|hits|replay):", text, re.M)))
 
 
 def test_the_help_of_a_chosen_task_tells_its_splits_alone():
