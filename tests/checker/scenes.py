@@ -152,7 +152,7 @@ FOREIGN = ("gravity_sideways", "robot_passes_through", "lighter_slab", "green_sl
 
 OTHERS: dict[str, dict[str, tuple[Change, str]]] = {
     "select_id": {
-        "decoy_is_red": (_recolour("decoy_0/box", "slab_1/box"), SAME),
+        "decoy_is_red": (_recolour("decoy/box", "slab/box"), SAME),
         "lighter_tiles": (_scaled("tile_2_1/box", "mass", 0.9), SAME),
         "tile_of_a_chain_moved": (_aside("tile_1_1", 0.002), SAME),
     },
