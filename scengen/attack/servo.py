@@ -61,9 +61,15 @@ def servo(player: Player) -> Iterator[Attempt]:
     """All attempts, for every arm with a jaw and every handled body in turn, the most promising ones first."""
     jaws = [arm for arm in player.world.arms if not arm.suction]
     bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
-    makers = (chased, carried, cradled)
-    of_one = _in_turn([made(player, arm, body) for arm, body in product(jaws, bodies) for made in makers])
-    swinging = [body for body in player.trace.handled if body not in bodies and body in moving(player)]
+    restless = moving(player)
+    of_one = _in_turn(
+        [
+            made(player, arm, body)
+            for arm, body in product(jaws, bodies)
+            for made in ((chased, carried, cradled) if body in restless else (carried, cradled))
+        ]
+    )
+    swinging = [body for body in player.trace.handled if body not in bodies and body in restless]
     of_hinged = [met(player, arm, body) for arm, body in product(jaws, swinging)]
     of_all = _in_turn([all_carried(player, arm, bodies) for arm in jaws]) if len(bodies) > 1 else iter(())
     yield from _in_turn([of_all, of_one, *of_hinged])
@@ -80,8 +86,6 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
     Then it is carried to its goal if it is not reached yet.
     """
-    if body not in moving(player):
-        return
     rest = bring(player, arm, body, ROUTES[1], 0.0)
     later = Macro("await", body, (), arm.number)
     plans = [("pursue", PURSUIT_LEADS), ("pin", BLOCK_LEADS), ("block", BLOCK_LEADS)]
