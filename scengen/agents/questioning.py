@@ -1,8 +1,8 @@
 """Stages 1 and 2: questions about a scenario, and a plan for it, asked from a model and graded."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from ..pool import PoolRow
 from .calls import Calls
@@ -12,6 +12,8 @@ from .models import Model, Turn
 from .replies import FormatError, Planned, Understanding, plan, plan_schema, understanding, understanding_schema
 from .scene import View, prompt, scene_text
 
+Artefact = TypeVar("Artefact")
+"""What a reply of a stage says."""
 UNDERSTAND = 1
 """Number of the stage of understanding."""
 PLAN = 2
@@ -96,15 +98,35 @@ def understand(exam: Exam, calls: Calls) -> tuple[Understanding | None, Result]:
     """Ask stage 1 until the artefact has no faults that show without the answers, and grade the best attempt."""
     frames = list(exam.view.frames)
     schema = understanding_schema(exam.facts, frames)
-    best, fewest, wrong_form, faults, attempt = None, float("inf"), "", list[str](), 0
-    while attempt < UNDERSTAND_ATTEMPTS:
-        attempt += 1
+
+    def ask(attempt: int, faults: Sequence[str]) -> tuple[Understanding, list[str]]:
         about = {**exam.about, "stage": UNDERSTAND, "attempt": attempt}
-        turns = understand_turns(exam, faults)
-        reply = calls.ask(about, turns, (), schema, exam.temperature, exam.stand_in)
+        reply = calls.ask(about, understand_turns(exam, faults), (), schema, exam.temperature, exam.stand_in)
+        found = understanding(reply.text, exam.facts)
+        return found, found.faults(exam.facts, frames)
+
+    best, attempts, told = _best(ask, UNDERSTAND_ATTEMPTS)
+    return best, Result(exam.about, UNDERSTAND, attempts, told, grade_understanding(best, exam.facts))
+
+
+def _best(
+    ask: Callable[[int, Sequence[str]], tuple[Artefact, list[str]]], most: int
+) -> tuple[Artefact | None, int, str]:
+    """Ask until an artefact has no faults that show without the answers.
+
+    Args:
+        ask: function of the number of the attempt and the faults of the last one, which returns an artefact and its
+            faults, or raises `FormatError`.
+        most: largest number of attempts.
+
+    Returns:
+        The artefact with the fewest faults, the number of attempts, and the last fault of form if there is no artefact.
+    """
+    best, fewest, wrong_form, faults, attempt = None, float("inf"), "", list[str](), 0
+    while attempt < most:
+        attempt += 1
         try:
-            found = understanding(reply.text, exam.facts)
-            faults = found.faults(exam.facts, frames)
+            found, faults = ask(attempt, faults)
         except FormatError as error:
             faults, wrong_form = [str(error)], str(error)
             continue
@@ -112,8 +134,7 @@ def understand(exam: Exam, calls: Calls) -> tuple[Understanding | None, Result]:
             best, fewest = found, len(faults)
         if not faults:
             break
-    told = "" if best else wrong_form
-    return best, Result(exam.about, UNDERSTAND, attempt, told, grade_understanding(best, exam.facts))
+    return best, attempt, "" if best else wrong_form
 
 
 def plan_turns(exam: Exam, artefact: Understanding, faults: Sequence[str] = ()) -> list[Turn]:
@@ -130,27 +151,20 @@ def make_plan(exam: Exam, artefact: Understanding | None, calls: Calls) -> Resul
     order = exam.sheet.plan
     vocabulary, conditions = order.vocabulary, order.conditions
     schema = plan_schema(vocabulary, exam.sheet.objects, conditions, [fact.id for fact in exam.facts])
-    best, fewest, wrong_form, faults, attempt = None, float("inf"), "", list[str](), 0
-    while attempt < PLAN_ATTEMPTS:
-        attempt += 1
+
+    def ask(attempt: int, faults: Sequence[str]) -> tuple[Planned, list[str]]:
         about = {**exam.about, "stage": PLAN, "attempt": attempt}
         turns = plan_turns(exam, artefact, faults)
         free = calls.ask({**about, "step": "free"}, turns, (), None, exam.temperature, exam.stand_in)
         named = Turn("user", prompt("plan", vocabulary=vocabulary, conditions=conditions))
         turns = [*turns, Turn("assistant", free.text), named]
         reply = calls.ask({**about, "step": "named"}, turns, (), schema, exam.temperature, exam.stand_in)
-        try:
-            found = plan(reply.text, vocabulary)
-            faults = found.faults(artefact)
-        except FormatError as error:
-            faults, wrong_form = [str(error)], str(error)
-            continue
-        if len(faults) < fewest:
-            best, fewest = found, len(faults)
-        if not faults:
-            break
+        found = plan(reply.text, vocabulary)
+        return found, found.faults(artefact)
+
+    best, attempts, told = _best(ask, PLAN_ATTEMPTS)
     grade = grade_plan(best, order, exam.sheet.objects) if best else None
-    return Result(exam.about, PLAN, attempt, "" if best else wrong_form, _plan_grades(grade, best))
+    return Result(exam.about, PLAN, attempts, told, _plan_grades(grade, best))
 
 
 def _plan_grades(grade: PlanGrade | None, planned: Planned | None = None) -> dict[str, Any]:
