@@ -24,6 +24,8 @@ from ..params import Value
 from ..pool.library import Library
 from ..samplers.task import Task
 from ..sim.world import IDLE, hands
+from .remote.client import ClientSettings, is_address
+from .remote.policy import RemotePolicy
 
 
 class Policy(Protocol):
@@ -142,12 +144,13 @@ def coordinates(task: Task, values: Mapping[str, Value]) -> NDArray[np.float64]:
     return np.array(found)
 
 
-def find_policy(name: str, memory: Library | None = None) -> Factory:
+def find_policy(name: str, memory: Library | None = None, client: ClientSettings | None = None) -> Factory:
     """The factory of a policy.
 
     Args:
-        name: a built-in name, or `module:factory` from the path or the working directory.
+        name: a built-in name, `module:factory` from the path or the working directory, or the address of a server.
         memory: training scenarios, for the policy `replay`.
+        client: names of observations and actions, for the policy of a server.
 
     Raises:
         ScengenError: there is no such policy.
@@ -156,9 +159,11 @@ def find_policy(name: str, memory: Library | None = None) -> Factory:
         return lambda env: NearestReplay(env, memory)
     if name in BUILT_IN:
         return BUILT_IN[name]
+    if client is not None and is_address(name):
+        return lambda env: RemotePolicy(env, name, client)
     module, colon, factory = name.partition(":")
     if not (colon and all(map(str.isidentifier, module.split(".")))):
-        raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory"])
+        raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory", "ws://HOST:PORT", "zmq://HOST:PORT"])
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:

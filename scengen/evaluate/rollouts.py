@@ -4,7 +4,9 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compose import load_task
 from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..episode import STRICT, check_rules
@@ -25,6 +28,7 @@ from ..work.log import Log
 from ..work.parallel import Workers, each
 from ..work.targets import refused, try_folder
 from .policies import FULL_RATE_POLICIES, REPLAY, Policy, find_policy, identity, make_policy, policy_errors
+from .remote.client import ClientSettings, address_of, is_address, read_client
 
 
 class BadPolicy(ScengenError):
@@ -49,6 +53,7 @@ class EvaluateSettings:
     action_filter: str | None = None
     action_repeat: int = 1
     rules: str = STRICT
+    client: str | None = None
 
     @cached_property
     def folders(self) -> list[str]:
@@ -58,7 +63,12 @@ class EvaluateSettings:
     @property
     def folder(self) -> Path:
         """Folder of the results."""
-        return Path(self.to or f"generated/evaluation/{self.policy.replace(':', '.')}")
+        return Path(self.to or Path("generated/evaluation", re.sub(r"[^\w.-]+", ".", self.policy)))
+
+    @cached_property
+    def remote(self) -> ClientSettings | None:
+        """Names of observations and actions of a policy behind a socket; None for other policies."""
+        return read_client(self.client, address_of(self.policy)) if is_address(self.policy) else None
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
@@ -67,6 +77,12 @@ class EvaluateSettings:
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
         if self.action_repeat != 1 and self.policy in FULL_RATE_POLICIES:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.policy} acts at 100 Hz: leave it out")
+        if self.remote:
+            for name, free in (("observations", None), ("action_repeat", 1)):
+                if getattr(self, name) != free:
+                    raise BadConfig(f"{name} = {getattr(self, name)}; {self.remote.file} decides it: leave it out")
+        elif self.client is not None:
+            raise BadConfig(f"client = {self.client}; policy {self.policy} is not behind a socket: leave it out")
 
 
 @dataclass(frozen=True, order=True)
@@ -111,25 +127,29 @@ def evaluate(
     pools = [Pool.open(folder).check() for folder in settings.folders]
     about, lost = _scenarios(pools, settings)
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
-    path, player = settings.folder / "episodes.jsonl", PolicyPlayer(settings, search)
-    depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
-    if settings.workers != 1:
-        player = PolicyPlayer(_for_workers(settings), search)  # each worker makes its own policy
-    if settings.fresh:
-        _move_aside(path)
+    path = settings.folder / "episodes.jsonl"
+    if settings.remote and settings.version is None and not settings.fresh and path.exists():
+        why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
+        raise BadConfig(f"{why}; say fresh=true to begin anew, or version=NAME from the start to be able to continue")
     remedy = "say fresh=true to begin anew (old episodes are moved aside), or choose another to="
-    with Log(path, depends, remedy) as log:
-        todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
-        done = len(wanted) - len(todo)
-        progress(done, len(wanted))
-        for count, episode in enumerate(each(player, todo, settings.workers), done + 1):
-            log.add({"task": about[episode["pool"], episode["scenario"]]["task"], **episode})
-            progress(count, len(wanted))
-        episodes = sorted(
-            ({**about[e["pool"], e["scenario"]], **e} for e in log.records if _id(e) in wanted),
-            key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
-        )
-        return Evaluation(episodes, done, lost)
+    with closing(PolicyPlayer(settings, search)) as player:
+        depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
+        if settings.fresh:
+            _move_aside(path)
+        play = player if settings.workers == 1 else PolicyPlayer(_for_workers(settings), search)  # one for each worker
+        with Log(path, depends, remedy) as log:
+            todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
+            done = len(wanted) - len(todo)
+            progress(done, len(wanted))
+            for count, episode in enumerate(each(play, todo, settings.workers), done + 1):
+                log.add({"task": about[episode["pool"], episode["scenario"]]["task"], **episode})
+                progress(count, len(wanted))
+            records = log.records
+    episodes = sorted(
+        ({**about[e["pool"], e["scenario"]], **e} for e in records if _id(e) in wanted),
+        key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
+    )
+    return Evaluation(episodes, done, lost)
 
 
 def _id(episode: Mapping[str, Any]) -> RolloutId:
@@ -172,12 +192,16 @@ def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, An
     """Everything on which the outcome of a rollout depends. More seeds or rollouts continue the same run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules")
     chosen = {name: getattr(settings, name) for name in names}
+    if settings.remote:
+        chosen["client"] = settings.remote.identity()
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
 def _for_workers(settings: EvaluateSettings) -> EvaluateSettings:
     """Settings for workers, which may run in another folder: with absolute paths."""
-    return replace(settings, pool=[str(Path(folder).resolve()) for folder in settings.folders], workers=1)
+    folders = [str(Path(folder).resolve()) for folder in settings.folders]
+    client = settings.remote and str(Path(settings.remote.file).resolve())
+    return replace(settings, pool=folders, client=client, workers=1)
 
 
 def _move_aside(path: Path) -> None:
@@ -233,30 +257,41 @@ class PolicyPlayer:
 
     def _identity(self, task: str) -> str:
         _, policy = self._prepared_for(task)
-        return identity(self.settings.policy, find_policy(self.settings.policy), policy)
+        factory = find_policy(self.settings.policy, client=self.settings.remote)
+        return identity(self.settings.policy, factory, policy)
 
     def _prepared_for(self, task: str) -> tuple[PoolEnv, Policy]:
         if self._running and self._running[0].task.name != task:
-            self._running[0].close()
-            self._running = None
+            self.close()
         if not self._running:
-            settings = self.settings
+            settings, remote = self.settings, self.settings.remote
             folders = [f for f in settings.folders if task in Pool.open(f).kinds("task")[0]]
             env = PoolEnv(
                 task,
                 folders,
-                settings.observations,
+                remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations,
                 width=settings.width,
                 height=settings.height,
                 action_filter=settings.action_filter,
-                action_repeat=settings.action_repeat,
+                action_repeat=remote.repeat if remote else settings.action_repeat,
                 rules=check_rules(settings.rules),
                 settle=True,
                 search=self.search,
             )
             memory = _training(folders) if settings.policy == REPLAY else None
-            self._running = env, make_policy(settings.policy, find_policy(settings.policy, memory), env)
+            factory = find_policy(settings.policy, memory, remote)
+            self._running = env, make_policy(settings.policy, factory, env)
         return self._running
+
+    def close(self) -> None:
+        """Close the environment, and the policy if it has a method `close`."""
+        if self._running:
+            env, policy = self._running
+            env.close()
+            if callable(close := getattr(policy, "close", None)):
+                with policy_errors(self.settings.policy, "its close"):
+                    close()
+            self._running = None
 
 
 def _training(folders: Sequence[str]) -> Library | None:

@@ -40,6 +40,8 @@ APART = {
     "scengen verify pool=generated/domino_single-id-demos": "the demonstrations are not made",
     "scengen curate": "the recording is not made",
     "scengen stats": "the recording is not made",
+    "scengen evaluate policy=ws://": "needs a server of policies",
+    "scengen evaluate policy=zmq://": "needs a server of policies",
     "scengen probe": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
