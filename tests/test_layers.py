@@ -30,7 +30,7 @@ LAYERS = (
     ("export", "evaluate"),
     ("analysis", "agents"),
     ("demos", "curate"),
-    ("ood", "drift"),
+    ("ood", "drift", "teleop"),
     ("conformance",),
     ("commands",),
     ("cli",),

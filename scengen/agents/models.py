@@ -5,19 +5,17 @@ is sent; retries, time limits and the journal are here anyway.
 """
 
 import base64
-import importlib
 import json
 import os
-import sys
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Protocol
 
-from ..errors import BadConfig, ForeignCode, ScengenError, cut
+from ..errors import BadConfig, ScengenError, cut
+from ..work.foreign import at_fault, factory_of
 
 TRIES = 5
 """Largest number of tries of a request that the server was too busy for."""
@@ -205,19 +203,13 @@ def made(name: str) -> Model:
         BadConfig: there is no such factory.
         ForeignCode: it raises an error.
     """
-    module, _, factory = name.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
+    factory = factory_of("model", name)
     try:
-        found = getattr(importlib.import_module(module), factory, None)
-        if not callable(found):
-            raise BadConfig(f"model = {cut(name)}; {module} has no function or class named {factory!r}")
-        model: Any = found()
+        model: Any = factory()
     except ScengenError:
         raise
     except Exception as error:
-        told = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
-        raise ForeignCode(f"model = {cut(name)} cannot be made ({told}); the fault is the model's") from error
+        raise at_fault("model", name, "its factory fails", error) from error
     if not callable(getattr(model, "reply", None)):
         raise BadConfig(f"model = {cut(name)}; its factory returned {type(model).__name__}, which has no method reply")
     return model

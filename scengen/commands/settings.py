@@ -1,5 +1,6 @@
 """Settings of commands: composed by Hydra, checked, and filled into dataclasses."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -14,6 +15,9 @@ from ..work.machine import cores
 from ..work.parallel import Workers
 
 T = TypeVar("T")
+
+TASK_SETTINGS = re.compile(r"(\+\+|\+|~)?task\.")
+"""Beginning of overrides that change the task."""
 
 
 def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
@@ -40,6 +44,11 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
     certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"]))
     certify_settings.check()
     return settings, task, certify_settings
+
+
+def task_overrides(overrides: Sequence[str]) -> list[str]:
+    """Those overrides of a command line that change the task."""
+    return [text for text in overrides if TASK_SETTINGS.match(text)]
 
 
 def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from ..validate.settings import CertifySettings
 from ..work.targets import try_file
 from . import FAILED, OK, Arguments, chosen, err, holder, remark, say, write
 from .film import check_format
-from .settings import read
+from .settings import read, task_overrides
 
 ORACLE = "oracle"
 """Value of `what` for the oracle without jitter."""
@@ -36,8 +36,6 @@ JITTER = "jitter"
 """Word before the number of a jittered oracle run in `what`, as in `jitter:3`."""
 FILMS = (".png", ".mp4")
 """Suffixes of films: a strip and a video."""
-TASK_SETTINGS = re.compile(r"(\+\+|\+|~)?task\.")
-"""Beginning of overrides that change the task."""
 TARGETS = ("goal", "target", "spot")
 """Names by which moves call the place where the hand or a body shall go [m]."""
 MAX_RUN = 1000
@@ -178,8 +176,7 @@ def _drawn(name: str, settings: TrySettings, arguments: Arguments) -> Stage:
     Raises:
         BadConfig: its scene does not compile.
     """
-    own = [text for text in arguments if TASK_SETTINGS.match(text)]
-    task: Task = compose.load_task(name, [*search_path(arguments), *own])
+    task: Task = compose.load_task(name, [*search_path(arguments), *task_overrides(arguments)])
     tries = list(task.proposals(settings.split, settings.seed, settings.index, task.design(settings.sampler)))
     proposal = tries[0] if tries[-1].refutation else tries[-1]
     where = f"{name}/{settings.split}@{settings.index}/{proposal.scenario.id}"

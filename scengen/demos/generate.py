@@ -40,6 +40,8 @@ KEPT = "kept"
 """Verdict of an attempt that is a demonstration."""
 FAILED = "failed"
 """Verdict of an attempt that is none."""
+GIVEN_UP = "given up"
+"""Reason of a driven attempt that its operator has discarded; it has no row."""
 APART = "apart"
 """Check whether a scenario is apart from those of other pools."""
 CHEAP_CHECKS = ("feasible", "compiles", "overlap", "rest", "unsolved")
@@ -231,32 +233,39 @@ def generate_demonstrations(
         limits = Limits(settings.limit_seconds, settings.limit_mb)
         extend(job, Wanted(KEPT, settings.n, limit, settings.workers, limits), records, journal, progress)
         with writing_told(folder):
-            return _finish(folder, task, config, settings.n, records, journal)
+            return finish(folder, task, config, settings.n, records, journal)
     finally:
         journal.close()
 
 
-def _finish(
+def finish(
     folder: Path,
     task: Task,
     config: DemonstrationConfig,
     n: int,
     records: Mapping[int, Record],
     journal: Journal,
+    operator: str | None = None,
 ) -> DemosSummary:
-    """Write the first n demonstrations, and count the attempts up to the last of them."""
+    """Write the first n demonstrations, and count the attempts up to the last of them.
+
+    Args:
+        operator: code of the person who drove the robot; None for scripted demonstrations.
+    """
     kept = first_of(records, KEPT, n)
     counted = [records[i] for i in sorted(records) if len(kept) < n or i <= kept[-1]]
-    failed = [r.index for r in counted if r.check == "solved"] if config.keep else []
+    lost = [r.index for r in counted if r.check == "solved" and r.reason != GIVEN_UP]
+    failed = lost if config.keep else []
     outcomes = Counter("success" if r.verdict == KEPT else r.reason.partition(":")[0] for r in counted if _played(r))
     manifest = DemonstrationManifest(
         config=config,
         n=n,
-        indices=len(counted),
+        indices=counted[-1].index + 1 if counted else 0,
         funnel=funnel(counted),
         reasons=dict(Counter(rejection(r) for r in counted if r.check)),
         outcomes=dict(outcomes),
         styles=dict(Counter(row.style for row in journal.rows(kept))),
+        operator=operator,
         **made_with(task),
     )
     written = write_demonstrations(folder, manifest, journal.rows(kept), journal.rows(failed))

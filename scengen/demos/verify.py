@@ -8,7 +8,7 @@ from ..certificate import as_json
 from ..errors import Infeasible, PoolError, ScengenError
 from ..fingerprint import fingerprint
 from ..params import canonical
-from ..pool.demonstrations import DEMONSTRATIONS, DemonstrationConfig, Demonstrations
+from ..pool.demonstrations import DEMONSTRATIONS, SCRIPTED, TELEOP, DemonstrationConfig, Demonstrations
 from ..pool.files import sha256
 from ..pool.row import DemonstrationRow
 from ..samplers.split import Split
@@ -105,11 +105,15 @@ class Judge:
             yield "there are actions that the teleoperation filter cannot give"
         if row.run >= self.config.runs or row.index * self.config.runs + row.run >= self.attempts:
             yield f"run {row.run} of index {row.index} is none of the {self.attempts} attempts that the manifest counts"
-        if row.style != chosen(self.config.styles, *row.key):
-            yield f"the style is {row.style}, that of this run is {chosen(self.config.styles, *row.key)}"
+        if row.style != (style := self._style(row)):
+            yield f"the style is {row.style}, that of this run is {style}"
         if difference_ := difference(row.scene_xml, rebuild(scenario), self.same_machine, row.embodiment):
             yield difference_
         yield from self._wrongly_drawn(row)
+
+    def _style(self, row: DemonstrationRow) -> str:
+        """The style that the manifest demands of a row."""
+        return TELEOP if TELEOP in self.config.styles else chosen(self.config.styles, *row.key)
 
     def _wrongly_drawn(self, row: DemonstrationRow) -> Iterator[str]:
         design = self.task.design(self.config.sampler)
@@ -174,7 +178,8 @@ def verify_demonstrations(
     if report.faults or report.declined:
         return report
     try:
-        check_styles(manifest.config.styles)
+        if manifest.source == SCRIPTED:
+            check_styles(manifest.config.styles)
         task = task_of_manifest(found, installed)
         task.shifts(manifest.config.split)
     except ScengenError as error:
@@ -185,7 +190,9 @@ def verify_demonstrations(
     same = manifest.fingerprint == fingerprint()
     if not same:
         report.remarks.append("made on a machine with different rounding: final states are not compared")
-    judge = Judge(task, manifest.config, manifest.indices, same, oracle)
+    if oracle and manifest.source == TELEOP:
+        report.remarks.append("driven by a person: there is no oracle to play them again")
+    judge = Judge(task, manifest.config, manifest.indices, same, oracle and manifest.source == SCRIPTED)
     order = _Order(manifest.config.runs)
 
     def rows() -> Iterator[DemonstrationRow]:

@@ -5,7 +5,6 @@ A policy is any object with the two methods of `Policy` that `factory(env)` retu
 """
 
 import hashlib
-import importlib
 import inspect
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -19,11 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..control.teleop import Filter, unfiltered
 from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
-from ..errors import BadConfig, ForeignCode, GaveUp, ScengenError, UnknownName, cut
+from ..errors import BadConfig, GaveUp, ScengenError, UnknownName, cut
 from ..params import Value
 from ..pool.library import Library
 from ..samplers.task import Task
 from ..sim.world import IDLE, hands
+from ..work.foreign import at_fault, factory_of, is_factory
 from .remote.client import ClientSettings, is_address
 from .remote.policy import RemotePolicy
 
@@ -161,22 +161,9 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
         return BUILT_IN[name]
     if client is not None and is_address(name):
         return lambda env: RemotePolicy(env, name, client)
-    module, colon, factory = name.partition(":")
-    if not (colon and all(map(str.isidentifier, module.split(".")))):
+    if not is_factory(name):
         raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory", "ws://HOST:PORT", "zmq://HOST:PORT"])
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
-    try:
-        found: Factory | None = getattr(importlib.import_module(module), factory, None)
-    except ModuleNotFoundError as error:
-        if error.name and module.startswith(error.name):
-            raise BadConfig(f"policy = {name}; there is no module {module!r} on the path or in this folder") from None
-        raise _at_fault(name, "its module cannot be imported", error) from error
-    except Exception as error:
-        raise _at_fault(name, "its module cannot be imported", error) from error
-    if not callable(found):
-        raise BadConfig(f"policy = {name}; {module} has no function or class named {factory!r}")
-    return found
+    return factory_of("policy", name)
 
 
 def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
@@ -206,7 +193,7 @@ def policy_errors(name: str, part: str) -> Iterator[None]:
     except ScengenError:
         raise
     except Exception as error:
-        raise _at_fault(name, f"{part} fails", error) from error
+        raise at_fault("policy", name, f"{part} fails", error) from error
 
 
 def identity(name: str, factory: Factory, policy: Policy) -> str:
@@ -238,8 +225,3 @@ def identity(name: str, factory: Factory, policy: Policy) -> str:
 
 def _sha(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _at_fault(name: str, what: str, error: Exception) -> ForeignCode:
-    told = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
-    return ForeignCode(f"policy = {cut(name)}; {what} ({told}); the fault is the policy's")

@@ -40,7 +40,7 @@ from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
 from .replay import DatasetRow, Snapshot, WitnessReplay
-from .sources import LEROBOT, ROBOMIMIC, opened, robot_of, rows_of, scenes_of
+from .sources import LEROBOT, ROBOMIMIC, opened, origins_of, robot_of, rows_of, scenes_of
 
 NONE = "none"
 """Value of `cameras` for a recording without pictures."""
@@ -166,7 +166,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
         lost = dict(unplayable(rows_of(pools, count), settings.workers))
         with _writer(settings, path, robot, streams, bodies_told, next(iter(tasks)), tuple(search)) as writer:
-            for row in rows_of(pools, count):
+            for row, origin in zip(rows_of(pools, count), origins_of(pools, count), strict=True):
                 if row.id in lost:
                     left_out[str(row.name)] = lost[row.id]
                     continue
@@ -176,7 +176,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
                     observe = partial(Snapshot.of, world, writer.streams, pictures)
                     replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe)
-                    if not writer.episode(replay):
+                    if not writer.episode(replay, origin):
                         failed.append(str(row.name))
                 if isinstance(row, DemonstrationRow):
                     styles[row.style] += 1
@@ -208,8 +208,12 @@ class Writer(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
-    def episode(self, replay: WitnessReplay) -> bool:
-        """Add one scenario's episode, and return whether it reached the goal."""
+    def episode(self, replay: WitnessReplay, origin: Mapping[str, str]) -> bool:
+        """Add one scenario's episode, and return whether it reached the goal.
+
+        Args:
+            origin: source and operator of a demonstration.
+        """
         ...
 
     def finish(self, source: Mapping[str, Any]) -> None:
@@ -250,7 +254,7 @@ class _LeRobotWriter(DatasetWriter):
         super().__init__(path, settings.rate, robot, features, settings.camera_names, size)
         self.settings, self.streams, self._bodies = settings, streams, bodies
 
-    def episode(self, replay: WitnessReplay) -> bool:
+    def episode(self, replay: WitnessReplay, origin: Mapping[str, str]) -> bool:
         row, success = replay.row, False
         size, views = (self.settings.width, self.settings.height), cameras_of(row.embodiment)
         for name in self.settings.camera_names:
@@ -261,7 +265,8 @@ class _LeRobotWriter(DatasetWriter):
             success = dataset_row.success
         columns = row.plain()
         further = DEMONSTRATION_COLUMNS if isinstance(row, DemonstrationRow) else ()
-        told = {f"scengen/{name}": columns[name] for name in (*EPISODE_COLUMNS, *further)}
+        columns |= origin
+        told = {f"scengen/{name}": columns[name] for name in (*EPISODE_COLUMNS, *further, *origin)}
         model = replay.world.model
         present = {model.body(i).name for i in range(model.nbody)}
         absent = ",".join(body for body in self._bodies if body not in present)

@@ -82,7 +82,7 @@ class Demonstrations:
         self._data = self._file.create_group("data")
         self._masks: dict[str, list[str]] = defaultdict(list)
 
-    def episode(self, replay: WitnessReplay) -> bool:
+    def episode(self, replay: WitnessReplay, origin: Mapping[str, str]) -> bool:
         """Add one scenario's demonstration, and return whether it reached the goal.
 
         Raises:

@@ -1,7 +1,7 @@
 """Sources of recordings: pools, whose witnesses are played, and demonstrations."""
 
 from collections.abc import Iterator, Sequence
-from itertools import chain, islice
+from itertools import chain, islice, repeat
 
 from ..errors import BadConfig, PoolError
 from ..pool import Pool
@@ -54,6 +54,17 @@ def rows_of(pools: Sequence[Source], count: int) -> Iterator[SceneRow]:
 
 def _rows_of(source: Source) -> Iterator[SceneRow]:
     yield from source.rows()
+
+
+def origins_of(pools: Sequence[Source], count: int) -> Iterator[dict[str, str]]:
+    """Source and operator of each of the first rows, for demonstrations; nothing for pools."""
+    return islice(chain.from_iterable(repeat(_origin(source), len(source)) for source in pools), count)
+
+
+def _origin(source: Source) -> dict[str, str]:
+    if isinstance(source, Pool):
+        return {}
+    return {"source": source.manifest.source, "operator": source.manifest.operator or ""}
 
 
 def robot_of(pools: Sequence[Source]) -> str:

@@ -1,6 +1,7 @@
 """Demonstrations on disk: a folder with `demonstrations.json` and Parquet files. As a pool, it is data only."""
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -44,6 +45,12 @@ FAILED = "failed.parquet"
 """File of the failed attempts, if they were kept."""
 DEMONSTRATIONS_FORMAT = 1
 """Version of the format, which changes with the columns, the names of files and the entries of the manifest."""
+SCRIPTED = "scripted"
+"""Source of demonstrations that an oracle has played."""
+TELEOP = "teleop"
+"""Source of demonstrations that a person has driven, and the style of all of them."""
+OPERATOR = re.compile(r"[a-z]{0,4}[0-9]{1,6}")
+"""Code of an operator: short, and no name."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,7 @@ class DemonstrationManifest:
     n: int
     """Number of demonstrations that were asked for."""
     indices: int
-    """Number of attempts: of indices, times the runs of each."""
+    """Number of attempts: of indices, times the runs of each. Runs that a person did not need are counted, too."""
     funnel: Mapping[str, int]
     """Number of attempts that got through each step."""
     reasons: Mapping[str, int]
@@ -95,6 +102,8 @@ class DemonstrationManifest:
     """Files of the demonstrations, in the order of the attempts."""
     failed: FileEntry | None = None
     """File of the failed attempts, if they were kept."""
+    operator: str | None = None
+    """Code of the person who drove the robot; None for scripted demonstrations."""
 
     @classmethod
     def read(cls, folder: Path) -> "DemonstrationManifest":
@@ -133,6 +142,11 @@ class DemonstrationManifest:
         return {key: node for key, node in self.config.task.items() if key != "name"}
 
     @property
+    def source(self) -> str:
+        """Origin of the actions: `TELEOP` or `SCRIPTED`."""
+        return SCRIPTED if self.operator is None else TELEOP
+
+    @property
     def files(self) -> tuple[FileEntry, ...]:
         """All files with rows."""
         return self.shards if self.failed is None else (*self.shards, self.failed)
@@ -157,6 +171,10 @@ def _check(manifest: DemonstrationManifest) -> None:
     for entry in manifest.files:
         check_entry(entry)
     demand(len({entry.file for entry in manifest.files}) == len(manifest.files), "a file is listed twice")
+    if manifest.operator is not None:
+        check_match("operator", manifest.operator, OPERATOR)
+    demand((manifest.operator is None) == (TELEOP not in config.styles), f"style {TELEOP} and an operator go together")
+    demand(TELEOP not in config.styles or len(config.styles) == 1, f"{TELEOP} stands beside other styles")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)

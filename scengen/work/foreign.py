@@ -1,0 +1,48 @@
+"""Code of users that a setting names as `module:factory`."""
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadConfig, ForeignCode, cut
+
+
+def is_factory(name: str) -> bool:
+    """Whether a text is spelled `module:factory`."""
+    module, colon, factory = name.partition(":")
+    return bool(colon and factory.isidentifier() and all(map(str.isidentifier, module.split("."))))
+
+
+def factory_of(setting: str, name: str) -> Callable[..., Any]:
+    """The function or class that `module:factory` names; the module is on the path or in the working directory.
+
+    Args:
+        setting: name of the setting, for errors.
+
+    Raises:
+        BadConfig: there is no such module, or nothing callable of that name in it.
+        ForeignCode: the module cannot be imported.
+    """
+    module, _, factory = name.partition(":")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        found = getattr(importlib.import_module(module), factory, None)
+    except ModuleNotFoundError as error:
+        if error.name and module.startswith(error.name):
+            what = f"there is no module {module!r} on the path or in this folder"
+            raise BadConfig(f"{setting} = {cut(name)}; {what}") from None
+        raise at_fault(setting, name, "its module cannot be imported", error) from error
+    except Exception as error:
+        raise at_fault(setting, name, "its module cannot be imported", error) from error
+    if not callable(found):
+        raise BadConfig(f"{setting} = {cut(name)}; {module} has no function or class named {factory!r}")
+    return found
+
+
+def at_fault(setting: str, name: str, what: str, error: Exception) -> ForeignCode:
+    """The error for a fault of a user's code."""
+    told = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
+    return ForeignCode(f"{setting} = {cut(name)}; {what} ({told}); the fault is the {setting}'s")
