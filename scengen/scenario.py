@@ -122,8 +122,8 @@ class Scenario(abc.ABC):
     Families with much in common may share one abstract base, which derives from `Scenario` directly. Such a base
     declares every field that it uses, so that it can be read without its families.
 
-    A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `shortcuts`,
-    `ablations`, `constraints`, `features`, `facts`, geometry.
+    A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `steps`,
+    `shortcuts`, `ablations`, `constraints`, `features`, `facts`, geometry.
     """
 
     HOLD: ClassVar[float] = 0.0
@@ -193,6 +193,16 @@ class Scenario(abc.ABC):
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         """Tempting plans that must fail, by name in snake_case."""
+        return {}
+
+    def steps(self) -> Mapping[str, Planner]:
+        """Moves by which sub-goals of `conf/facts/<task>.yaml` are carried out, by their names.
+
+        A move starts from the state that the steps before it left. For a sub-goal of a right plan it is the oracle's
+        own part, for a wrong one a shortcut's. The move of a sub-goal that may be repeated does one round, and yields
+        nothing if nothing is left to do. The method is called anew for every rollout, so that moves may share what was
+        sensed. A family states moves of all sub-goals of its right plans but those that only look, or none.
+        """
         return {}
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:

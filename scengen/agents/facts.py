@@ -132,7 +132,7 @@ class Sheet:
         return self.names.get(body, self.names.get(pattern))
 
     def check(self, task: Task) -> None:
-        """Raise `BadConfig` unless the sheet fits the task: kinds, options, objects, and who answers what."""
+        """Raise `BadConfig` unless the sheet fits the task: kinds, options, objects, who answers what, and moves."""
         where = f"conf/facts/{task.name}.yaml"
         for id_, question in self.facts.items():
             if question.kind not in KINDS:
@@ -146,6 +146,11 @@ class Sheet:
         answered, asked = set(task.nominal.facts()), {id_ for id_, q in self.facts.items() if _by_family(id_, q)}
         if odd := sorted((answered - {SIMPLEST_PLAN}) ^ asked):
             raise BadConfig(f"{where} and {task.family.__name__}.facts() differ in {', '.join(odd)}; give both")
+        moves = task.nominal.steps()
+        if strange := [name for name in moves if name not in self.plan.vocabulary]:
+            raise UnknownName(f"sub-goal of {task.family.__name__}.steps()", strange[0], self.plan.vocabulary)
+        if moves and (still := [name for name in self.plan.moving if name not in moves]):
+            raise BadConfig(f"{task.family.__name__}.steps() has no move for {', '.join(still)} of {where}; add it")
 
     def facts_of(self, task: Task, params: Mapping[str, Value], checks: tuple[Check, ...]) -> tuple[Fact, ...]:
         """The facts of one scenario.

@@ -45,6 +45,20 @@ class Order:
         return frozenset(name for name, subgoal in self.subgoals.items() if subgoal.senses)
 
     @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the sub-goals of right plans that need a move."""
+        return tuple(name for name, subgoal in self.subgoals.items() if not subgoal.senses)
+
+    @cached_property
+    def sensed(self) -> frozenset[str]:
+        """Conditions that only sub-goals which bring information give."""
+        given = {
+            senses: {c for s in self.subgoals.values() if s.senses == senses for c in s.gives}
+            for senses in (False, True)
+        }
+        return frozenset(given[True] - given[False])
+
+    @property
     def vocabulary(self) -> dict[str, str]:
         """Outcomes of all sub-goals by name, the wrong ones among them, in alphabetical order."""
         right = {name: subgoal.outcome for name, subgoal in self.subgoals.items()}

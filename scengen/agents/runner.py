@@ -4,7 +4,7 @@ import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from ..work.targets import try_folder, write
 from . import facts
 from .acting import MODES, SEE, act
 from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
+from .execution import EXECUTIONS, Executions
 from .facts import Fact, Sheet
 from .models import Endpoint, Model, Turn, made
 from .priors import prior_shares
@@ -57,6 +58,7 @@ class AgentSettings:
     spacing: float = 0.5
     budget: Budget = Budget()
     mode: str = SEE
+    execute: bool = True
     dry: bool = False
 
     @cached_property
@@ -171,15 +173,21 @@ def run(
     folder = settings.folder
     try_folder(folder)
     path = folder / CALLS
-    with Log(path, settings.identity, "choose another to= for another model") as log:
-        calls = Calls(log, model, settings.budget)
+    with (
+        Log(path, settings.identity, "choose another to= for another model") as log,
+        Log(folder / EXECUTIONS, {"plans": "carried out"}) as played,
+    ):
+        calls, executions = Calls(log, model, settings.budget), Executions(played) if settings.execute else None
         if settings.model.startswith(TRANSCRIPT):
             calls.recall(Path(settings.model.removeprefix(TRANSCRIPT)))
         write(folder / SETTINGS, json.dumps(asdict(settings), indent=1) + "\n")
         results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
         try:
             for work, exam, env in exams(settings, todo, ask, search):
-                results += [{**_labels(work), **each.plain()} for each in _stages(settings, exam, calls, env)]
+                found = _stages(settings, exam, calls, env)
+                if settings.stage == PLAN and executions:
+                    found[-1] = _executed(work, exam, found[-1], executions)
+                results += [{**_labels(work), **each.plain()} for each in found]
                 progress(sum(r["stage"] == settings.stage for r in results), total)
         except OutOfBudget as error:
             stopped = str(error)
@@ -195,6 +203,13 @@ def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv) -> 
         return [act(exam, calls, env, settings.mode)]
     artefact, first = understand(exam, calls)
     return [first] if settings.stage == UNDERSTAND else [first, make_plan(exam, artefact, calls)]
+
+
+def _executed(work: Work, exam: Exam, result: Result, executions: Executions) -> Result:
+    """The result of stage 2 with what became of its plan; None if there is no plan, or the task states no moves."""
+    names, scenario = result.grades["plan"], work.task.scenario(work.row.params)
+    outcome = executions.of(work.row, scenario, names, exam.sheet.plan) if names else None
+    return replace(result, grades={**result.grades, "executed": outcome})
 
 
 def exams(

@@ -77,13 +77,25 @@ def take_handle(arm: Arm, hook: Hook, body: str, stretch: float) -> Plan:
     yield from pick(arm, at, closing=rot[:, 1], lift=0.0)
 
 
+Leg = tuple[float, float, float]
+"""Target of `slide`: bearing, inside, beside."""
+
+
 def pull(arm: Arm, hook: Hook, body: str, cube: str, half: float, to: float, mirror: float = 1.0) -> Plan:
     """Pass the held hook by a cube on the side away from its tip, put the tip behind the cube, and pull.
+
+    See `pull_legs` for the arguments.
+    """
+    for leg in pull_legs(arm, hook, cube, half, to, mirror):
+        yield from slide(arm, hook, body, *leg)
+
+
+def pull_legs(arm: Arm, hook: Hook, cube: str, half: float, to: float, mirror: float = 1.0) -> list[Leg]:
+    """The four legs of a pull: before the cube, past it, the tip behind it, and back with the cube.
 
     Args:
         arm: the arm.
         hook: the hook.
-        body: the hook's body.
         cube: the cube's body.
         half: half the cube's edge [m].
         to: final distance of the cube's centre from the robot's first axis [m].
@@ -98,8 +110,8 @@ def pull(arm: Arm, hook: Hook, body: str, cube: str, half: float, to: float, mir
         half + to,
     )
     past, against = across + PASSING_CLEARANCE + hook.aside + hook.width / 2, half + hook.width / 2 - SQUARING_PUSH
-    for inside, beside in ((before, past), (behind, past), (behind, against), (drawn, against)):
-        yield from slide(arm, hook, body, bearing, inside, mirror * beside)
+    legs = ((before, past), (behind, past), (behind, against), (drawn, against))
+    return [(bearing, inside, mirror * beside) for inside, beside in legs]
 
 
 def slide(arm: Arm, hook: Hook, body: str, bearing: float, inside: float, beside: float) -> Plan:

@@ -1,4 +1,4 @@
-"""Moves of a two-finger jaw: pick up, put down, poke. See `motion`."""
+"""Moves of a two-finger jaw: pick up, put down, poke, and their parts. See `motion`."""
 
 from collections.abc import Generator
 
@@ -64,11 +64,16 @@ def pick(
         squeeze: time for which the jaw closes [s].
         pace: pace of the way down.
     """
+    yield from come_down(arm, at, closing, above, pace)
+    yield from grasp(arm, squeeze)
+    yield from retreat(arm, lift)
+
+
+def come_down(arm: Arm, at: ArrayLike, closing: ArrayLike, above: float = 0.10, pace: Pace = FINE) -> Plan:
+    """Come down on an object from above with the open jaw, as `pick` does, and do not close it."""
     target, rot = np.asarray(at, float), closing_along(arm, closing)
     yield from go_to(arm, target + above * UP, rot, COARSE, OPEN)
     yield from go_to(arm, target, rot, pace, OPEN)
-    yield from grasp(arm, squeeze)
-    yield from retreat(arm, lift)
 
 
 def put(
@@ -93,11 +98,25 @@ def put(
         speed: speed on the last stretch [m/s].
         near: length of the last stretch [m].
     """
+    yield from lower(arm, body, at, on, hover, down, speed, near)
+    yield from release(arm)
+
+
+def lower(
+    arm: Arm,
+    body: str,
+    at: ArrayLike,
+    on: str,
+    hover: float = 0.10,
+    down: ArrayLike = -UP,
+    speed: float = 0.04,
+    near: float = 0.01,
+) -> Plan:
+    """Carry a held body over a place and lower it until it touches `on`, as `put` does, and do not release it."""
     target, last = np.asarray(at, float), np.asarray(down, float)
     yield from carry(arm, body, target + hover * UP, pace=COARSE)
     yield from carry(arm, body, target - near * last)
     yield from push(arm, speed * last, until=lambda: arm.world.touching(body, on))
-    yield from release(arm)
 
 
 def carry(
@@ -160,9 +179,21 @@ def poke(
         rot: orientation of the hand. By default it points down with its fingers side by side across the motion.
         pace: pace of the way down.
     """
+    yield from come_beside(arm, start, velocity, above, rot, pace)
+    yield from push(arm, velocity, until)
+    yield from step_back(arm, velocity, back)
+
+
+def come_beside(
+    arm: Arm, start: ArrayLike, velocity: Vec3, above: float = 0.10, rot: Mat3 | None = None, pace: Pace = STEADY
+) -> Plan:
+    """Come down beside an object with closed fingers, as `poke` does."""
     at, along = np.asarray(start, float), velocity / np.linalg.norm(velocity)
     rot = closing_along(arm, [-along[1], along[0], 0.0]) if rot is None else rot
     yield from go_to(arm, at + above * UP, rot, COARSE, CLOSED)
     yield from go_to(arm, at, rot, pace)
-    yield from push(arm, velocity, until)
-    yield from go_to(arm, arm.hand + back * (UP - along), pace=COARSE)
+
+
+def step_back(arm: Arm, velocity: Vec3, back: float = 0.03) -> Plan:
+    """Move back from a push and up by `back` [m] each."""
+    yield from go_to(arm, arm.hand + back * (UP - velocity / np.linalg.norm(velocity)), pace=COARSE)

@@ -40,11 +40,11 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import OPEN_GAP, pinch
-from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, pick, release
-from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to
+from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, wait
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
 RELEASE_TIME = 0.1
@@ -133,8 +133,12 @@ class UprightRod(RodAndRidge[InlaidRod]):
             across: place of the foot, along the rod's y from its middle, that comes over the ridge's middle [m].
         """
         yield from self.bring(world, across)
-        yield from push(world.arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
+        yield from self._set_down(world)
         yield from self.leave(world)
+
+    def _set_down(self, world: World) -> Plan:
+        """Lower the held rod until it touches the ridge."""
+        yield from push(world.arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
 
     def leave(self, world: World) -> Plan:
         """Open the jaw and go straight up, slowly while the fingers are beside the rod."""
@@ -163,6 +167,18 @@ class UprightRod(RodAndRidge[InlaidRod]):
         rod = math.atan2(*world.rot("rod")[1::-1, 0])
         return about_z(rod + math.remainder(yaw - rod, math.pi / 2))
 
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "take_top": self.lift,
+            "bring_over": lambda world: self.bring(world, self.rod.com),
+            "set_down": self._set_down,
+            "let_go": self.leave,
+            "stays": lambda world: wait(world.arm, lambda: self.success(world), give_up=4.0),
+            "drop_rod": self._drop_held,
+            "lay_across": self._lay_held,
+            "hold_on": lambda world: hold(world.arm, 3 * self.HOLD),
+        }
+
     # --- shortcuts and ablations ------------------------------------------------------------
 
     @property
@@ -190,6 +206,10 @@ class UprightRod(RodAndRidge[InlaidRod]):
     def _drop(self, world: World) -> Plan:
         """Let the rod fall on the ridge."""
         yield from self.lift(world)
+        yield from self._drop_held(world)
+
+    def _drop_held(self, world: World) -> Plan:
+        """Let the held rod fall on the ridge."""
         yield from self.bring(world, self.rod.com, DROP_HEIGHT)
         yield from self.leave(world)
 
@@ -207,6 +227,10 @@ class UprightRod(RodAndRidge[InlaidRod]):
     def _lay(self, world: World) -> Plan:
         """Lay the rod level across the ridge, with its centre of mass over it."""
         yield from self.lift(world)
+        yield from self._lay_held(world)
+
+    def _lay_held(self, world: World) -> Plan:
+        """Lay the held rod level across the ridge, with its centre of mass over it."""
         yield from self.bring(world, self.rod.com, LIFT_HEIGHT)
         arm, start = world.arm, world.arm.hand_rot
         level = np.column_stack([start[:, 0], -start[:, 2], start[:, 1]])
@@ -219,7 +243,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
         """Hold the rod upright on the ridge."""
         yield from self.lift(world)
         yield from self.bring(world, self.rod.com)
-        yield from push(world.arm, -0.02 * UP, until=lambda: world.touching("rod", RIDGE))
+        yield from self._set_down(world)
         yield from hold(world.arm, 3 * self.HOLD)
 
     def _beside(self, world: World) -> Plan:

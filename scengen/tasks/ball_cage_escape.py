@@ -25,6 +25,7 @@ slid off its stool in the hand is as good as lifted.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import mujoco
@@ -38,10 +39,10 @@ from ..geometry import UP, Mat3, Vec3, about_z, shortest, spoken
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills.jaw import pick, poke
-from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, turn_about_vertical, turn_to, wait
+from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, retreat, turn_about_vertical, turn_to, wait
 
 REST_SPEED = 0.02
 """Speed below which the ball counts as at rest [m/s]: at the nominal rolling resistance it stops within 1 mm."""
@@ -60,6 +61,7 @@ END_MARGIN = 0.001
 """Distance from the wall at which a ball has come to an end of the cage [m]."""
 GRIP_HEIGHT = 0.030
 """Height of the grip site above the foot of the cage [m]: the finger tips, 9 mm lower, stay 21 mm above the stool."""
+LIFT_HEIGHT = 0.05  # height by which the cage is lifted off the stool [m]
 CARRY_PACE = Pace(0.15, 0.01)  # pace with the cage in the hand: slow enough for the ball to stay where it is
 
 
@@ -133,13 +135,17 @@ class BallCageEscape(Scenario):
         """Lift the cage, carry it aside, and tip it until the ball is over the sill and out."""
         yield from self.pick_up(world)
         yield from self.present(world, self.tilts()[-1])
+        yield from self._tip_out(world)
+        yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
+
+    def _tip_out(self, world: World) -> Plan:
+        """Tip the held cage from one tilt to the next until the ball is out."""
         for down in self.tilts():
             if self.out(world):
                 break
             yield from self.tip(world, down)
             yield from hold(world.arm, 0.3)
             yield from wait(world.arm, lambda: self.out(world) or still(world, "ball", REST_SPEED), give_up=3.0)
-        yield from wait(world.arm, lambda: self.success(world), give_up=4.0)
 
     def tilts(self) -> list[Vec3]:
         """Unit vectors in the cage's axes that must point down, one after the other."""
@@ -154,9 +160,9 @@ class BallCageEscape(Scenario):
             return [lowered(self.way * STEEP)]
         return [lowered(self.way * (self.rolling_tilt + GENTLE + math.radians(more))) for more in (0.0, 3.0, 6.0)]
 
-    def pick_up(self, world: World) -> Plan:
-        """Take the cage by its width and lift it clear of the stool."""
-        yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=0.05)
+    def pick_up(self, world: World, lift: float = LIFT_HEIGHT) -> Plan:
+        """Take the cage by its width and lift it clear of the stool [m]."""
+        yield from pick(world.arm, self.handle, closing=self.axes[:, 1], lift=lift)
 
     def present(self, world: World, down: Vec3) -> Plan:
         """Carry the cage level to a free place, low over the table, and turn it so that `down` can come to point down.
@@ -191,6 +197,17 @@ class BallCageEscape(Scenario):
         rot = shortest(world.rot("cage") @ down, -UP) @ world.arm.hand_rot
         yield from turn_to(world.arm, rot, rate, until=lambda: self.out(world))
 
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "take_cage": partial(self.pick_up, lift=0.0),
+            "lift_off": lambda world: retreat(world.arm, LIFT_HEIGHT),
+            "carry_aside": lambda world: self.present(world, self.tilts()[-1]),
+            "tilt_to_hole": self._tip_out,
+            "ball_out": lambda world: wait(world.arm, lambda: self.success(world), give_up=4.0),
+            "shake": self._shake_held,
+            "tilt_to_trap": lambda world: self.tip(world, lowered(-self.way * STEEP), rate=0.5),
+        }
+
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
@@ -217,6 +234,10 @@ class BallCageEscape(Scenario):
     def _shake(self, world: World, tilt: float = 0.0, spin: float = 0.0) -> Plan:
         """Shake the cage along its length as hard as the hand can; if `spin` is not 0, the wrist turns to and fro."""
         yield from self.tip_only(world, tilt)
+        yield from self._shake_held(world, spin)
+
+    def _shake_held(self, world: World, spin: float = 0.0) -> Plan:
+        """Shake the held cage along its length for 4 s."""
         end = world.time + 4.0
         while world.time < end:
             sign = 1.0 if world.time % 0.6 < 0.3 else -1.0

@@ -38,7 +38,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
-from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
@@ -169,6 +169,17 @@ class CrackerBoxJaw(BoxAndSlot):
         """Whether the box' middle is at the height of its seat."""
         return abs(world.com("box")[2] - self.seat[2]) < HEIGHT_TOLERANCE
 
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "take_thickness": lambda world: self.take(world.arm),
+            "lean_in": lambda world: self.insert(world.arm),
+            "let_go": lambda world: self.leave(world.arm),
+            "knock_home": lambda world: () if self.down(world) else self.knock(world.arm),
+            "take_width": lambda world: self._pick_flat_side(world.arm),
+            "lay_level": lambda world: self._lower_held(world.arm),
+            "topple": self._topple,
+        }
+
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
@@ -204,8 +215,12 @@ class CrackerBoxJaw(BoxAndSlot):
 
     def _lower_level(self, world: World) -> Plan:
         """Turn the box level in the hand, lower it over the slot until the palm meets something, let go."""
-        arm = world.arm
-        yield from self.take(arm)
+        yield from self.take(world.arm)
+        yield from self._lower_held(world.arm)
+
+    def _lower_held(self, arm: Arm) -> Plan:
+        """Lower the held box level, see `_lower_level`."""
+        world = arm.world
         for angle in (math.radians(60.0), math.radians(30.0), 0.0):
             _, rot = self.leaning(world, angle)
             with suppress(GaveUp):
@@ -220,11 +235,15 @@ class CrackerBoxJaw(BoxAndSlot):
 
     def _take_flat_side(self, world: World) -> Plan:
         """Close the jaw across the width of the box, and carry on."""
-        arm, top = world.arm, world.pos("box") + self.box.size[2] * UP
-        yield from jaw.pick(arm, top + 0.01 * UP, world.rot("box")[:, 1], above=0.08, lift=LIFT_HEIGHT)
+        yield from self._pick_flat_side(world.arm)
         with suppress(GaveUp):
-            yield from self.insert(arm)
-        yield from self.leave(arm)
+            yield from self.insert(world.arm)
+        yield from self.leave(world.arm)
+
+    def _pick_flat_side(self, arm: Arm) -> Plan:
+        """Close the jaw across the width of the box, and lift."""
+        top = arm.world.pos("box") + self.box.size[2] * UP
+        yield from jaw.pick(arm, top + 0.01 * UP, arm.world.rot("box")[:, 1], above=0.08, lift=LIFT_HEIGHT)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """A slot that is 20 mm too short; a box so slippery that the jaw, which holds 0.8 N then, cannot hold it."""

@@ -36,7 +36,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
-from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import Arm, World
 from ..skills.jaw import poke
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, push, retreat, turn_to, until
@@ -146,6 +146,18 @@ class CrackerBoxSuction(BoxAndSlot):
     def origin(self, rot: Mat3, above: float) -> Vec3:
         """Position of the box' origin with its middle over the middle of the slot, `above` its seat [m]."""
         return self.seat + above * UP - self.box.size[2] / 2 * rot[:, 2]
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "take_face": lambda world: self.take(world.arm),
+            "turn_flat": lambda world: self.tip(world.arm),
+            "bring": lambda world: self.bring(world.arm, self.laid(world)),
+            "lower": lambda world: self.lower(world.arm, self.laid(world)),
+            "let_go": lambda world: let_go(world.arm),
+            "take_top": lambda world: self._take_top(world.arm),
+            "drop_box": self._let_drop,
+            "knock_over": self._knock_over,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -28,8 +28,9 @@ Decisions, where the paper (App. B, T24) is silent:
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -45,7 +46,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP_BELOW, TIP_SPAN_CLOSED, pinch
 from ..robots.panda import BASE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills import motion
 from ..skills.grip import take
@@ -68,6 +69,7 @@ so chaotically that a nanometre at the start decides where it comes to rest, and
 misses."""
 MAX_POUR_TILT = math.radians(130.0)  # largest tilt of the cup to which a hand at `POUR_DISTANCE` turns it [rad]
 TURN_RATE = 1.2  # rate at which the cup turns while the block cannot slide yet, and back [rad/s]
+LIFT_HEIGHT = 0.06  # height by which the cup is lifted [m]
 POUR_RATE = 0.3  # rate at which the cup turns while it pours [rad/s]
 REST_SPEED = 0.02  # speed below which the block counts as at rest [m/s]
 
@@ -125,10 +127,10 @@ class CupExtract(Scenario):
         yield from self.put_down(world, self.aside)
         yield from self.place_block(world)
 
-    def take_cup(self, world: World) -> Plan:
-        """Grasp the upright of the handle and lift the cup clear of the table."""
+    def take_cup(self, world: World, lift: float = LIFT_HEIGHT) -> Plan:
+        """Grasp the upright of the handle and lift the cup clear of the table [m]."""
         rot = world.rot("cup")
-        yield from pick(world.arm, world.pos("cup") + rot @ self.cup.grip, rot[:, 1], lift=0.06)
+        yield from pick(world.arm, world.pos("cup") + rot @ self.cup.grip, rot[:, 1], lift=lift)
 
     def pour(self, world: World, tilt: float = MAX_POUR_TILT) -> Plan:
         """Turn the handle to the robot, then the mouth away and down, until the block is out or up to a tilt [rad]."""
@@ -150,11 +152,38 @@ class CupExtract(Scenario):
 
     def place_block(self, world: World) -> Plan:
         """When the block is at rest, take it, put it in the middle of the square, let go."""
+        height = yield from self._take_block(world)
+        yield from self._place(world, height)
+
+    def _take_block(self, world: World) -> Generator[Action, None, float]:
+        """When the block is at rest, take it; returns the height of its middle before that [m]."""
         yield from motion.wait(world.arm, lambda: still(world, "block", REST_SPEED), 2.0)
-        stands = world.com("block")[2]
+        stood = float(world.com("block")[2])
         yield from take(world.arm, "block")
-        yield from put(world.arm, "block", [self.goal_x, self.goal_y, stands], "table", hover=0.06)
+        return stood
+
+    def _place(self, world: World, height: float) -> Plan:
+        """Put the held block in the middle of the square, its middle at a height [m], and let go."""
+        yield from put(world.arm, "block", [self.goal_x, self.goal_y, height], "table", hover=0.06)
         yield from retreat(world.arm, 0.06)
+
+    def steps(self) -> Mapping[str, Planner]:
+        stood = list[float]()
+
+        def take_block(world: World) -> Plan:
+            stood.append((yield from self._take_block(world)))
+
+        return {
+            "take_handle": partial(self.take_cup, lift=0.0),
+            "lift_cup": lambda world: retreat(world.arm, LIFT_HEIGHT),
+            "pour": self.pour,
+            "put_cup_aside": lambda world: self.put_down(world, self.aside),
+            "take_block": take_block,
+            "place_block": lambda world: self._place(world, stood[-1] if stood else world.com("block")[2]),
+            "reach_in": self._reach_in,
+            "hold_wall": self._hold_wall,
+            "push_over": self._knock,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -180,11 +209,15 @@ class CupExtract(Scenario):
         yield from go_to(arm, self.goal + 0.08 * UP)
 
     def _by_the_rim(self, world: World) -> Plan:
-        """Pinch the wall at the handle, as deep as the palm allows, lift, pour."""
+        """Pinch the wall at the handle, lift, pour."""
+        yield from self._hold_wall(world)
+        yield from self.pour(world, math.radians(100.0))
+
+    def _hold_wall(self, world: World) -> Plan:
+        """Pinch the wall at the handle, as deep as the palm allows, and lift."""
         arm, out = world.arm, -world.rot("cup")[:, 0]
         at = world.pos("cup") + (self.cup.rim - self.cup.wall / 2) * out
-        yield from pick(arm, at + (self.cup.height - PALM_ABOVE + MIN_CLEARANCE) * UP, out, lift=0.06)
-        yield from self.pour(world, math.radians(100.0))
+        yield from pick(arm, at + (self.cup.height - PALM_ABOVE + MIN_CLEARANCE) * UP, out, lift=LIFT_HEIGHT)
 
     def _level(self, world: World) -> Plan:
         """Turn the cup only until it is level, and back."""

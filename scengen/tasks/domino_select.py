@@ -45,11 +45,12 @@ from ..geometry import UP, Vec3, about_z, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import pick, poke
-from ..skills.motion import go_to, push, retreat, wait
+from ..skills.jaw import come_beside, pick, poke, step_back
+from ..skills.motion import Condition, go_to, push, retreat, wait
 
+PUSH_SPEED = 0.08  # speed of the push [m/s]
 LANES = 5
 """Chains on the table (paper, App. B, T18)."""
 RED_LANES = LANES - 1
@@ -124,11 +125,29 @@ class DominoSelect(Scenario):
 
     def topple(self, world: World, tile: str) -> Plan:
         """Push a tile over along its chain with the closed finger tips, then step back."""
+        yield from poke(world.arm, self._behind(tile), PUSH_SPEED * self.u, self._falls(world, tile), above=0.08)
+
+    def _behind(self, tile: str) -> Vec3:
+        """Place of the closed finger tips behind a tile [m]."""
         piece = self.lanes.piece(tile)
-        start = self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER_ACROSS + 0.02) * self.u
-        # Past 30 deg a slender first tile falls by itself, even if it carries its neighbour along.
-        lean = max(math.radians(30.0), 1.3 * piece.tipping_angle)
-        yield from poke(world.arm, start, 0.08 * self.u, lambda: world.tilt(tile) > lean, above=0.08)
+        return self.feet[tile] + 0.8 * piece.height * UP - (piece.thickness / 2 + FINGER_ACROSS + 0.02) * self.u
+
+    def _falls(self, world: World, tile: str) -> Condition:
+        """A condition: a tile falls by itself. Past 30 deg a slender one does, even if it pushes its neighbour."""
+        lean = max(math.radians(30.0), 1.3 * self.lanes.piece(tile).tipping_angle)
+        return lambda: world.tilt(tile) > lean
+
+    def steps(self) -> Mapping[str, Planner]:
+        first, wrong = f"tile_{self.intact_lane}_0", f"tile_{self.wrong[0]}_0"
+        return {
+            "reach_behind": lambda world: come_beside(world.arm, self._behind(first), self.u, above=0.08),
+            "tip_first": lambda world: push(world.arm, PUSH_SPEED * self.u, self._falls(world, first)),
+            "step_back": lambda world: step_back(world.arm, self.u),
+            "chain_falls": lambda world: wait(world.arm, lambda: self.success(world), give_up=4.0),
+            "push_slab": self._push_slab,
+            "try_second": lambda world: self.topple(world, wrong),
+            "carry_first": self._carry,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

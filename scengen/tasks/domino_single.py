@@ -26,12 +26,13 @@ from ..geometry import UP, Vec3, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import pick, poke
-from ..skills.motion import COARSE, FINE, go_to, push, wait
+from ..skills.jaw import come_beside, grasp, pick, poke, step_back
+from ..skills.motion import COARSE, FINE, Condition, go_to, push, wait
 
 PUSH_HEIGHT_SHARE = 0.8  # height at which a piece is pushed, as a share of its own height
+PUSH_SPEED = 0.08  # speed of the push [m/s]
 APPROACH_HEIGHT = 0.12
 """Height above the start of a push from which the hand comes down [m]; it passes over every piece."""
 CARRY_TOLERANCE = 0.01
@@ -90,20 +91,36 @@ class DominoSingle(Scenario):
 
         Behind any tile but the first, the tips go into the middle of the gap.
         """
+        along, falls = PUSH_SPEED * self.u, self._falls(world, i)
+        yield from poke(world.arm, self._behind(i), along, falls, above=APPROACH_HEIGHT, pace=FINE)
+
+    def _behind(self, i: int) -> Vec3:
+        """Place of the closed finger tips behind tile `i` [m]."""
         tile = self.pieces[i]
         clearance = 0.02 if i == 0 else max(0.0, self.gap / 2 - FINGER_ACROSS)
         behind = (tile.thickness / 2 + FINGER_ACROSS + clearance) * self.u
-        start = self.spot(i) + PUSH_HEIGHT_SHARE * tile.height * UP - behind
+        return self.spot(i) + PUSH_HEIGHT_SHARE * tile.height * UP - behind
 
-        def falls() -> bool:  # a stout tile may strike its neighbour before it is past its own balance point
-            return self._tips(world, i) or self._tips(world, i + 1)
-
-        yield from poke(world.arm, start, 0.08 * self.u, falls, above=APPROACH_HEIGHT, pace=FINE)
+    def _falls(self, world: World, i: int) -> Condition:
+        """A condition: tile `i` falls by itself. A stout tile may strike its neighbour before its own balance point."""
+        return lambda: self._tips(world, i) or self._tips(world, i + 1)
 
     def _tips(self, world: World, i: int) -> bool:
         """Whether piece `i` leans so far past its balance point that it falls by itself."""
         name = f"tile_{i}" if i < self.count else "slab"
         return world.tilt(name) > 1.3 * self.pieces[i].tipping_angle
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "close_jaw": lambda world: grasp(world.arm),
+            "reach_behind": lambda world: come_beside(world.arm, self._behind(0), self.u, APPROACH_HEIGHT, pace=FINE),
+            "tip_first": lambda world: push(world.arm, PUSH_SPEED * self.u, self._falls(world, 0)),
+            "step_back": lambda world: step_back(world.arm, self.u),
+            "chain_falls": lambda world: wait(world.arm, lambda: self.success(world), give_up=4.0),
+            "push_slab": self._push_slab,
+            "push_middle": lambda world: self.topple(world, self.count // 2),
+            "carry_first": lambda world: self._carry(world, self.count),
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

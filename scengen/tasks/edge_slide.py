@@ -28,7 +28,7 @@ Decisions, where the paper (App. B, T01) says no more than "a thin rectangular p
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -43,7 +43,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, held
 from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch, time_to_grip
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import grasp, pick
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, STEADY, Pace, facing_down, go_to, retreat, steer
@@ -61,6 +61,9 @@ GRIP_DEPTH = 0.018
 of the corner."""
 PUSH_SPEED = 0.06  # speed of the push [m/s]
 END_SPEED = 0.03  # speed of the last stretch of the push [m/s]
+PUSHING_HAND = facing_down()  # with the other yaw joint 7 reaches its limit
+LIFT_HEIGHT = 0.16  # height by which the plate is lifted [m]
+LIFT_PACE = Pace(0.20, 0.01)
 PUSH_TIMEOUT = 10.0  # time after which a push is given up [s]
 
 
@@ -120,17 +123,25 @@ class EdgeSlide(Scenario):
             speed: speed of the push [m/s].
             last: speed of its last stretch [m/s].
         """
-        arm, rot = world.arm, facing_down()  # with the other yaw joint 7 reaches its limit
+        yield from self._reach_inner_side(world)
+        yield from self._push_out(world, overhang, speed, last)
+        yield from self._leave(world)
+
+    def _reach_inner_side(self, world: World) -> Plan:
+        """Bring the closed fingers behind the plate."""
+        arm, rot = world.arm, PUSHING_HAND
         behind = min(float(corner @ self.out) for corner in self.underside(world))
         start = self.contact(world) * self.along + (behind - 0.03) * self.out + (TABLE_TOP + TIP_BELOW + 0.002) * UP
         yield from go_to(arm, start + 0.08 * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot, FINE)
-        yield from self._push(world, lambda: overhang - self.overhang(world), rot, speed, last)
-        yield from go_to(arm, arm.hand - 0.03 * self.out, rot, STEADY)
-        yield from retreat(arm, 0.20)
 
-    def _push(self, world: World, remaining: Callable[[], float], rot: Mat3, speed: float, last: float) -> Plan:
-        """Push until nothing remains [m], with the fingers beside the plate's middle so that it becomes square.
+    def _leave(self, world: World) -> Plan:
+        """Step back from the plate and move up."""
+        yield from go_to(world.arm, world.arm.hand - 0.03 * self.out, PUSHING_HAND, STEADY)
+        yield from retreat(world.arm, 0.20)
+
+    def _push_out(self, world: World, overhang: float, speed: float = PUSH_SPEED, last: float = END_SPEED) -> Plan:
+        """Push to an overhang [m], with the fingers beside the plate's middle so that it becomes square.
 
         The speed is `last` over the last 2 cm. The finger tips are kept above the table by 0.4 of the plate's
         thickness: tips that press on the table stick and slip, and higher ones climb the plate. The error in height
@@ -140,14 +151,14 @@ class EdgeSlide(Scenario):
             GaveUp: the push took longer than `PUSH_TIMEOUT`.
         """
         arm, setpoint, end = world.arm, world.arm.hand, world.time + PUSH_TIMEOUT
-        while remaining() > 0.0:
+        while (remaining := overhang - self.overhang(world)) > 0.0:
             if world.time > end:
                 raise GaveUp(f"the plate was not over the edge after {PUSH_TIMEOUT:g} s")
             sideways = 4.0 * (self.contact(world) - float(setpoint @ self.along))
             rise = 8.0 * (TABLE_TOP + TIP_BELOW + 0.4 * self.plate.thickness - arm.hand[2])
-            velocity = (speed if remaining() > 0.02 else last) * self.out + sideways * self.along + rise * UP
+            velocity = (speed if remaining > 0.02 else last) * self.out + sideways * self.along + rise * UP
             setpoint = setpoint + velocity * Loop.PERIOD
-            yield steer(arm, setpoint, velocity, between(arm.hand_rot, rot), CLOSED)
+            yield steer(arm, setpoint, velocity, between(arm.hand_rot, PUSHING_HAND), CLOSED)
 
     def contact(self, world: World) -> float:
         """Position along the edge at which the fingers are to push now [m].
@@ -162,8 +173,14 @@ class EdgeSlide(Scenario):
         ends = sorted(float(corner @ self.along) for corner in inner)
         return float(np.clip(beside, ends[0], ends[1]))
 
-    def pinch(self, world: World, lift: float = 0.16) -> Plan:
+    def pinch(self, world: World, lift: float = LIFT_HEIGHT) -> Plan:
         """Come down beside the table, grasp the outer corner on the robot's side, lift it [m]."""
+        yield from self._reach_lip(world)
+        yield from grasp(world.arm, time_to_grip(self.plate.thickness))
+        yield from retreat(world.arm, lift, LIFT_PACE)
+
+    def _reach_lip(self, world: World) -> Plan:
+        """Come down beside the table, the open jaw around the outer corner on the robot's side."""
         arm, rot = world.arm, self.grip
         outermost = max(float(corner @ self.out) for corner in self.underside(world))
         nearest = min(corner[0] for corner in self.underside(world) if corner @ self.out > outermost - 0.02)
@@ -173,8 +190,25 @@ class EdgeSlide(Scenario):
         yield from go_to(arm, back + 0.05 * self.out + 0.18 * UP, rot, COARSE, OPEN)
         yield from go_to(arm, back, rot, STEADY)
         yield from go_to(arm, at, rot, Pace(0.15, 0.003, 2.5))
-        yield from grasp(arm, time_to_grip(self.plate.thickness))
-        yield from retreat(arm, lift, Pace(0.20, 0.01))
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "reach_inner_side": self._reach_inner_side,
+            "slide_out": lambda world: self._push_out(world, self.aim),
+            "leave_plate": self._leave,
+            "reach_lip": self._leave_for_lip,
+            "pinch": lambda world: grasp(world.arm, time_to_grip(self.plate.thickness)),
+            "lift": lambda world: retreat(world.arm, LIFT_HEIGHT, LIFT_PACE),
+            "close_from_above": self._close_from_above,
+            "squeeze_corner": self._squeeze_corner,
+            "push_off": lambda world: self._push_out(world, self.plate.length + self.plate.width),
+        }
+
+    def _leave_for_lip(self, world: World) -> Plan:
+        """Bring the jaw to the lip; fingers that are still low behind the plate leave it first."""
+        if world.arm.hand[2] < TABLE_TOP + TIP_BELOW + 0.05:
+            yield from self._leave(world)
+        yield from self._reach_lip(world)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -38,9 +38,9 @@ from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
 from ..params import param
 from ..robots import jaw
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import carry, grasp, pick, put, release
+from ..skills.jaw import carry, grasp, lower, pick, release
 from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
 
 TRAY = Bin(width=0.08, length=0.15, depth=0.012, wall=0.005, floor=0.005)
@@ -108,14 +108,34 @@ class GalileoRampDrop(Scenario):
 
     def _put_at(self, world: World, s: float, hover: float = CARRY_HEIGHT) -> Plan:
         """Lower the held ball on the floor at s [m], from a height `hover` [m], and release it."""
+        yield from self._lower_at(world, s, hover)
+        yield from release(world.arm)
+
+    def _lower_at(self, world: World, s: float, hover: float = CARRY_HEIGHT) -> Plan:
+        """Lower the held ball on the floor at s [m], from a height `hover` [m]."""
         on, down = f"ramp/{self.ramp.part(s)}", -self.axes @ self.ramp.normal(s)
-        yield from put(world.arm, "ball", self.resting(s), on, hover, down)
+        yield from lower(world.arm, "ball", self.resting(s), on, hover, down)
 
     def _take(self, world: World) -> Plan:
         """Take the ball from the tray. The hand turns first: turning on the way may bend the arm out of reach."""
         across = self.axes[:, 1]
         yield from turn_to(world.arm, closing_along(world.arm, across), rate=2.0)
         yield from pick(world.arm, world.com("ball"), across, lift=CARRY_HEIGHT)
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "take_ball": self._take,
+            "bring_to_height": lambda world: self._lower_at(world, self.release_place),
+            "release": self._leave,
+            "turns_on_patch": lambda world: wait(world.arm, lambda: self.success(world), give_up=6.0),
+            "carry_to_patch": partial(self._lower_at, s=self.ramp.at_height(self.ramp.goal)),
+            "try_again": self._try_higher,
+        }
+
+    def _leave(self, world: World) -> Plan:
+        """Open the jaw and move away from the ball."""
+        yield from release(world.arm)
+        yield from retreat(world.arm, CARRY_HEIGHT)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -45,10 +45,10 @@ from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills import motion
-from ..skills.jaw import carry, pick, release
+from ..skills.jaw import carry, come_down, grasp, pick, release
 from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait
 
 MAX_RISE = 0.02  # height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall
@@ -123,12 +123,20 @@ class GapFunnel(Scenario):
 
     def align(self, world: World, spot: Vec3) -> Plan:
         """Grasp the ball across the gap's axis, draw it over the table to a spot, and release it."""
+        yield from pick(world.arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=0.0)
+        yield from self._draw(world, spot)
+        yield from self._leave(world)
+
+    def _draw(self, world: World, spot: Vec3) -> Plan:
+        """Draw the held ball over the table to a spot."""
         arm = world.arm
-        yield from pick(arm, world.com("ball"), self.tangent, above=APPROACH_HEIGHT, lift=0.0)
         yield from carry(arm, "ball", [spot[0], spot[1], world.com("ball")[2]], pace=motion.Pace(0.15, 0.002))
         yield from hold(arm, 0.2)
-        yield from release(arm, 0.3)
-        yield from retreat(arm, APPROACH_HEIGHT)
+
+    def _leave(self, world: World) -> Plan:
+        """Open the jaw and move up."""
+        yield from release(world.arm, 0.3)
+        yield from retreat(world.arm, APPROACH_HEIGHT)
 
     def send(self, world: World, spot: Vec3, factor: float) -> Plan:
         """Push the ball towards a spot, until the hand is in front of the wall.
@@ -164,6 +172,21 @@ class GapFunnel(Scenario):
         """A condition that holds from one second after this call."""
         end = world.time + 1.0
         return lambda: world.time > end
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "reach_ball": lambda world: come_down(world.arm, world.com("ball"), self.tangent, APPROACH_HEIGHT),
+            "draw_in_line": self._draw_in_line,
+            "release": self._leave,
+            "push_through": lambda world: self.send(world, self.gap_at, SPEED_FACTOR),
+            "in_square": lambda world: wait(world.arm, lambda: self.success(world), give_up=6.0),
+            "lift_over": self._over,
+        }
+
+    def _draw_in_line(self, world: World) -> Plan:
+        """Close the jaw and draw the ball in front of the gap."""
+        yield from grasp(world.arm)
+        yield from self._draw(world, self.gap_at - self.before * self.normal)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -28,7 +28,7 @@ Decisions, where the paper (App. B, T12) is silent:
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -43,10 +43,11 @@ from ..physics import passes, rolled, rolling_deceleration
 from ..predicates import displaced
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Plan, Refutation, Shortcut, on_table, require
+from ..scenario import Action, Plan, Planner, Refutation, Shortcut, on_table, require
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.motion import COARSE, OPEN, Condition, closing_along, stay
+from ..skills.jaw import grasp
+from ..skills.motion import COARSE, OPEN, Condition, closing_along, retreat, stay
 from .launched_ball import (
     EDGE_MARGIN,
     FORESIGHT_TIME,
@@ -108,20 +109,29 @@ class LinearIntercept(LaunchedBall):
     def take(self, world: World, lead: float) -> Plan:
         """Meet the ball, and close `lead` [s] before it arrives."""
         yield from self.observe(world)
+        at = yield from self._wait_on_path(world, lead)
+        yield from self._wait_nearer(world, at, lead)
+        yield from self.catch(world)
+
+    def _wait_on_path(self, world: World, lead: float) -> Generator[Action, None, Vec3]:
+        """Wait at a place on the ball's path until the hand may not move any more; returns the place [m]."""
         across = between(world.arm.hand_rot, closing_along(world.arm, np.cross(UP, self.u)))
         found = self.meeting(world.com("ball"), world.velocity("ball")[3:], world.arm.hand, math.sqrt(across @ across))
         if found is None:
             raise GaveUp("the hand comes too late to every place on the ball's path")
-        at, _ = found
+        closes = self._arrives(world, lead)
+        yield from self.wait_at(world, found[0], self.u, lambda: closes() or not self.may_move(world))
+        return found[0]
 
-        def closes() -> bool:
-            return self.time_left(world, world.arm.hand) <= lead
-
-        yield from self.wait_at(world, at, self.u, lambda: closes() or not self.may_move(world))
+    def _wait_nearer(self, world: World, at: Vec3, lead: float) -> Plan:
+        """Wait as near to a place [m] as a waiting hand may still come, until `lead` [s] before the ball arrives."""
         left = at - world.arm.hand
         nearer = world.arm.hand + left * min(1.0, NEAR_CORRECTION / max(math.sqrt(left @ left), 1e-9))
-        yield from self.wait_at(world, nearer, self.u, closes)
-        yield from self.catch(world)
+        yield from self.wait_at(world, nearer, self.u, self._arrives(world, lead))
+
+    def _arrives(self, world: World, lead: float) -> Condition:
+        """A condition: the ball is at the hand in `lead` [s] or less."""
+        return lambda: self.time_left(world, world.arm.hand) <= lead
 
     def wait_at(self, world: World, at: Vec3, along: Vec3, ends: Condition) -> Plan:
         """Bring the open jaw to a place straight along the table: the ball is far from the hand's way."""
@@ -133,6 +143,25 @@ class LinearIntercept(LaunchedBall):
         velocity = world.velocity("ball")[3:]
         speed = math.sqrt(velocity @ velocity)
         return passes(float((at - world.com("ball")) @ velocity) / max(speed, 1e-9), speed, self.deceleration)
+
+    def steps(self) -> Mapping[str, Planner]:
+        place = list[Vec3]()
+
+        def wait_on_path(world: World) -> Plan:
+            place.append((yield from self._wait_on_path(world, self.closing_time)))
+
+        def close_in_time(world: World) -> Plan:
+            yield from self._wait_nearer(world, place[-1] if place else world.arm.hand, self.closing_time)
+            yield from grasp(world.arm)
+
+        return {
+            "observe": self.observe,
+            "wait_on_path": wait_on_path,
+            "close_in_time": close_in_time,
+            "lift": lambda world: retreat(world.arm),
+            "chase": lambda world: self.follow(world, lambda: self.u),
+            "go_to_ball": self._go_to_it,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

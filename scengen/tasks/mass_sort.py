@@ -24,6 +24,7 @@ Decisions where the paper is silent:
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, pairwise, permutations
 
 import mujoco
@@ -55,6 +56,9 @@ from ..skills.jaw import pick, put, release, weigh
 from ..skills.motion import STEADY, push, retreat
 
 CUBE_COUNT = 3
+PLACES = ("left", "middle", "right")
+RANKS = ("lightest", "middle", "heaviest")
+PROBE_LIFT = 0.04  # height by which a cube is lifted to be weighed [m]; the hand ends 2 cm short
 ORDERS = tuple(permutations(range(CUBE_COUNT)))
 """Ranks of the cubes on the left, in the middle and on the right: 0 is the lightest. The first order is sorted."""
 MIN_MASS_DIFFERENCE = 0.025
@@ -169,14 +173,18 @@ class MassSort(Scenario):
         weights: list[float] = []
         *others, last = self.cubes
         for cube in others:
-            yield from self.take(world, cube, 0.04)  # ends 2 cm short
+            yield from self.take(world, cube, PROBE_LIFT)
             weights.append(float((yield from weigh(world.arm))[2]))
-            yield from push(world.arm, -0.1 * UP, lambda cube=cube: world.touching(cube, "table"))
-            yield from release(world.arm)
-            yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
+            yield from self._put_back(world, cube)
         yield from self.take(world, last, self.edge + CARRY_HEIGHT)
         weights.append(float((yield from weigh(world.arm))[2]))
         return weights
+
+    def _put_back(self, world: World, cube: str) -> Plan:
+        """Lower the held cube to the table, release it and move up."""
+        yield from push(world.arm, -0.1 * UP, lambda: world.touching(cube, "table"))
+        yield from release(world.arm)
+        yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
 
     def sort_held(self, world: World, ranks: Sequence[int]) -> Plan:
         """Put the last cube, which is held, and then the others into the zones of the given ranks."""
@@ -200,6 +208,34 @@ class MassSort(Scenario):
         for cube, rank in ranks.items():
             yield from self.take(world, cube, self.edge + CARRY_HEIGHT)
             yield from self.place_held(world, cube, rank)
+
+    def steps(self) -> Mapping[str, Planner]:
+        weights, held = dict[str, float](), list[str]()
+
+        def put_back(world: World) -> Plan:
+            while held:
+                yield from self._put_back(world, held.pop())
+
+        def weigh_it(world: World, cube: str) -> Plan:
+            yield from put_back(world)
+            held.append(cube)
+            yield from self.take(world, cube, PROBE_LIFT)
+            weights[cube] = float((yield from weigh(world.arm))[2])
+
+        def place(world: World, rank: int) -> Plan:
+            cube = sorted(weights, key=weights.__getitem__)[rank]
+            if held != [cube]:
+                yield from put_back(world)
+                yield from self.take(world, cube, self.edge + CARRY_HEIGHT)
+            held.clear()
+            yield from self.place_held(world, cube, rank)
+
+        weighings = {
+            f"weigh_{where}": partial(weigh_it, cube=cube) for where, cube in zip(PLACES, self.cubes, strict=True)
+        }
+        placings = {f"place_{which}": partial(place, rank=rank) for rank, which in enumerate(RANKS)}
+        by_sight = dict(zip(self.cubes, range(CUBE_COUNT), strict=True))
+        return {**weighings, **placings, "sort_by_sight": lambda world: self.deliver(world, by_sight)}
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -32,7 +32,7 @@ among them, solve half of the scenes: the task's question does not arise for a p
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -46,10 +46,10 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, held
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW, pinch
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
-from ..skills.jaw import pick
-from ..skills.motion import FINE, OPEN, facing_down, go_to, steer
+from ..skills.jaw import grasp, pick
+from ..skills.motion import COARSE, FINE, OPEN, closing_along, facing_down, go_to, retreat, steer
 
 LIFT_HEIGHT = 0.04
 """Height that the cube's centre must rise above its height on the table [m]: robosuite Lift, `_check_success`."""
@@ -110,16 +110,44 @@ class MirrorPickPlace(Scenario):
         Args:
             foot: assumed position of the middle of the cube's foot [m].
         """
-        arm, (wide, long, high) = world.arm, self.cube.size
-        # Held above its middle (65 %) the cube hangs straight: below, only the edges of the pads would keep it from
-        # turning. The finger tips stay 4 mm above the table, and the palm 6 mm above the cube's top.
-        grasp = foot + max(0.65 * high, TIP_BELOW + 0.004, high + 0.006 - PALM_ABOVE) * UP
+        at = foot + self._grip_above * UP
+        across = yield from self._turn(world, at)
+        yield from pick(world.arm, at, closing=across, above=APPROACH_HEIGHT)
+
+    def _turn(self, world: World, at: Vec3) -> Generator[Action, None, Vec3]:
+        """Turn the hand above the grasp of a bar [m]; returns the direction along which the fingers are to close."""
+        arm, (wide, long, _) = world.arm, self.cube.size
         faces = world.rot("cube")[:, :2].T
         if long > wide:
             turned = facing_down(math.radians(self.yaw) + math.pi / 2)
-            yield from go_to(arm, grasp + APPROACH_HEIGHT * UP, turned, FINE, OPEN)
-        across = max(faces, key=lambda normal: abs(float(normal @ arm.hand_rot[:, 0])))
-        yield from pick(arm, grasp, closing=across, above=APPROACH_HEIGHT)
+            yield from go_to(arm, at + APPROACH_HEIGHT * UP, turned, FINE, OPEN)
+        return max(faces, key=lambda normal: abs(float(normal @ arm.hand_rot[:, 0])))
+
+    @property
+    def _grip_above(self) -> float:
+        """Height of the grip site over the cube's foot in the grasp [m]."""
+        # Held above its middle (65 %) the cube hangs straight: below, only the edges of the pads would keep it from
+        # turning. The finger tips stay 4 mm above the table, and the palm 6 mm above the cube's top.
+        high = self.cube.size[2]
+        return max(0.65 * high, TIP_BELOW + 0.004, high + 0.006 - PALM_ABOVE)
+
+    def steps(self) -> Mapping[str, Planner]:
+        low = TABLE_TOP + self._grip_above
+        return {
+            "go_above": lambda world: self._go_above(world, world.pos("cube")),
+            "come_down": lambda world: go_to(world.arm, [*world.arm.hand[:2], low], pace=FINE, grip=OPEN),
+            "grasp": lambda world: grasp(world.arm),
+            "lift": lambda world: retreat(world.arm, 0.12),
+            "go_where_shown": lambda world: self._go_above(world, self._shown_spot(UPRIGHT)),
+        }
+
+    def _go_above(self, world: World, foot: Vec3) -> Plan:
+        """Bring the open hand above a place [m], turned for the grasp."""
+        at = foot + self._grip_above * UP
+        across = yield from self._turn(world, at)
+        rot = closing_along(world.arm, across)
+        yield from go_to(world.arm, at + APPROACH_HEIGHT * UP, rot, COARSE, OPEN)
+        yield from go_to(world.arm, at + APPROACH_HEIGHT * UP, rot, FINE, OPEN)
 
     # --- shortcuts --------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ from ..geometry import UP, Outline, Vec3, about_z, corners, gap
 from ..params import check_bounds, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, STEADY, closing_along, go_to, push, retreat
@@ -161,12 +161,38 @@ class OccluderPush(Scenario):
 
     def deliver(self, world: World, i: int) -> Plan:
         """Take a cube and put it down on the patch."""
+        yield from self._take(world, i)
+        yield from self._place(world, i)
+
+    def _take(self, world: World, i: int) -> Plan:
+        """Take a cube and lift it."""
         half = self.cube.edge / 2
         at = self.foot(i) * [1.0, 1.0, 0.0] + (TABLE_TOP + max(half, TIP_BELOW + 0.005)) * UP
         at[:2] = world.com(self.cubes[i])[:2]
         yield from pick(world.arm, at, np.cross(UP, self.directions[i]), above=CARRY_HEIGHT, lift=CARRY_HEIGHT)
-        yield from put(world.arm, self.cubes[i], self.goal + half * UP, on="table", hover=CARRY_HEIGHT)
+
+    def _place(self, world: World, i: int) -> Plan:
+        """Put the held cube down on the patch."""
+        at = self.goal + self.cube.edge / 2 * UP
+        yield from put(world.arm, self.cubes[i], at, on="table", hover=CARRY_HEIGHT)
         yield from retreat(world.arm)
+
+    def steps(self) -> Mapping[str, Planner]:
+        uncovered, other = list[int](), (self.red + 1) % CUBE_COUNT
+
+        def uncover_next(world: World) -> Plan:
+            if self.reddest(world) not in uncovered and len(uncovered) < CUBE_COUNT:
+                uncovered.append(len(uncovered))
+                yield from self.uncover(world, uncovered[-1])
+
+        return {
+            "uncover_first": uncover_next,
+            "take_red": lambda world: self._take(world, self.reddest(world)),
+            "place_red": lambda world: self._place(world, self.reddest(world)),
+            "lift_lid": self._pick_lid,
+            "place_any": lambda world: self._look_under(world, other),
+            "reach_through": self._reach_through,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -51,7 +51,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, inside
 from ..robots.panda import WRIST_MIDDLE
 from ..robots.suction import CUP_HALF_WIDTH, PULL
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, facing_down, go_to, retreat, until
 from ..skills.suction import carry, let_go, suck
@@ -171,18 +171,52 @@ class Packing(Scenario):
             yield from until(lower, lambda: self.lies(world, i) or not arm.sealed)
 
     def fetch(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
-        """Take piece `i` up by suction and bring it above a place at a yaw [rad], or lose it on the way.
+        """Take piece `i` up by suction and bring it above a place at a yaw [rad], or lose it on the way."""
+        yield from self._take(world, i, yaw)
+        yield from self._bring(world, i, pos, yaw)
 
-        Before it takes the piece, the wrist turns back by half of the turn that the piece needs.
-        """
+    def _take(self, world: World, i: int, yaw: float) -> Plan:
+        """Take piece `i` up by suction; the wrist first turns back by half of the turn to its final yaw [rad]."""
         arm, name = world.arm, f"piece_{i}"
         spot, rot = world.pos(name) + world.rot(name) @ self.face(i), world.rot(name)
         down = facing_down(WRIST_MIDDLE - float(between(rot, about_z(yaw))[2]) / 2)
         yield from go_to(arm, spot + 0.03 * UP, down, STEADY, OPEN)
         yield from suck(arm, spot, down)
         yield from retreat(arm, CARRY_HEIGHT)
+
+    def _bring(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
+        """Bring the held piece `i` above a place at a yaw [rad], or lose it on the way."""
+        arm, name = world.arm, f"piece_{i}"
         above = np.array([*pos[:2], TABLE_TOP + CARRY_HEIGHT])
         yield from until(carry(arm, name, above, yaw, COARSE), lambda: not arm.sealed)
+
+    def steps(self) -> Mapping[str, Planner]:
+        turned = set[int]()
+
+        def piece(world: World) -> int | None:
+            return next((i for i in range(self.count) if not self.lies(world, i)), None)
+
+        def held(world: World) -> int | None:
+            if (i := piece(world)) is not None and not world.arm.sealed:
+                raise GaveUp("no piece is in the cup")
+            return i
+
+        def take(world: World) -> Plan:
+            if (i := piece(world)) is not None and not world.arm.sealed:
+                yield from self._take(world, i, self.goal(i)[1])
+
+        def turn(world: World) -> Plan:
+            if (i := held(world)) is not None:
+                turned.add(i)
+                yield from self._bring(world, i, *self.goal(i))
+
+        def lower(world: World) -> Plan:
+            if (i := held(world)) is not None:
+                yield from self.insert(world, i, *(self.goal(i) if i in turned else self._unturned(world, i)))
+                if self.lies(world, i):
+                    yield from let_go(world.arm)
+
+        return {"take_piece": take, "turn_piece": turn, "lower_piece": lower}
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

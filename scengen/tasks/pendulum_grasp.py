@@ -47,7 +47,7 @@ from ..params import param
 from ..predicates import still
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp
@@ -162,6 +162,10 @@ class PendulumGrasp(Scenario):
     def close_before(self, world: World, lead: float) -> Plan:
         """Wait at the near turning point and close `lead` [s] before the bob arrives."""
         yield from self.wait_at(world, self.bob_at(NEAR_SIDE * self.peak_angle))
+        yield from self._close(world, lead)
+
+    def _close(self, world: World, lead: float) -> Plan:
+        """Close `lead` [s] before the bob arrives, and pull it out of the swing."""
         for later in (True, False):  # wait for the next arrival but one if the next is too soon
             yield from until(hold(world.arm, 3.0), lambda later=later: (self.time_left(world) > lead) == later)
         yield from grasp(world.arm, self.closing_time + 0.05)  # the force needs 0.05 s more: `jaw.time_to_grip`
@@ -180,6 +184,15 @@ class PendulumGrasp(Scenario):
     def time_left(self, world: World) -> float:
         """Time until the bob is at the near turning point [s]."""
         return self.pendulum.until_turning(*world.hinge(HINGE), NEAR_SIDE)
+
+    def steps(self) -> Mapping[str, Planner]:
+        return {
+            "wait_at_apex": lambda world: self.wait_at(world, self.bob_at(NEAR_SIDE * self.peak_angle)),
+            "close_in_time": lambda world: self._close(world, self.closing_time),
+            "grab_at_bottom": self._grab_below,
+            "brake": self._stop,
+            "follow": self._follow,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -39,7 +39,7 @@ from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..predicates import fallen, held, over, rests_on, still
 from ..robots.panda import BASE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
 from ..skills.grip import take
@@ -135,9 +135,13 @@ class PickPlaceYcb(Scenario):
         """Pick the object up, follow the square until it is locked, put the object down on it."""
         yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         while world.memory["jumps"] < self.jumps:
-            spot = world.pos("patch")
-            yield from self.bring(world, spot, ends=lambda spot=spot: math.dist(world.pos("patch"), spot) > 0.0)
+            yield from self._bring_near(world)
         yield from self.set_down(world, world.pos("patch"))
+
+    def _bring_near(self, world: World) -> Plan:
+        """Carry the object above the square as it is now, until the square jumps."""
+        spot = world.pos("patch")
+        yield from self.bring(world, spot, ends=lambda: math.dist(world.pos("patch"), spot) > 0.0)
 
     def bring(self, world: World, spot: Vec3, height: float = CARRY_HEIGHT, ends: Condition = lambda: False) -> Plan:
         """Carry the object above a place on the table, at a height above where it stood [m]."""
@@ -149,6 +153,25 @@ class PickPlaceYcb(Scenario):
         yield from self.bring(world, spot)
         yield from put(world.arm, "thing", [spot[0], spot[1], world.memory["stood"]], "table", hover=0.03)
         yield from retreat(world.arm, 0.06)
+
+    def steps(self) -> Mapping[str, Planner]:
+        def approach(world: World) -> Plan:
+            if world.memory["jumps"] < self.jumps:
+                yield from self._bring_near(world)
+
+        def put_down(world: World) -> Plan:
+            at = [*world.com("thing")[:2], world.memory["stood"]]
+            yield from put(world.arm, "thing", at, "table", hover=0.03)
+            yield from retreat(world.arm, 0.06)
+
+        return {
+            "take_object": lambda world: take(world.arm, "thing", lift=CARRY_HEIGHT),
+            "approach": approach,
+            "follow": self._bring_near,
+            "put_down": put_down,
+            "place_at_start": lambda world: self.set_down(world, self.spots[0]),
+            "drag": self._drag,
+        }
 
     # --- shortcuts ------------------------------------------------------------------------
 

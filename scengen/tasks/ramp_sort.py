@@ -26,7 +26,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -36,11 +36,12 @@ from ..assets.barrier import Barrier, let_pass
 from ..assets.bin import Bin
 from ..assets.crowned_ramp import CrownedRamp
 from ..assets.prop import TABLE_TOP, place, table
+from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release
 from ..skills.motion import COARSE, Pace, closing_along, go_to, push, wait
@@ -198,6 +199,32 @@ class RampSort(Scenario):
         yield from release(arm)
         # Before the hand moves aside, its tips, 9 mm below it, must be over a ball of 36 mm.
         yield from go_to(arm, spot + 0.065 * UP, pace=COARSE)
+
+    def steps(self) -> Mapping[str, Planner]:
+        left, held = list(range(len(self.colours))), list[int]()
+
+        def next_of(red: bool) -> int | None:
+            return next((i for i in left if self.colours[i] == red), None)
+
+        def take(world: World, red: bool) -> Plan:
+            if (i := next_of(red)) is not None:
+                held.append(left.pop(left.index(i)))
+                yield from self.take(world, i)
+
+        def release_it(world: World, red: bool) -> Plan:
+            if not held and next_of(red) is not None:
+                raise GaveUp("no ball is in the jaw")
+            spot = self.release_spot(self.red_side if red else -self.red_side)
+            yield from self.release_at(world, held.pop(), spot) if held else ()
+
+        return {
+            "take_red": partial(take, red=True),
+            "release_red": partial(release_it, red=True),
+            "take_blue": partial(take, red=False),
+            "release_blue": partial(release_it, red=False),
+            "drop_in_bin": lambda world: self._over_the_bin(world, BIN_RIM),
+            "all_one_side": lambda world: self.sort(world, [1] * len(self.colours), range(len(self.colours))),
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

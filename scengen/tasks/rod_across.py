@@ -27,13 +27,14 @@ import numpy as np
 
 from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
-from ..geometry import UP, about_z, gap, shortest, way_to
+from ..errors import GaveUp
+from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, release, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
@@ -44,6 +45,7 @@ MISS_MARGIN = 0.006
 """Least distance beyond the ridge's edge of the centre of mass of a rod that is laid by its middle [m]."""
 LIFT_HEIGHT = 0.10  # height to which the rod is lifted to be weighed [m]
 CARRY_HEIGHT = 0.015  # height over the ridge at which the rod is aligned [m]
+MIN_WEIGHT = 0.1  # weight from which something hangs in the jaw [N], a tenth of the lightest rod
 EXPECTED_MASS = 0.125  # mass that a guess assumes without having weighed the rod [kg]: the middle of training
 
 
@@ -108,24 +110,67 @@ class RodAcross(RodAndRidge[Rod]):
             yaw: angle to the ridge's normal [rad].
         """
         yield from self.bring(world, along, yaw)
+        yield from self._leave(world)
+
+    def _leave(self, world: World) -> Plan:
+        """Open the jaw and go straight up, slowly while the fingers are beside the rod."""
         yield from release(world.arm)
         yield from retreat(world.arm, 0.03, Pace(0.05, 0.003))
         yield from retreat(world.arm, 0.05)
 
     def bring(self, world: World, along: float, yaw: float = 0.0) -> Plan:
         """Bring the held rod over the ridge, level it, lower it until it touches; see `lay`."""
+        across = self._across(world, yaw)
+        yield from self._hold_over(world, along, across)
+        yield from self._set_down(world, along, across)
+
+    def _across(self, world: World, yaw: float = 0.0) -> Vec3:
+        """Direction of the rod at `yaw` to the ridge's normal [rad] that the nearer of two wrist angles gives it."""
         arm, across = world.arm, about_z(yaw) @ self.normal
         wrist = closing_along(arm, np.cross(across, UP)) @ arm.hand_rot.T
-        across = math.copysign(1.0, float(wrist @ world.rot("rod")[:, 1] @ across)) * across
+        return math.copysign(1.0, float(wrist @ world.rot("rod")[:, 1] @ across)) * across
+
+    def _hold_over(self, world: World, along: float, across: Vec3) -> Plan:
+        """Bring the held rod over the ridge, level, in the direction `across`."""
         # The rod is aligned to 1.5 mm, a quarter of what the narrower ridge forgives. After a move above the ridge it
         # swings in the hand for 0.25 s; the last move ends where it touches the ridge.
-        aim, lower = Pace(0.08, 0.0015), Pace(0.03, 0.001)
-        for height, pace in ((CARRY_HEIGHT, STEADY), (CARRY_HEIGHT, aim), (-0.03, lower)):
-            rod = world.rot("rod")[:, 1]
-            turn, spot = shortest(rod, across), world.pos("rod") + along * rod
-            there = self.top + height * UP + turn @ (arm.hand - spot)
-            yield from until(go_to(arm, there, turn @ arm.hand_rot, pace), lambda: world.touching("rod", RIDGE))
-            yield from hold(arm, 0.25 if height > 0 else 0.0)
+        for pace in (STEADY, Pace(0.08, 0.0015)):
+            yield from self._align(world, along, across, CARRY_HEIGHT, pace)
+            yield from hold(world.arm, 0.25)
+
+    def _set_down(self, world: World, along: float, across: Vec3) -> Plan:
+        """Lower the held rod until it touches the ridge."""
+        yield from self._align(world, along, across, -0.03, Pace(0.03, 0.001))
+
+    def _align(self, world: World, along: float, across: Vec3, height: float, pace: Pace) -> Plan:
+        """Bring a place of the held rod to a height over the ridge [m], or until the rod touches it."""
+        arm, rod = world.arm, world.rot("rod")[:, 1]
+        turn, spot = shortest(rod, across), world.pos("rod") + along * rod
+        there = self.top + height * UP + turn @ (arm.hand - spot)
+        yield from until(go_to(arm, there, turn @ arm.hand_rot, pace), lambda: world.touching("rod", RIDGE))
+
+    def steps(self) -> Mapping[str, Planner]:
+        measured = list[float]()
+
+        def feel(world: World) -> Plan:
+            weight, torque = yield from self.feel(world)
+            if weight < MIN_WEIGHT:
+                raise GaveUp("nothing hangs in the jaw")
+            measured.append(self.held_at(world) + torque / weight)
+
+        def com(world: World) -> float:
+            return measured[-1] if measured else self.held_at(world)
+
+        return {
+            "take_rod": self.lift,
+            "feel": feel,
+            "bring_over": lambda world: self._hold_over(world, com(world), self._across(world)),
+            "lay_down": lambda world: self._set_down(world, com(world), self._across(world)),
+            "let_go": self._leave,
+            "middle_on_ridge": lambda world: self.lay(world, 0.0),
+            "along": lambda world: self.lay(world, self.rod.com, math.pi / 2),
+            "hold_on": lambda world: hold(world.arm, 2 * self.HOLD),
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

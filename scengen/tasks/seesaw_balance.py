@@ -43,10 +43,10 @@ from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills.jaw import pick, put
-from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat
+from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, facing_down, go_to, hold, push, retreat, wait
 
 MAX_TILT = math.radians(5.0)
 """Largest tilt that counts as level [rad] (paper, App. B, T19)."""
@@ -134,37 +134,80 @@ class SeesawBalance(Scenario):
         Reads no mass. A deck on its stop shows the direction of the error, which is at least `MIN_STOP_ERROR`. Between
         the stops the tilt is proportional to the error, by a factor that is half to twice the expected one.
         """
-        low, high = (self.nearest(self.raised, end) for end in (-1.0, 1.0))
+        low, high = self._ends
         along = (low + high) / 2
         while True:
             yield from self.put_at(world, self.nearest(self.raised, along))
-            tilt, stood = self.tilt(world), self.along(world, "weight")
-            if abs(tilt) <= SAFE_TILT:
+            if abs(self.tilt(world)) <= SAFE_TILT:
                 return
-            stopped = abs(tilt) > self.seesaw.steepest - math.radians(1.0)
-            past = stood - math.copysign(MIN_STOP_ERROR if stopped else 0.0, tilt)
-            low, high = (low, min(high, past)) if tilt > 0 else (max(low, past), high)
-            if high - low < 0.004:
-                raise GaveUp("the balancing place was not found")
-            there = stood - math.tan(tilt) / math.tan(MAX_TILT) * with_values(self, EXPECTED_MASSES).margin
-            along = (low + high) / 2 if stopped or not low < there < high else there
+            low, high, along = self._narrowed(world, low, high)
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Ends of the raised arm between which the balancing place is [m]."""
+        return self.nearest(self.raised, -1.0), self.nearest(self.raised, 1.0)
+
+    def _narrowed(self, world: World, low: float, high: float) -> tuple[float, float, float]:
+        """The stretch in which the balancing place is, given how the deck stands now, and the next place to try [m].
+
+        Raises:
+            GaveUp: no such stretch is left.
+        """
+        tilt, stood = self.tilt(world), self.along(world, "weight")
+        stopped = abs(tilt) > self.seesaw.steepest - math.radians(1.0)
+        past = stood - math.copysign(MIN_STOP_ERROR if stopped else 0.0, tilt)
+        low, high = (low, min(high, past)) if tilt > 0 else (max(low, past), high)
+        if high - low < 0.004:
+            raise GaveUp("the balancing place was not found")
+        there = stood - math.tan(tilt) / math.tan(MAX_TILT) * with_values(self, EXPECTED_MASSES).margin
+        return low, high, (low + high) / 2 if stopped or not low < there < high else there
 
     def put_at(self, world: World, along: float, block: str = "weight") -> Plan:
         """Put a block on the deck, release it, and wait until the deck is at rest; if it is level, wait for `HOLD`."""
+        yield from self._take(world, block)
+        yield from self._set_on(world, along, block)
+        yield from self._settle(world)
+
+    def _take(self, world: World, block: str) -> Plan:
+        """Grasp a block and lift it over the deck."""
         arm, at = world.arm, world.com(block)
         lift = TABLE_TOP + CARRY_HEIGHT - at[2]
         yield from go_to(arm, at + lift * UP, self.down, COARSE, OPEN)
         yield from pick(arm, at, closing=world.rot(block)[:, 1], above=lift, lift=lift, pace=STEADY)
-        spot = self.on_deck(along, self.tilt(world))
+
+    def _set_on(self, world: World, along: float, block: str) -> Plan:
+        """Put the held block on the deck and release it."""
+        arm, spot = world.arm, self.on_deck(along, self.tilt(world))
         yield from go_to(arm, [*spot[:2], TABLE_TOP + CARRY_HEIGHT], self.down, COARSE)
         yield from put(arm, block, spot + world.com(block) - world.pos(block), on=BEAM, hover=0.02)
         yield from retreat(arm, 0.08)
-        before = math.inf
+
+    def _settle(self, world: World) -> Plan:
+        """Wait until the deck is at rest; if it is level, for `HOLD`."""
+        arm, before = world.arm, math.inf
         while abs(self.tilt(world) - before) > 0.002:  # a deck that bounces is at rest for a moment
             before = self.tilt(world)
             yield from hold(arm, 0.2)
         if world.tilt(BEAM) <= SAFE_TILT:
             yield from hold(arm, self.HOLD)
+
+    def steps(self) -> Mapping[str, Planner]:
+        search = list(self._ends)
+
+        def correct(world: World) -> Plan:
+            if abs(self.tilt(world)) > SAFE_TILT:
+                *search[:], along = self._narrowed(world, *search)
+                yield from self.put_at(world, self.nearest(self.raised, along))
+
+        return {
+            "take_weight": lambda world: self._take(world, "weight"),
+            "put_on_arm": lambda world: self._set_on(world, self.nearest(self.raised, sum(search) / 2), "weight"),
+            "look": self._settle,
+            "correct": correct,
+            "level": lambda world: wait(world.arm, lambda: self.success(world), give_up=4.0),
+            "hold_level": self._hold_level,
+            "move_target": self._shift,
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -47,7 +47,7 @@ from ..params import param
 from ..predicates import fallen, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, facing, facing_down, go_to, retreat
@@ -138,17 +138,27 @@ class ShelteredGrasp(Scenario):
             spot: place of the object's foot [m].
             rot: orientation of the hand as it enters; by default level, towards the rack.
         """
-        arm, rot, into = world.arm, self.entry if rot is None else rot, self.entry[:, 2]
-        at = self.grip_at(spot)
-        out = at - (self.depth + GRIP_DEPTH + 0.12) * into  # 12 cm before the open side
-        away = np.array([0.0, -0.17 * self.side, 0.0])  # a turn drags the hand 0.1 m back towards the rack
-        yield from go_to(arm, arm.hand + away, pace=COARSE, grip=OPEN)
-        yield from go_to(arm, out, rot, STEADY)
-        yield from go_to(arm, at, rot, ENTER_PACE)
-        yield from grasp(arm)
-        yield from go_to(arm, at + LIFT_HEIGHT * UP, rot, FINE)
-        yield from go_to(arm, out + LIFT_HEIGHT * UP, rot, ENTER_PACE)
+        rot = self.entry if rot is None else rot
+        yield from self._come_before(world, spot, rot)
+        yield from go_to(world.arm, self.grip_at(spot), rot, ENTER_PACE)
+        yield from grasp(world.arm)
+        yield from self._come_out(world, spot, rot)
         yield from self.drop(world)
+
+    def _come_before(self, world: World, spot: Vec3, rot: Mat3) -> Plan:
+        """Bring the open jaw before the open side, at the height of a place [m]."""
+        away = np.array([0.0, -0.17 * self.side, 0.0])  # a turn drags the hand 0.1 m back towards the rack
+        yield from go_to(world.arm, world.arm.hand + away, pace=COARSE, grip=OPEN)
+        yield from go_to(world.arm, self._before(spot), rot, STEADY)
+
+    def _come_out(self, world: World, spot: Vec3, rot: Mat3) -> Plan:
+        """Lift the held object off the floor and draw it out through the open side."""
+        yield from go_to(world.arm, self.grip_at(spot) + LIFT_HEIGHT * UP, rot, FINE)
+        yield from go_to(world.arm, self._before(spot) + LIFT_HEIGHT * UP, rot, ENTER_PACE)
+
+    def _before(self, spot: Vec3) -> Vec3:
+        """Place of the hand 12 cm before the open side, at the height of a place [m]."""
+        return self.grip_at(spot) - (self.depth + GRIP_DEPTH + 0.12) * self.entry[:, 2]
 
     def drop(self, world: World) -> Plan:
         """Bring the held object above the tray with a level hand, and let go.
@@ -161,6 +171,18 @@ class ShelteredGrasp(Scenario):
         yield from go_to(arm, above - self.lever * rot[:, 2], rot, STEADY)
         yield from release(arm)
         yield from retreat(arm, 0.05)
+
+    def steps(self) -> Mapping[str, Planner]:
+        spot, steep = self.spot(self.storey, self.along), facing(self._azimuth, math.radians(60.0))
+        return {
+            "level_hand": lambda world: self._come_before(world, spot, self.entry),
+            "enter": lambda world: go_to(world.arm, self.grip_at(spot), self.entry, ENTER_PACE),
+            "grasp": lambda world: grasp(world.arm),
+            "come_out": lambda world: self._come_out(world, spot, self.entry),
+            "drop_in_tray": self.drop,
+            "from_above": lambda world: self._from_above(world, spot),
+            "reach_steeply": lambda world: self.fetch(world, spot, steep),
+        }
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

@@ -49,7 +49,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
 from ..robots.panda import BASE
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.grip import extent, take
@@ -197,6 +197,27 @@ class SlipRecovery(Scenario):
         stands = np.array([*self.goal[:2], world.memory["stood"]])
         yield from put(world.arm, "thing", stands, "table", hover=0.03)
         yield from retreat(world.arm, 0.06)
+
+    def steps(self) -> Mapping[str, Planner]:
+        def find(world: World) -> Plan:
+            if not world.touching(ROBOT, "thing"):
+                yield from release(world.arm)
+                yield from self.settle(world)
+
+        def take_again(world: World) -> Plan:
+            if not world.touching(ROBOT, "thing"):
+                yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
+
+        return {
+            "take_object": lambda world: take(world.arm, "thing", lift=CARRY_HEIGHT),
+            "carry": self.bring,
+            "find_object": find,
+            "take_again": take_again,
+            "put_down": self.set_down,
+            "slide_object": self._drag,
+            "carry_low": self._carry_low,
+            "grip_harder": self._grip_harder,
+        }
 
     # --- shortcuts ------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ there is no `answer` to guess. A hook that falls off the table is lost, but may 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -37,9 +38,18 @@ from ..predicates import fallen, held
 from ..robots import ik
 from ..robots.jaw import OPENING
 from ..robots.panda import BASE, REACH, SHOULDER
-from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require
 from ..sim.world import ROBOT, World
-from ..skills.hook import HOOK_CLEARANCE, nearest_pull, pull, put_down, shortest_stretch, take_handle
+from ..skills.hook import (
+    HOOK_CLEARANCE,
+    Leg,
+    nearest_pull,
+    pull_legs,
+    put_down,
+    shortest_stretch,
+    slide,
+    take_handle,
+)
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, OPEN, facing_down, go_to, push, retreat
 
@@ -109,14 +119,42 @@ class ToolRetrieve(Scenario):
 
     def draw_in(self, world: World, mirror: float = 1.0) -> Plan:
         """Put the tip behind the cube and pull; with `mirror` = -1 the tip passes the cube on the wrong side."""
-        end = max(PULL_END_DISTANCE, nearest_pull(self.stretch) - self.half)
-        yield from pull(world.arm, self.tool, "hook", "cube", self.half, end, mirror)
+        for leg in self._legs(world, mirror):
+            yield from slide(world.arm, self.tool, "hook", *leg)
 
-    def lift_cube(self, world: World) -> Plan:
-        """Grasp the cube across the faces for which the hand turns least, and lift it."""
+    def lift_cube(self, world: World, lift: float = 0.12) -> Plan:
+        """Grasp the cube across the faces for which the hand turns least, and lift it [m]."""
         closing = world.arm.hand_rot[:, 0]
         faces = max(world.rot("cube")[:, :2].T, key=lambda normal: abs(float(normal @ closing)))
-        yield from pick(world.arm, world.com("cube"), closing=faces)
+        yield from pick(world.arm, world.com("cube"), closing=faces, lift=lift)
+
+    def steps(self) -> Mapping[str, Planner]:
+        legs = list[Leg]()
+
+        def pass_behind(world: World) -> Plan:
+            legs[:] = self._legs(world)
+            for leg in legs[:-1]:
+                yield from slide(world.arm, self.tool, "hook", *leg)
+
+        def draw_in(world: World) -> Plan:
+            yield from slide(world.arm, self.tool, "hook", *(legs or self._legs(world))[-1])
+
+        return {
+            "take_hook": self.take_hook,
+            "pass_behind": pass_behind,
+            "draw_in": draw_in,
+            "put_hook_down": lambda world: put_down(world.arm, self.tool, "hook"),
+            "grasp_cube": partial(self.lift_cube, lift=0.0),
+            "lift_cube": lambda world: retreat(world.arm, 0.12),
+            "reach_cube": self._reach,
+            "lift_with_hook": self._pick_with_hook,
+            "grasp_with_hook": self._grasp_with_hook,
+        }
+
+    def _legs(self, world: World, mirror: float = 1.0) -> list[Leg]:
+        """Ways of the held hook past the cube, behind it and back; see `hook.pull_legs`."""
+        end = max(PULL_END_DISTANCE, nearest_pull(self.stretch) - self.half)
+        return pull_legs(world.arm, self.tool, "cube", self.half, end, mirror)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 

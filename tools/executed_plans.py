@@ -1,0 +1,97 @@
+"""Carry out right and wrong plans of every task with moves for its sub-goals, and print what became of them.
+
+    python tools/executed_plans.py [n=10] [wrong=3] [TASK ...]
+
+The plan of conf/facts/<task>.yaml is played in n feasible training scenarios, with and without its optional sub-goals.
+Wrong plans are played in the first ones: with a required sub-goal missing, with two neighbours that have an order
+exchanged, and with a wrong sub-goal after the first k ones in place of the rest, which counts if it was begun. Results are lines of
+records/executed_plans.jsonl; a repeated call plays only what the file lacks under today's code.
+"""
+
+import hashlib
+import json
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import count, islice
+from pathlib import Path
+
+from scengen import list_tasks, load_task
+from scengen.agents import execution, facts
+from scengen.agents.order import Order
+from scengen.errors import Infeasible
+from scengen.samplers.split import ID
+from scengen.samplers.task import Task
+from scengen.scenario import Scenario
+from scengen.validate.identity import source_sha256
+from scengen.validate.rebuilt import world_of
+
+RECORDS = Path(__file__).parent.parent / "records" / "executed_plans.jsonl"
+RIGHT, OPTIONAL, MISSING, ORDER, WRONG = "right", "with optional ones", "missing", "wrong order", "wrong sub-goal"
+SEED = 1
+"""Seed of the draws, that of `tools/certified.py` for draws that only the oracle plays."""
+
+
+def plans(order: Order, n: int, wrong: int) -> Iterator[tuple[str, tuple[str, ...], int]]:
+    """Kind of each plan, its sub-goals, and the number of scenarios in which it is played."""
+    right = order.required
+    yield RIGHT, right, n
+    if len(right) < len(order.subgoals):
+        yield OPTIONAL, tuple(order.subgoals), n
+    for k, left_out in enumerate(right):
+        yield MISSING, (*right[:k], *right[k + 1 :]), wrong
+        if k and (right[k - 1], left_out) in order.before:
+            yield ORDER, (*right[: k - 1], left_out, right[k - 1], *right[k + 1 :]), wrong
+    for k in range(len(right)):
+        for name in order.wrong:
+            yield WRONG, (*right[:k], name), min(wrong, 1)
+
+
+def feasible(task: Task) -> Iterator[Scenario]:
+    """Training scenarios that statics does not refute, as certification draws them."""
+    for index in count():
+        with suppress(Infeasible):
+            yield task.draw(ID, SEED, index).scenario
+
+
+def main(*arguments: str) -> None:
+    """Play what is missing, and print the table."""
+    numbers = {"n": 10, "wrong": 3} | {k: int(v) for k, v in (a.split("=") for a in arguments if "=" in a)}
+    known = {}
+    if RECORDS.exists():
+        known = {record["digest"]: record for record in map(json.loads, RECORDS.read_text().splitlines())}
+    for name in [a for a in arguments if "=" not in a] or list_tasks():
+        task = load_task(name)
+        order = facts.load(task).plan
+        if not task.nominal.steps():
+            print(f"{name}: no steps")
+            continue
+        counts: dict[str, list[bool]] = defaultdict(list)
+        scenarios = list(islice(feasible(task), numbers["n"]))
+        for kind, names, many in plans(order, numbers["n"], numbers["wrong"]):
+            for index, scenario in enumerate(scenarios[:many]):
+                told = [name, scenario.id, task.horizon, names, source_sha256(task.family)]
+                digest = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
+                if digest not in known:
+                    found = execution.execute(names, order, scenario, world_of(scenario, task.embodiment), task.horizon)
+                    assert found
+                    record = {"digest": digest, "task": name, "scenario": index, "kind": kind, "plan": " ".join(names)}
+                    known[digest] = {
+                        **record,
+                        "success": found.success,
+                        "reason": found.reason,
+                        "seconds": found.seconds,
+                    }
+                    with RECORDS.open("a") as file:
+                        file.write(json.dumps(known[digest]) + "\n")
+                    if found.success != (kind in (RIGHT, OPTIONAL)):
+                        print(f"  {name}@{index} {kind}: {' '.join(names)}: {found.reason or 'success'}", flush=True)
+                if kind != WRONG or known[digest]["began"] == len(names):  # else the goal was reached before it
+                    counts[kind].append(known[digest]["success"])
+        told = ", ".join(f"{kind} {sum(found)}/{len(found)}" for kind, found in counts.items())
+        print(f"{name}: reached the goal: {told}", flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
