@@ -4,7 +4,8 @@
 
 The plan of conf/facts/<task>.yaml is played in n feasible training scenarios, with and without its optional sub-goals.
 Wrong plans are played in the first ones: with a required sub-goal missing, with two neighbours that have an order
-exchanged, and with a wrong sub-goal after the first k ones in place of the rest, which counts if it was begun. Results are lines of
+exchanged, and with a wrong sub-goal after the first k ones in place of the rest. The last kind counts if the wrong
+sub-goal was begun, because nothing is wrong where the goal is reached before it. Results are lines of
 records/executed_plans.jsonl; a repeated call plays only what the file lacks under today's code.
 """
 

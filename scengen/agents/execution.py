@@ -29,6 +29,8 @@ DONE = "done"
 
 NOT_BEGUN = "not begun"
 """End of a step that the plan did not come to."""
+NO_PLAN = "there is no plan"
+"""Reason of a reply without a step."""
 CUT_OFF = "the episode was over before its end"
 """End of a step during which the episode ended."""
 
@@ -154,6 +156,8 @@ class Executions:
     def of(self, row: PoolRow, scenario: Scenario, names: Sequence[str], order: Order) -> dict[str, Any] | None:
         """Outcome of a plan as plain data, see `Execution`; None if the family states no moves."""
         family = type(scenario)
+        if not names and scenario.steps():
+            return asdict(Execution(False, NO_PLAN, 0.0, []))
         code = [source_sha256(family), inspect.getsource(inspect.getmodule(family) or family)]
         asked = [row.task, row.id, row.horizon, list(names), repr(order.subgoals), *code]
         digest = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:32]

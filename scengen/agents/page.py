@@ -10,7 +10,7 @@ from ..pictures.report import template
 from ..work.targets import write
 from .calls import CALLS
 from .questioning import ACT, PLAN, UNDERSTAND
-from .tables import GRADES, by_question, lines, lost_in_twins, plan_errors, sighted_lines
+from .tables import GRADES, agreement, by_question, executed_lines, lines, lost_in_twins, plan_errors, sighted_lines
 
 TITLES = {UNDERSTAND: "Stage 1: understanding", PLAN: "Stage 2: plan", ACT: "Stage 3: action"}
 """Titles of the stages."""
@@ -37,6 +37,8 @@ def write_page(
         sighted=[cells(line) for line in sighted_lines(results, priors)],
         grades=GRADES,
         errors=plan_errors(results),
+        executed=[cells(line) for line in executed_lines(results)],
+        agreement=agreement(results),
         results=[
             (result, by_exam.get(_key({**result["about"], "stage": result["stage"]}), [])) for result in results[:SHOWN]
         ],

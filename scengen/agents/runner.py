@@ -206,9 +206,9 @@ def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv) -> 
 
 
 def _executed(work: Work, exam: Exam, result: Result, executions: Executions) -> Result:
-    """The result of stage 2 with what became of its plan; None if there is no plan, or the task states no moves."""
-    names, scenario = result.grades["plan"], work.task.scenario(work.row.params)
-    outcome = executions.of(work.row, scenario, names, exam.sheet.plan) if names else None
+    """The result of stage 2 with what became of its plan; None if the task states no moves."""
+    scenario = work.task.scenario(work.row.params)
+    outcome = executions.of(work.row, scenario, result.grades["plan"], exam.sheet.plan)
     return replace(result, grades={**result.grades, "executed": outcome})
 
 

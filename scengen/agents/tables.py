@@ -42,6 +42,44 @@ def sighted_lines(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Map
     return table(episodes) if episodes else []
 
 
+def executed_lines(results: Sequence[Mapping[str, Any]]) -> list[TableLine]:
+    """The table of stage 2 for plans that were carried out: whether they reached the goal. Tasks without moves have no
+    line; the list is empty if nothing was carried out."""
+    episodes = [_episode(plain, outcome["success"]) for plain, outcome in _executed(results) if outcome]
+    return table(episodes) if episodes else []
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Audits of plans beside their outcomes."""
+
+    right: int
+    """Number of plans that are right and were carried out."""
+    right_reached: int
+    """Number of them that reached the goal."""
+    wrong: int
+    """Number of plans that are wrong and were carried out."""
+    wrong_reached: int
+    """Number of them that reached the goal all the same."""
+    no_moves: tuple[str, ...]
+    """Tasks that state no moves for their sub-goals; their plans are not carried out."""
+
+
+def agreement(results: Sequence[Mapping[str, Any]]) -> Agreement | None:
+    """How audits and outcomes of plans agree; None if no plan was to be carried out."""
+    if not (found := _executed(results)):
+        return None
+    told = Counter((plain["grades"]["right"], outcome["success"]) for plain, outcome in found if outcome)
+    still = tuple(dict.fromkeys(plain["task"] for plain, outcome in found if not outcome))
+    right, wrong = (told[right, True] + told[right, False] for right in (True, False))
+    return Agreement(right, told[True, True], wrong, told[False, True], still)
+
+
+def _executed(results: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], Mapping[str, Any] | None]]:
+    """Results of stage 2 whose plans were to be carried out, and their outcomes; None if the task states no moves."""
+    return [(plain, plain["grades"]["executed"]) for plain in results if "executed" in plain["grades"]]
+
+
 def _episode(plain: Mapping[str, Any], success: bool) -> dict[str, Any]:
     return {**{name: plain[name] for name in ("task", "category", "split", "seed", "index")}, "success": success}
 
@@ -79,7 +117,7 @@ def plan_errors(results: Sequence[Mapping[str, Any]]) -> Counter[str]:
     for plain in results:
         if "errors" in plain["grades"]:
             found.update({kind for kind, _ in plain["grades"]["errors"]})
-            found["format"] += bool(plain["format_error"])
+            found.update(["format"] if plain["format_error"] else [])
     return found
 
 

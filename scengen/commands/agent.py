@@ -2,17 +2,25 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from rich.table import Table
 
 from ..agents.page import TITLES, write_page
-from ..agents.questioning import UNDERSTAND
+from ..agents.questioning import PLAN, UNDERSTAND
 from ..agents.runner import AgentSettings, Outcome, earlier, prompts, run
-from ..agents.tables import lines, lost_in_twins, markdown, plan_errors, sighted_lines
+from ..agents.tables import (
+    agreement,
+    executed_lines,
+    lines,
+    lost_in_twins,
+    markdown,
+    plan_errors,
+    sighted_lines,
+)
 from ..errors import BadConfig
-from ..evaluate.table import cells, plain
+from ..evaluate.table import TableLine, cells, plain
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..work.targets import write
@@ -53,10 +61,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         raise BadConfig(f"nothing was graded: {found.stopped}")
     for stage in sorted({result["stage"] for result in found.results}):
         rows, title = lines(found.results, stage), f"{settings.model}: {TITLES[stage]}, right [%]"
-        shown = Table("", "split", "ID", "OOD", "difference", title=title, title_justify="left")
-        for row in rows:
-            shown.add_row(*cells(row))
-        out.print(shown)
+        _print(title, rows)
         if stage == UNDERSTAND and (sighted := sighted_lines(found.results, found.priors)):
             line = sighted[-1]
             _, _, inside, outside, _ = cells(line)
@@ -68,6 +73,9 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         told[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
         if stage == UNDERSTAND:
             told[stage]["need_a_look"] = plain(sighted_lines(found.results, found.priors))
+        if stage == PLAN and (agreed := agreement(found.results)):
+            told[stage] |= {"executed": plain(executed_lines(found.results)), "agreement": asdict(agreed)}
+            _show_executed(settings, found)
     if errors := plan_errors(found.results):
         say("plans with errors: " + ", ".join(f"{kind} {count}" for kind, count in sorted(errors.items())))
     formats = Counter(result["stage"] for result in found.results if result["format_error"])
@@ -80,6 +88,30 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         remark(f"stopped early: {found.stopped}")
         return FAILED
     return OK
+
+
+def _show_executed(settings: AgentSettings, found: Outcome) -> None:
+    """Print and write what became of the plans of stage 2."""
+    rows, agreed = executed_lines(found.results), agreement(found.results)
+    assert agreed
+    if rows:
+        title = f"{settings.model}: {TITLES[PLAN]} carried out, goal reached [%]"
+        _print(title, rows)
+        write(settings.folder / "table-2-executed.md", markdown(title, rows))
+        say(
+            f"right plans that reach the goal: {agreed.right_reached} of {agreed.right}; wrong plans that reach it: "
+            f"{agreed.wrong_reached} of {agreed.wrong}"
+        )
+    if agreed.no_moves:
+        say(f"not carried out, as their sub-goals have no moves: plans of {', '.join(agreed.no_moves)}")
+
+
+def _print(title: str, rows: Sequence[TableLine]) -> None:
+    """Print a table."""
+    shown = Table("", "split", "ID", "OOD", "difference", title=title, title_justify="left")
+    for row in rows:
+        shown.add_row(*cells(row))
+    out.print(shown)
 
 
 def _dry(settings: AgentSettings, search: Sequence[str]) -> int:

@@ -170,11 +170,15 @@ class CrackerBoxJaw(BoxAndSlot):
         return abs(world.com("box")[2] - self.seat[2]) < HEIGHT_TOLERANCE
 
     def steps(self) -> Mapping[str, Planner]:
+        def knock(world: World) -> Plan:
+            if not self.down(world):
+                yield from self.knock(world.arm)
+
         return {
             "take_thickness": lambda world: self.take(world.arm),
             "lean_in": lambda world: self.insert(world.arm),
             "let_go": lambda world: self.leave(world.arm),
-            "knock_home": lambda world: () if self.down(world) else self.knock(world.arm),
+            "knock_home": knock,
             "take_width": lambda world: self._pick_flat_side(world.arm),
             "lay_level": lambda world: self._lower_held(world.arm),
             "topple": self._topple,
