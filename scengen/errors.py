@@ -86,7 +86,9 @@ MAX_SETTINGS = {
     "budget": 10_000_000,
     "any_n": 1_000_000,
     "attack": 1_000_000,
+    "chunk": 1000,
     "comparisons": 1_000_000,
+    "epochs": 1_000_000,
     "films": 100_000,
     "first": 1_000_000_000,
     "fps": 100,  # control periods in a second
@@ -97,8 +99,10 @@ MAX_SETTINGS = {
     "limit": 1_000_000_000,
     "limit_mb": 1_000_000,
     "limit_seconds": 86_400,  # a day
+    "minutes": 100_000,
     "n": 1_000_000,
     "permutations": 1_000_000,
+    "played": 1000,
     "repeats": 1000,
     "rollouts": 1_000_000,
     "rounds": 10_000,
@@ -106,6 +110,7 @@ MAX_SETTINGS = {
     "sample": 1_000_000_000,
     "seed": 2**63 - 1,  # a column of a pool holds it
     "seeds": 1_000_000,
+    "steps": 100,
     "width": 4096,
     "workers": 256,
 }

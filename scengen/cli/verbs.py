@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Generate and check": ("tasks", "try", "generate", "verify", "crosscheck", "drift", "attack"),
-    "Demonstrate": ("demos", "teleop", "curate", "stats"),
+    "Demonstrate and train": ("demos", "teleop", "curate", "stats", "train"),
     "View and export": ("show", "film", "view", "report", "export", "record", "publish"),
     "Evaluate and analyse": ("evaluate", "agent", "power", "audit", "compare", "subset", "shrink", "bench"),
     "Extend": ("new", "asset", "probe", "discover"),
@@ -14,5 +14,5 @@ VERBS = tuple(verb for verbs in GROUPS.values() for verb in verbs)
 """Names of all commands."""
 RENAMED: Mapping[str, str] = {"axis": "probe", "bias": "audit", "card": "publish", "robosuite": "crosscheck"}
 """New names of commands by the old ones, which version 0.3 removes. Help and completion do not list the old ones."""
-CONTINUING = ("generate", "demos", "teleop", "evaluate", "agent", "attack", "probe", "discover")
+CONTINUING = ("generate", "demos", "teleop", "train", "evaluate", "agent", "attack", "probe", "discover")
 """Commands that keep finished work when they are interrupted, and continue from there."""

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.table import Table
 
-from ..curate.dataset import Recording
 from ..curate.stats import TaskStats, paths_of, statistics_of
 from ..errors import BadConfig
+from ..export.dataset import Recording
 from ..pictures.plots import svg
 from ..pictures.report import template
 from ..work.targets import try_file

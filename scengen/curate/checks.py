@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ..control.loop import ACTION
 from ..control.teleop import LARGEST_CHANGE, MOTION
 from ..envs.observations import proprioception
+from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT, STATE
 from ..robots.panda import Names
-from .dataset import EpisodeData, Recording
 from .findings import Finding, Severity
 
 MAX_TIME_ERROR = 1e-4

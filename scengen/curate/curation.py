@@ -22,11 +22,11 @@ import numpy as np
 
 from .. import compose
 from ..errors import BadConfig, PoolError, cut
+from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT
 from ..pool.files import replace_file, sha256
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
 from .checks import Subject, check_rows, found
-from .dataset import EpisodeData, Recording
 from .findings import SCHEMA, EpisodeReport, Finding
 from .replays import Recorded, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of

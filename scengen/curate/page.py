@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 
 from ..control.loop import ACTION
 from ..errors import PoolError
+from ..export.dataset import EpisodeData, Recording
 from ..pictures import render
 from ..pictures.plots import svg
 from ..pictures.report import template
 from ..pool.files import replace_file
 from ..robots.panda import Names
 from .curation import VERDICTS, Curated, Decision
-from .dataset import EpisodeData, Recording
 from .findings import EpisodeReport
 
 MAX_CARDS = 200

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import ACTION
+from ..export.dataset import EpisodeData
 from ..robots.panda import Names
-from .dataset import EpisodeData
 
 INNER = 1.5
 """Excess over the upper quartile beyond which a term is high [interquartile ranges] (Tukey's inner fence)."""

@@ -12,11 +12,11 @@ from ..control.loop import ACTION
 from ..control.teleop import LARGEST_CHANGE, MOTION
 from ..envs.observations import action_names
 from ..errors import BadConfig
+from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS
 from ..robots.panda import Names
 from ..task_files import paper_lengths
 from .checks import MOVING_ACTION
-from .dataset import EpisodeData, Recording
 from .score import terms_of
 
 PHASES = 50

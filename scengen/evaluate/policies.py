@@ -9,6 +9,7 @@ import inspect
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,8 @@ from ..control.teleop import Filter, unfiltered
 from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
 from ..errors import BadConfig, GaveUp, ScengenError, UnknownName, cut
+from ..learn.player import TrainedPolicy
+from ..learn.store import StoredPolicy, is_policy
 from ..params import Value
 from ..pool.library import Library
 from ..samplers.task import Task
@@ -148,7 +151,8 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
     """The factory of a policy.
 
     Args:
-        name: a built-in name, `module:factory` from the path or the working directory, or the address of a server.
+        name: a built-in name, the folder of a policy of `scengen train`, `module:factory` from the path or the working
+            directory, or the address of a server.
         memory: training scenarios, for the policy `replay`.
         client: names of observations and actions, for the policy of a server.
 
@@ -159,10 +163,13 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
         return lambda env: NearestReplay(env, memory)
     if name in BUILT_IN:
         return BUILT_IN[name]
+    if is_policy(name):
+        return partial(TrainedPolicy, StoredPolicy.open(name))
     if client is not None and is_address(name):
         return lambda env: RemotePolicy(env, name, client)
     if not is_factory(name):
-        raise UnknownName("policy", name, [*BUILT_IN, REPLAY, "module:factory", "ws://HOST:PORT", "zmq://HOST:PORT"])
+        known = [*BUILT_IN, REPLAY, "module:factory", "a folder", "ws://HOST:PORT", "zmq://HOST:PORT"]
+        raise UnknownName("policy", name, known)
     return factory_of("policy", name)
 
 

@@ -19,6 +19,7 @@ from ..control.teleop import check_filter
 from ..envs.gym import PoolEnv
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, PoolError, ScengenError, at_least
+from ..learn.store import is_policy, read_settings
 from ..pool import Pool, collection
 from ..pool.library import Library
 from ..samplers.keyed import unit
@@ -122,6 +123,7 @@ def evaluate(
     Raises:
         ScengenError: a pool, a policy or a setting is not valid.
     """
+    settings = _completed(settings)
     settings.check()
     try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
@@ -150,6 +152,15 @@ def evaluate(
         key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
     )
     return Evaluation(episodes, done, lost)
+
+
+def _completed(settings: EvaluateSettings) -> EvaluateSettings:
+    """Settings with the observations and the rate of a policy that names them, unless they were chosen."""
+    if not is_policy(settings.policy):
+        return settings
+    own = read_settings(settings.policy)
+    repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
+    return replace(settings, observations=settings.observations or list(own.streams), action_repeat=repeat)
 
 
 def _id(episode: Mapping[str, Any]) -> RolloutId:

@@ -11,9 +11,9 @@ import yaml
 from helpers import REFERENCE
 
 from scengen import cli, list_tasks
-from scengen.curate.dataset import Recording
 from scengen.curate.stats import PHASES, at_phases, paths_of, statistics_of
 from scengen.errors import BadConfig, PoolError
+from scengen.export.dataset import Recording
 from scengen.task_files import conf_dir, paper_lengths
 
 

@@ -1,4 +1,4 @@
-"""A LeRobot recording of scengen, read for curation. What cannot be read is one line with the remedy."""
+"""Reader of the LeRobot recordings of `scengen record`. What cannot be read is one line with the remedy."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -55,7 +55,7 @@ class Recording:
             raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
         lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
         if lacking or not found.episodes or "scengen/task" not in found.episodes[0]:
-            raise PoolError(f"{folder} is not a recording of scengen; curate what scengen record has written")
+            raise PoolError(f"{folder} is not a recording of scengen; name a folder that scengen record has written")
         return found
 
     @cached_property

@@ -1,0 +1,1 @@
+"""Small state-based policies trained by imitation: data, features, training, and playing in plain numpy."""

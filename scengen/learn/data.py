@@ -1,0 +1,164 @@
+"""Demonstrations for training: the observations and actions of each episode of a recording, at its own rate."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control.loop import Loop
+from ..envs.object_state import NAME
+from ..envs.observations import proprioception
+from ..errors import BadConfig, PoolError, UnknownName, cut
+from ..export.dataset import EpisodeData, Recording
+from ..export.recording import ENVIRONMENT
+from ..pool.files import read_json_file, sha256, sha256_of_file
+
+KEPT = Path("curation", "kept.json")
+"""File in which `scengen curate` lists the episodes that are kept."""
+MIN_EPISODES = 2
+"""Smallest number of demonstrations: one to learn from, one held out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Rows of one demonstration."""
+
+    scenario: str
+    """Id of its scenario."""
+    observations: NDArray[np.float32]
+    """Observed entries, shape (rows, entries)."""
+    actions: NDArray[np.float32]
+    """Action that is held until the next row, shape (rows, 7 * arms)."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """Demonstrations of one task."""
+
+    task: str
+    embodiment: str
+    rate: int
+    """Rows per second, a divisor of 100."""
+    streams: tuple[str, ...]
+    """Names of the observed streams."""
+    entries: tuple[str, ...]
+    """Names of the entries of these streams, one after the other."""
+    trajectories: tuple[Trajectory, ...]
+    sha256: str
+    """Hash of the recording's rows, and of the choice of episodes."""
+    left_out: Mapping[str, int]
+    """Number of episodes that are not learned from, by reason."""
+
+    @classmethod
+    def read(cls, folder: str | Path, observations: Sequence[str] | None = None) -> "TrainingData":
+        """Read the demonstrations of a recording.
+
+        Failed episodes are left out, and those that a curation of the recording has not kept.
+
+        Args:
+            folder: a LeRobot recording of `scengen record`.
+            observations: streams to observe; default: proprioception and `object-state`.
+
+        Raises:
+            ScengenError: the recording is damaged, holds several tasks or no success, or lacks a stream.
+        """
+        recording = Recording.open(folder)
+        tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
+        if len(tasks) > 1:
+            raise BadConfig(f"{folder} holds demonstrations of {' and '.join(tasks)}; record one task alone")
+        robot = str(recording.info["robot_type"])
+        streams = tuple(observations or (*proprioception(robot), NAME))
+        columns = _columns(recording, streams)
+        kept = _kept(recording)
+        found, left_out = [], {"failed": 0, "not kept by the curation": 0}
+        for episode in recording.read():
+            if not episode.about.get("scengen/success"):
+                left_out["failed"] += 1
+            elif kept is not None and episode.number not in kept:
+                left_out["not kept by the curation"] += 1
+            else:
+                found.append(_trajectory(recording, episode, columns))
+        if len(found) < MIN_EPISODES:
+            told = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
+            raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({told}); at least {MIN_EPISODES}")
+        entries = tuple(name for names in columns.values() for name in names)
+        identity = [*_hashes(recording), json.dumps([trajectory.scenario for trajectory in found])]
+        return cls(
+            tasks[0], robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of all demonstrations."""
+        return sum(len(trajectory.actions) for trajectory in self.trajectories)
+
+
+def entry_names(stream: str, names: Sequence[str], shape: Sequence[int]) -> tuple[str, ...]:
+    """Names of the entries of a stream, one for each of its numbers; those of a grid are counted.
+
+    Args:
+        names: names of the entries of a vector, or of the axes of a grid.
+    """
+    return tuple(names) if len(shape) < 2 else tuple(f"{stream}.{i}" for i in range(prod(shape)))
+
+
+def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Columns of the recording that hold the streams, and the names of their entries.
+
+    Raises:
+        UnknownName: there is no such column.
+    """
+    known = {
+        NAME if column == ENVIRONMENT else column: (column, feature)
+        for column, feature in recording.info["features"].items()
+        if feature["dtype"] == "float32" and feature.get("names") and "." not in column.removeprefix("observation.")
+    }
+    found = {}
+    for stream in streams:
+        if stream not in known:
+            if stream == NAME:
+                raise BadConfig(
+                    f"{recording.folder} holds no {NAME}: record with environment_state=true, or say observations=[...]"
+                )
+            raise UnknownName("recorded stream", stream, known)
+        column, feature = known[stream]
+        found[column] = entry_names(stream, feature["names"], feature["shape"])
+    return found
+
+
+def _trajectory(recording: Recording, episode: EpisodeData, columns: Mapping[str, Sequence[str]]) -> Trajectory:
+    rows = len(episode)
+    seen = np.concatenate([episode.columns[name].reshape(rows, -1) for name in columns], axis=1, dtype=np.float32)
+    actions = np.asarray(episode.columns["action"], np.float32)
+    if not (np.isfinite(seen).all() and np.isfinite(actions).all()):
+        raise PoolError(f"{recording.folder}: episode {episode.number} has numbers that are not finite; see curate")
+    return Trajectory(str(episode.about["scengen/id"]), seen, actions)
+
+
+def _kept(recording: Recording) -> set[int] | None:
+    """Numbers of the episodes that a curation has kept; None without one."""
+    path = recording.folder / KEPT
+    if not path.is_file():
+        return None
+    try:
+        found = read_json_file(path)
+        if not (isinstance(found, list) and all(type(number) is int for number in found)):
+            raise ValueError("not a list of numbers")
+    except (ValueError, OSError) as error:
+        raise PoolError(f"{path} is damaged ({cut(str(error))}); repeat scengen curate, or remove it") from None
+    return set(found)
+
+
+def _hashes(recording: Recording) -> list[str]:
+    return [sha256_of_file(path) for path in sorted((recording.folder / "data").glob("*/*.parquet"))]
+
+
+def _rate(recording: Recording) -> int:
+    full, rate = round(1 / Loop.PERIOD), round(recording.fps)
+    if rate < 1 or full % rate:
+        raise PoolError(f"{recording.folder} has {rate} rows per second, which does not divide {full}; record it again")
+    return rate

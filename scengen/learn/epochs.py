@@ -1,0 +1,146 @@
+"""Epochs of a training, each of which is kept on disk: a training that was interrupted continues after the last one.
+
+The networks are scikit-learn's `MLPRegressor`. Each epoch is one `fit` that continues from the weights of the one
+before, with fresh noise and a learning rate of its own. All random numbers depend on the seed and the epoch, and the
+arithmetic runs on one core: the same data give the same weights, with or without interruptions.
+"""
+
+import math
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..samplers.keyed import unit
+from ..work.targets import write
+from .models import BC, KNN, MIP, REFINED_AT, first_pass, second_pass
+from .samples import Samples
+from .store import arrays_as_bytes, network_shapes, read_arrays
+
+INPUT_NOISE = 0.02
+"""Standard deviation of the noise on inputs in training [standard deviations]. It stands for states beside those of the
+demonstrations."""
+BATCH = 256
+"""Rows per step of the optimiser."""
+FIRST_RATE = 1e-3
+"""Learning rate of Adam in the first epoch. It falls to 0 along half a cosine."""
+DECAY = 1e-4
+"""Weight of the squared norm of the weights."""
+
+
+class Training:
+    """A training with its present weights."""
+
+    def __init__(
+        self,
+        path: Path,
+        kind: str,
+        hidden: tuple[int, ...],
+        learned: Samples,
+        held_out: Samples,
+        epochs: int,
+        limit: float | None,
+        seed: int,
+    ):
+        """Begin, or continue from a file.
+
+        Args:
+            path: file of the weights after the last epoch; its name tells trainings apart.
+            kind: name of the policy.
+            hidden: units of the hidden layers.
+            learned: what is learned.
+            held_out: what the held-out losses are measured on.
+            epochs: number of epochs.
+            limit: processor time after which the training ends [s]; None for none.
+            seed: seed of all random numbers.
+
+        Raises:
+            Broken: the file is damaged.
+        """
+        self.path, self.kind, self.hidden, self.learned = path, kind, hidden, learned
+        self._measured = learned.some(), held_out.some()
+        self.epochs, self._limit, self._seed = epochs, limit, seed
+        self.arrays: dict[str, NDArray[np.float32]] = {}
+        self.losses: list[tuple[float, float]] = []
+        """Losses after each epoch [variances]: of what is learned, and of what is held out."""
+        self.seconds = 0.0
+        """Processor time, that of earlier runs included [s]."""
+        if path.exists():
+            self._continue()
+
+    @property
+    def share(self) -> float:
+        """Share of the training that is done, by epochs or by time, whichever is larger."""
+        timed = self.seconds / self._limit if self._limit else 0.0
+        return max(len(self.losses) / self.epochs, timed)
+
+    def advance(self) -> None:
+        """Train for one epoch and keep the result."""
+        started = time.process_time()
+        if self.kind == KNN:
+            self.arrays = {"inputs": self.learned.inputs, "chunks": self.learned.chunks}
+        else:
+            self.arrays = self._fitted()
+        learned, held_out = (samples.error(self.kind, self.arrays) for samples in self._measured)
+        self.losses.append((learned, held_out))
+        self.seconds += time.process_time() - started
+        if self.kind != KNN:
+            told = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
+            write(self.path, arrays_as_bytes({**self.arrays, **told}))
+
+    def _all_losses(self) -> NDArray[np.float32]:
+        """Losses of all epochs, shape (epochs, 2); -1 for those to come."""
+        found = np.full((self.epochs, 2), -1.0, np.float32)
+        found[: len(self.losses)] = self.losses
+        return found
+
+    def _continue(self) -> None:
+        shapes = network_shapes(self.kind, self.learned.inputs.shape[1], self.hidden, self.learned.chunks.shape[1])
+        arrays = read_arrays(self.path, {**shapes, "losses": (self.epochs, 2), "seconds": (1,)})
+        self.losses = [(float(a), float(b)) for a, b in arrays.pop("losses") if b >= 0.0]
+        self.seconds = float(arrays.pop("seconds")[0])
+        self.arrays = arrays
+
+    def _fitted(self) -> dict[str, NDArray[np.float32]]:
+        """Weights after one more epoch."""
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.neural_network import MLPRegressor
+        from threadpoolctl import threadpool_limits
+
+        number = len(self.losses)
+        random = np.random.default_rng(int(2**31 * unit("noise", self._seed, number)))
+        inputs, chunks = _augmented(self.kind, self.learned, random)
+        network = MLPRegressor(
+            hidden_layer_sizes=self.hidden,
+            alpha=DECAY,
+            batch_size=min(BATCH, len(inputs)),
+            learning_rate_init=FIRST_RATE * 0.5 * (1.0 + math.cos(math.pi * min(1.0, self.share))),
+            max_iter=1,
+            warm_start=True,
+            random_state=int(2**31 * unit("epoch", self._seed, number)),
+        )
+        with threadpool_limits(1), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was asked for
+            if self.arrays:
+                network.partial_fit(inputs[:BATCH], chunks[:BATCH])  # makes the arrays that are replaced now
+                network.coefs_ = [self.arrays[f"weights{i}"].copy() for i in range(len(self.hidden) + 1)]
+                network.intercepts_ = [self.arrays[f"biases{i}"].copy() for i in range(len(self.hidden) + 1)]
+            network.fit(inputs, chunks)
+        weights = {f"weights{i}": values for i, values in enumerate(network.coefs_)}
+        return weights | {f"biases{i}": values for i, values in enumerate(network.intercepts_)}
+
+
+def _augmented(
+    kind: str, samples: Samples, random: np.random.Generator
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Inputs and targets of one epoch, with noise; those of both calls for `mip`."""
+    noise = INPUT_NOISE * random.standard_normal(samples.inputs.shape, np.float32)
+    inputs, chunks = samples.inputs + noise, samples.chunks
+    if kind == BC:
+        return inputs, chunks
+    assert kind == MIP
+    blurred = REFINED_AT * chunks + (1.0 - REFINED_AT) * random.standard_normal(chunks.shape, np.float32)
+    both = np.concatenate([first_pass(inputs, chunks.shape[1]), second_pass(inputs, blurred)])
+    return both, np.concatenate([chunks, chunks])

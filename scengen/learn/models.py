@@ -1,0 +1,75 @@
+"""The three policies as functions of arrays, in plain numpy: from inputs to a chunk of future actions.
+
+    knn    weighted mean of the chunks of the k nearest rows of the demonstrations
+    bc     behaviour cloning: a perceptron that minimises the squared error of the chunk
+    mip    minimal iterative policy (Pan et al., arXiv 2512.01809): one perceptron p(o, a, t) that is called twice.
+           Trained on |p(o, 0, 0) - a|^2 + |p(o, t* a + (1 - t*) z, t*) - a|^2 with z ~ N(0, 1) and t* = 0.9;
+           played as p(o, t* p(o, 0, 0), t*).
+
+Chunks are standardised: each number of an action is shifted by its mean and divided by its spread.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray[np.float32]]
+"""Arrays of a policy, by name."""
+KNN = "knn"
+"""Name of the policy of nearest neighbours."""
+BC = "bc"
+"""Name of behaviour cloning."""
+MIP = "mip"
+"""Name of the minimal iterative policy."""
+KINDS = (KNN, BC, MIP)
+"""Names of the policies."""
+NEIGHBOURS = 5
+"""Number of neighbours of `knn`."""
+REFINED_AT = 0.9
+"""Time t* of the second call of `mip`, as in the paper."""
+
+
+def predict(kind: str, arrays: Arrays, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Standardised chunks, shape (n, chunk * actions), for inputs, shape (n, size)."""
+    if kind == KNN:
+        return np.stack([_neighbours(arrays["inputs"], arrays["chunks"], one) for one in inputs])
+    if kind == BC:
+        return perceptron(arrays, inputs)
+    outputs = len(arrays[f"biases{layers(arrays) - 1}"])
+    first = perceptron(arrays, first_pass(inputs, outputs))
+    return perceptron(arrays, second_pass(inputs, REFINED_AT * first))
+
+
+def first_pass(inputs: NDArray[np.float32], outputs: int) -> NDArray[np.float32]:
+    """Inputs of `mip`'s perceptron in its first call: o, 0, 0."""
+    return np.hstack([inputs, np.zeros((len(inputs), outputs + 1), np.float32)])
+
+
+def second_pass(inputs: NDArray[np.float32], blurred: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Inputs of `mip`'s perceptron in its second call: o, a blurred chunk, t*."""
+    return np.hstack([inputs, blurred, np.full((len(inputs), 1), REFINED_AT, np.float32)])
+
+
+def perceptron(arrays: Arrays, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Outputs of a perceptron with rectified hidden layers: `weights0`, `biases0`, `weights1` and so on."""
+    found, last = inputs, layers(arrays) - 1
+    for i in range(last + 1):
+        found = found @ arrays[f"weights{i}"] + arrays[f"biases{i}"]
+        if i < last:
+            np.maximum(found, 0.0, out=found)
+    return found
+
+
+def layers(arrays: Mapping[str, Any]) -> int:
+    """Number of layers of a perceptron."""
+    return sum(name.startswith("weights") for name in arrays)
+
+
+def _neighbours(known: NDArray[np.float32], chunks: NDArray[np.float32], here: NDArray[np.float32]) -> Any:
+    """Mean of the chunks of the nearest rows, weighted by the inverse of the squared distance."""
+    far = np.square(known - here).sum(axis=1)
+    near = np.argsort(far, kind="stable")[:NEIGHBOURS]
+    weights = 1.0 / (far[near] + 1e-6)
+    return (weights / weights.sum()) @ chunks[near]

@@ -1,0 +1,70 @@
+"""A trained policy in an environment: it observes, predicts a chunk of actions, and plays the first few of them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..envs.gym import Observation, PoolEnv
+from ..errors import BadConfig
+from . import models
+from .data import entry_names
+from .store import StoredPolicy
+
+
+class TrainedPolicy:
+    """Plays a `StoredPolicy`. It is deterministic."""
+
+    def __init__(self, stored: StoredPolicy, env: PoolEnv):
+        """
+        Raises:
+            BadConfig: the environment is of another task, or does not observe what the policy needs.
+        """
+        self.stored, self.settings = stored, stored.settings
+        self.version = stored.settings.weights_sha256
+        """Version of the policy, to which an evaluation is bound."""
+        _check(stored, env)
+
+    def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
+        """Begin an episode without earlier observations."""
+        self._seen: list[NDArray[np.float32]] = []
+        self._planned: list[NDArray[np.float32]] = []
+
+    def act(self, observation: Observation) -> ArrayLike:
+        """The next action of the chunk, shape (7 * arms,); of a new chunk if enough of the last one was played."""
+        own = self.settings
+        now = np.concatenate([np.ravel(observation[name]) for name in own.streams], dtype=np.float32)
+        self._seen = [*self._seen, now][-own.steps :]
+        if not self._planned:
+            self._planned = list(self._predicted()[: own.played])
+        return self._planned.pop(0)
+
+    def _predicted(self) -> NDArray[np.float32]:
+        """A chunk of actions from the last observations, shape (chunk, 7 * arms)."""
+        arrays = self.stored.arrays
+        inputs = self.stored.features.inputs(np.stack(self._seen))[-1:]
+        standard = models.predict(self.settings.kind, arrays, inputs)[0]
+        actions = standard * arrays["output_scale"] + arrays["output_mean"]
+        return np.clip(actions, -1.0, 1.0).reshape(self.settings.chunk, -1)
+
+
+def _check(stored: StoredPolicy, env: PoolEnv) -> None:
+    own = stored.settings
+    if own.task != env.task.name:
+        raise BadConfig(f"the policy was trained for {own.task}, the pool holds {env.task.name}; train one for it")
+    missing = [name for name in own.streams if name not in env.streams]
+    if missing:
+        raise BadConfig(
+            f"the policy observes {missing[0]}, the environment does not; say observations=[...,{missing[0]}]"
+        )
+    entries = [
+        n for name in own.streams for n in entry_names(name, env.streams[name].entries(name), env.streams[name].shape)
+    ]
+    if tuple(entries) != own.entries:
+        other = next((a for a, b in zip(entries, own.entries, strict=False) if a != b), "their number")
+        raise BadConfig(f"the policy was trained on other entries of its observations ({other}); train it again")
+    if env.action_repeat != own.action_repeat:
+        raise BadConfig(
+            f"action_repeat = {env.action_repeat}; the policy acts {own.rate} times per second: {own.action_repeat}"
+        )

@@ -1,0 +1,203 @@
+"""Training of a policy on demonstrations: `scengen train`."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+from matplotlib.figure import Figure
+
+from ..errors import BadConfig, UnknownName, at_least, cut
+from ..pictures.plots import svg_bytes
+from ..pool.files import sha256
+from ..versions import versions
+from ..work.targets import refused, try_folder, write
+from .data import TrainingData
+from .epochs import Training
+from .features import Features
+from .models import BC, KINDS, KNN
+from .samples import parted, samples_of, scaling_of
+from .store import LOSS, Broken, PolicySettings, StoredPolicy, is_policy
+
+UNFINISHED = "unfinished-{identity}.npz"
+"""Name of the file of weights of an unfinished training."""
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """Settings of `scengen train`; conf/command/train.yaml explains them."""
+
+    policy: str = BC
+    data: str = ""
+    to: str = ""
+    observations: list[str] | None = None
+    steps: int = 2
+    chunk: int = 8
+    played: int = 4
+    hidden: list[int] = field(default_factory=lambda: [256, 256])
+    epochs: int = 40
+    minutes: float | None = None
+    seed: int = 0
+
+    def check(self) -> None:
+        """Raise `ScengenError` for invalid settings."""
+        if self.policy not in KINDS:
+            raise UnknownName("policy to train", self.policy, KINDS)
+        at_least(self, steps=1, chunk=1, played=1, epochs=1, minutes=0.01, seed=0)
+        if self.played > self.chunk:
+            raise BadConfig(f"played = {self.played}; it must be at most chunk = {self.chunk}")
+        if not 1 <= len(self.hidden) <= 20 or any(not 0 < size <= 10_000 for size in self.hidden):
+            raise BadConfig(f"hidden = {cut(str(self.hidden))}; give the units of 1 to 20 layers, each 1 to 10000")
+        if self.policy != KNN and find_spec("sklearn") is None:
+            raise BadConfig(
+                f"no scikit-learn for policy={self.policy}; say pip install 'scengen[train]', or policy=knn"
+            )
+        try_folder(self.to)
+
+
+@dataclass(frozen=True)
+class Trained:
+    """Result of a training."""
+
+    settings: PolicySettings
+    losses: tuple[tuple[float, float], ...]
+    """Losses after each epoch [variances]: of demonstrations that were learned from, and of held-out ones. Empty if the
+    policy was there already."""
+    held_out: int
+    """Number of demonstrations that were held out."""
+    seconds: float
+    """Processor time, that of earlier runs included [s]."""
+    earlier: int
+    """Number of epochs of earlier runs."""
+
+
+def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, int, str], None]) -> Trained:
+    """Train a policy and write it to `settings.to`. An interrupted training continues after its last epoch.
+
+    Args:
+        progress: called with the number of finished epochs, the number of all, and the last losses in words.
+
+    Raises:
+        BadConfig: the folder holds another policy or another unfinished training, or cannot be written.
+    """
+    settings.check()
+    folder, identity = Path(settings.to), _identity(settings, data)
+    learned, held_out = parted(data.trajectories)
+    with _alone(folder):
+        if is_policy(folder):
+            return Trained(_same(folder, identity), (), len(held_out), 0.0, 0)
+        path = folder / UNFINISHED.format(identity=identity[:16])
+        _check_unfinished(folder, path)
+        scaling = scaling_of(data.entries, settings.steps, settings.chunk, learned)
+        features = Features(data.entries, settings.steps, scaling["input_mean"], scaling["input_scale"])
+        samples = samples_of(features, settings.chunk, scaling, learned)
+        validation = samples_of(features, settings.chunk, scaling, held_out)
+        hidden = () if settings.policy == KNN else tuple(settings.hidden)
+        limit = None if settings.minutes is None else 60.0 * settings.minutes
+        epochs = 1 if settings.policy == KNN else settings.epochs
+        try:
+            run = Training(path, settings.policy, hidden, samples, validation, epochs, limit, settings.seed)
+        except (Broken, ValueError, OSError) as error:
+            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to begin anew") from None
+        earlier = len(run.losses)
+        while run.share < 1.0:
+            run.advance()
+            progress(len(run.losses), epochs, f"loss {run.losses[-1][0]:.4f}, held out {run.losses[-1][1]:.4f}")
+        own = PolicySettings(
+            kind=settings.policy,
+            task=data.task,
+            embodiment=data.embodiment,
+            rate=data.rate,
+            streams=data.streams,
+            entries=data.entries,
+            steps=settings.steps,
+            chunk=settings.chunk,
+            played=settings.played,
+            hidden=hidden,
+            inputs=samples.inputs.shape[1],
+            epochs=len(run.losses),
+            seed=settings.seed,
+            demonstrations=len(learned),
+            rows=len(samples.inputs),
+            data_sha256=data.sha256,
+            training_sha256=identity,
+            weights_sha256="",  # that of the file that is written
+            versions={**versions(), "scikit-learn": _version("scikit-learn")},
+        )
+        write(folder / LOSS, _curve(own, run.losses))
+        own = StoredPolicy(own, {**scaling, **run.arrays}).write(folder)
+        path.unlink(missing_ok=True)
+    return Trained(own, tuple(run.losses), len(held_out), run.seconds, earlier)
+
+
+# --- the folder ---------------------------------------------------------------------------------------
+
+
+def _identity(settings: TrainSettings, data: TrainingData) -> str:
+    """Hash of everything that decides the weights."""
+    chosen = {name: value for name, value in asdict(settings).items() if name not in ("data", "to")}
+    told = {**chosen, "sha256": data.sha256, "streams": data.streams, "version": _version("scengen")}
+    return sha256(json.dumps(told, sort_keys=True))
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold the folder's lock.
+
+    Raises:
+        BadConfig: another training holds it, or the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / "train.lock", timeout=0):
+            yield
+    except Timeout:
+        raise BadConfig(f"another training is writing {folder}; wait for it or choose another to=") from None
+    except OSError as error:
+        raise refused(folder, error) from None
+
+
+def _same(folder: Path, identity: str) -> PolicySettings:
+    """The settings of a policy that is there already.
+
+    Raises:
+        BadConfig: it comes from another training.
+    """
+    found = StoredPolicy.open(folder).settings
+    if found.training_sha256 != identity:
+        raise BadConfig(f"{folder} holds a policy of other data or settings; choose another to=, or delete it")
+    return found
+
+
+def _check_unfinished(folder: Path, path: Path) -> None:
+    for other in sorted(folder.glob(UNFINISHED.format(identity="*"))):
+        if other != path:
+            raise BadConfig(
+                f"{folder} holds an unfinished training with other data or settings; repeat its command, "
+                f"choose another to=, or delete {other.name}"
+            )
+
+
+# --- the report ---------------------------------------------------------------------------------------
+
+
+def _curve(own: PolicySettings, losses: Sequence[tuple[float, float]]) -> bytes:
+    """The losses of the epochs as a plot."""
+    figure = Figure(figsize=(6, 3.4))
+    axes = figure.subplots()
+    epochs = range(1, len(losses) + 1)
+    marker = "o" if len(losses) == 1 else ""
+    axes.plot(epochs, [loss for loss, _ in losses], marker=marker, label="learned from")
+    axes.plot(epochs, [loss for _, loss in losses], marker=marker, label="held out")
+    axes.set(xlabel="epoch", ylabel="error of the actions [variances]", title=f"{own.kind}, {own.task}")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+    return svg_bytes(figure)
+
+
+def _version(package: str) -> str:
+    return version(package) if find_spec("sklearn" if package == "scikit-learn" else package) else "none"

@@ -1,0 +1,136 @@
+"""Training: the same data give the same weights, also after an interruption, and what was shown is learned."""
+
+import numpy as np
+import pytest
+
+from scengen.errors import BadConfig
+from scengen.learn.data import TrainingData, Trajectory
+from scengen.learn.models import BC, KINDS, KNN, MIP, REFINED_AT, perceptron, predict
+from scengen.learn.store import StoredPolicy
+from scengen.learn.train import TrainSettings, train
+
+ENTRIES = ("robot0_eef_pos.x", "robot0_eef_pos.y", "robot0_eef_pos.z")
+ROBOT = "panda_jaw"
+
+
+def shown(count=8, rows=60):
+    """Demonstrations in which the hand goes back to the origin, and closes where x is positive."""
+    random = np.random.default_rng(3)
+    found = []
+    for i in range(count):
+        seen = random.uniform(-0.5, 0.5, (rows, 3)).astype(np.float32)
+        grip = np.where(seen[:, :1] > 0, 1.0, -1.0)
+        found.append(Trajectory(f"{i:012x}", seen, np.hstack([-seen, 0 * seen, grip]).astype(np.float32)))
+    return TrainingData("push", ROBOT, 25, ("robot0_eef_pos",), ENTRIES, tuple(found), "0" * 64, {})
+
+
+def trained(folder, progress=lambda *_: None, data=None, **changes):
+    given = {"policy": BC, "to": str(folder), "steps": 1, "chunk": 1, "played": 1, "hidden": [32], "epochs": 6}
+    return train(TrainSettings(**{**given, **changes}), data or shown(), progress)
+
+
+def weights(folder):
+    return (folder / "weights.npz").read_bytes()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_same_data_give_the_same_weights(tmp_path, kind):
+    for name in ("a", "b"):
+        trained(tmp_path / name, policy=kind)
+    assert weights(tmp_path / "a") == weights(tmp_path / "b")
+    assert (tmp_path / "a" / "loss.svg").read_bytes() == (tmp_path / "b" / "loss.svg").read_bytes()
+
+
+def test_another_seed_gives_other_weights(tmp_path):
+    trained(tmp_path / "a")
+    trained(tmp_path / "b", seed=1)
+    assert weights(tmp_path / "a") != weights(tmp_path / "b")
+
+
+@pytest.mark.parametrize("kind", [BC, MIP])
+def test_an_interrupted_training_ends_with_the_same_weights(tmp_path, kind):
+    def interrupt(done, total, told):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    trained(tmp_path / "whole", policy=kind)
+    with pytest.raises(KeyboardInterrupt):
+        trained(tmp_path / "cut", interrupt, policy=kind)
+    assert not (tmp_path / "cut" / "policy.json").exists(), "half a policy cannot be played"
+    assert trained(tmp_path / "cut", policy=kind).earlier == 3
+    assert weights(tmp_path / "cut") == weights(tmp_path / "whole")
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == sorted(
+        path.name for path in (tmp_path / "whole").iterdir()
+    )
+
+
+def test_a_finished_training_is_not_repeated_and_never_replaced(tmp_path):
+    trained(tmp_path)
+    assert trained(tmp_path).losses == ()
+    with pytest.raises(BadConfig, match="holds a policy of other data or settings"):
+        trained(tmp_path, epochs=7)
+
+
+def test_an_unfinished_training_of_other_settings_is_not_replaced(tmp_path):
+    def interrupt(done, total, told):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        trained(tmp_path, interrupt)
+    with pytest.raises(BadConfig, match="unfinished training with other data or settings"):
+        trained(tmp_path, epochs=7)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_was_shown_is_learned(tmp_path, kind):
+    """The error on held-out demonstrations falls far below 1, the error of always playing the mean."""
+    found = trained(tmp_path, policy=kind, epochs=60, data=shown(40))
+    assert found.losses[-1][1] < 0.2
+    stored = StoredPolicy.open(tmp_path)
+    here = np.array([[0.3, -0.2, 0.1]], np.float32)
+    predicted = predict(kind, stored.arrays, stored.features.inputs(here))
+    action = predicted[0] * stored.arrays["output_scale"] + stored.arrays["output_mean"]
+    assert action[:3] == pytest.approx([-0.3, 0.2, -0.1], abs=0.12) and action[6] > 0.5
+
+
+def test_validation_uses_no_scenario_that_was_learned_from(tmp_path):
+    """Several runs of one scenario are on the same side."""
+    data = shown(8)
+    twice = [Trajectory(one.scenario, one.observations + 0.01, one.actions) for one in data.trajectories]
+    both = TrainingData(
+        *[getattr(data, n) for n in ("task", "embodiment", "rate", "streams", "entries")],
+        (*data.trajectories, *twice),
+        "1" * 64,
+        {},
+    )
+    found = trained(tmp_path, policy=KNN, data=both)
+    assert (found.settings.demonstrations, found.held_out) == (14, 2)
+    assert found.losses[-1][1] > 0.01, "a run of the same scenario is 1 cm away"
+
+
+def test_mip_refines_its_own_first_prediction(tmp_path):
+    trained(tmp_path, policy=MIP)
+    arrays = StoredPolicy.open(tmp_path).arrays
+    here = np.array([[0.5, -1.0, 0.25]], np.float32)
+    first = perceptron(arrays, np.hstack([here, np.zeros((1, 8), np.float32)]))
+    second = perceptron(arrays, np.hstack([here, REFINED_AT * first, np.full((1, 1), REFINED_AT, np.float32)]))
+    assert np.array_equal(predict(MIP, arrays, here), second) and not np.allclose(first, second)
+
+
+def test_a_limit_of_time_ends_the_training(tmp_path):
+    assert trained(tmp_path, epochs=100_000, minutes=0.01).settings.epochs < 100_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"policy": "bcc"}, "no policy to train named 'bcc' (did you mean 'bc'?)"),
+        ({"played": 9}, "played = 9; it must be at most chunk = 1"),
+        ({"epochs": 0}, "epochs = 0; it must be at least 1"),
+        ({"hidden": []}, "hidden = []; give the units"),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(tmp_path, changes, said):
+    with pytest.raises(Exception) as error:
+        trained(tmp_path, **changes)
+    assert said in str(error.value) and not list(tmp_path.iterdir())
