@@ -66,11 +66,16 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
-def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, capsys, case, ending):
+def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, case, ending):
     mesh, says = WRONG[case]
-    file = tmp_path / f"{case}.{ending}"
-    mesh.export(file)
-    assert cli.run(["asset", f"mesh={file}", f"to={tmp_path / 'asset'}"]) == cli.BAD_INPUT
+    told = refusal(tmp_path, f"{case}.{ending}", mesh.export(file_type=ending))
+    assert says in told and "\n" not in told
+
+
+def test_the_command_ends_with_that_line_and_writes_nothing(tmp_path, capsys):
+    mesh, says = WRONG["two"]
+    mesh.export(tmp_path / "two.stl")
+    assert cli.run(["asset", f"mesh={tmp_path / 'two.stl'}", f"to={tmp_path / 'asset'}"]) == cli.BAD_INPUT
     told = capsys.readouterr().err
     assert says in told and told.count("\n") == 1
     assert not (tmp_path / "asset").exists()
@@ -79,7 +84,6 @@ def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, capsys, case, e
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
-        ("none.stl", None, "there is no file"),
         ("mesh.foo", b"x", "no mesh format named '.foo'; known: .glb, .obj, .off, .ply, .stl"),
         ("noise.stl", b"noise", "holds no triangles"),
         ("empty.obj", b"", "holds no triangles"),
@@ -99,12 +103,15 @@ def test_what_is_wrong_with_a_mesh_is_said_in_one_line(tmp_path, capsys, case, e
         ("noise.ply", b"ply", "cannot be read as a .ply file"),
     ],
 )
-def test_what_is_no_mesh_is_said_in_one_line(tmp_path, capsys, name, content, says):
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    assert cli.run(["asset", f"mesh={tmp_path / name}", f"to={tmp_path / 'asset'}"]) == cli.BAD_INPUT
+def test_what_is_no_mesh_is_said_in_one_line(tmp_path, name, content, says):
+    told = refusal(tmp_path, name, content)
+    assert says in told and "\n" not in told
+
+
+def test_a_mesh_that_is_not_there_is_said_in_one_line(tmp_path, capsys):
+    assert cli.run(["asset", f"mesh={tmp_path / 'none.stl'}", f"to={tmp_path / 'asset'}"]) == cli.BAD_INPUT
     told = capsys.readouterr().err
-    assert says in told and told.count("\n") == 1
+    assert "there is no file" in told and told.count("\n") == 1
 
 
 @pytest.mark.parametrize(
