@@ -50,6 +50,8 @@ RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
 RESET_OPTIONS = ("scenario", "labels")
 """Names of the options of `reset`."""
+INFOS: Mapping[str, type] = {"success": bool, "is_success": bool, "reason": object, "time": float}
+"""Entries of `info` without labels, and their types in an array."""
 MAX_ACTION_REPEAT = 100
 """Largest `action_repeat` [control periods]: one second. With longer repeats the arm is hardly controlled."""
 
@@ -119,7 +121,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         task: str,
-        pool: Folders | None = None,
+        pool: Folders | Library | None = None,
         observations: str | Sequence[str] | None = None,
         render_mode: str | None = None,
         width: int = 256,
@@ -137,7 +139,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
         Args:
             task: name of the task. Pools of other tasks are refused.
-            pool: folder of a pool, or several folders.
+            pool: folder of a pool, or several folders; or the scenarios of another environment of the task.
             observations: names of streams and cameras, or one name; only these are computed. Default: proprioception.
                 Privileged streams are `object-state`, all poses and velocities in one vector
                 (`scengen.envs.object_state`), each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m]
@@ -278,21 +280,15 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ValueError: the action has another shape than `action_space`, or is not finite. Nothing is simulated then.
         """
-        given, size = np.asarray(action, np.float32), action_size(self.task.embodiment)
-        if given.shape != (size,) or not np.isfinite(given).all():
+        given = np.asarray(action, np.float32)
+        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+            size = action_size(self.task.embodiment)
             raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
         if self._world is None:
             raise BadConfig("no scenario is running; call reset first")
         with self._lock:
-            outcome = None
-            for _ in range(self.action_repeat):
-                outcome = outcome or self._advance(given)
-            reason = self._episode.reason
-            terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
-            if outcome == "success" and self.settle:
-                outcome, reason = self._settled()
-            success = outcome == "success"
-            return self._observe(), float(success), terminated, truncated, self._info(reason, success)
+            reward, terminated, truncated, info = self._play(given if self.action_filter else unfiltered(given))
+            return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture of `camera`, shape (height, width, 3), or None without a render mode."""
@@ -348,13 +344,29 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
-    def _advance(self, action: NDArray[np.floating]) -> Outcome | None:
-        return self._episode.step(self.world.filter(action) if self.action_filter else unfiltered(action))
+    def _play(self, given: NDArray[np.float32]) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Take a step with a valid action, clipped unless there is a filter.
+
+        Returns:
+            Reward, whether the episode terminates, whether it is truncated, and the info.
+        """
+        outcome = None
+        for _ in range(self.action_repeat):
+            outcome = outcome or self._advance(given)
+        reason = self._episode.reason
+        terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
+        if outcome == "success" and self.settle:
+            outcome, reason = self._settled()
+        success = outcome == "success"
+        return float(success), terminated, truncated, self._info(reason, success)
+
+    def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
+        return self._episode.step(self.world.filter(action) if self.action_filter else action)
 
     def _settled(self) -> tuple[Outcome, str]:
         """Outcome and reason after the robot has been idle for the certificate's settling time."""
         for _ in range(round((self._row.certificate.settle or 0.0) / Loop.PERIOD)):
-            if self._advance(self.world.idle) != "success":
+            if self._advance(unfiltered(self.world.idle)) != "success":
                 break
         return self._episode.settled()
 
@@ -363,7 +375,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return bool(self.cameras) or self.render_mode is not None
 
     def _observe(self) -> Observation:
-        read = {name: _clipped(s.read(self.world), s.bound) for name, s in self.streams.items()}
+        read = {name: clipped(s.read(self.world), s.bound) for name, s in self.streams.items()}
         return {**read, **{name: self._picture(camera) for name, camera in self.observed.cameras.items()}}
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:
@@ -422,9 +434,15 @@ def _requested(
     )
 
 
-def _clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:
-    return reading.clip(-bound, bound).astype(np.float32)
+def clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:
+    """A reading, or several ones along the first axis, within the bounds of its stream."""
+    return np.minimum(np.maximum(reading, -bound), bound).astype(np.float32)  # a fifth of the time of `clip`
 
 
 for _name in task_files.tasks():
-    gymnasium.register(f"scengen/{_name}-v0", "scengen.envs.gym:PoolEnv", kwargs={"task": _name})
+    gymnasium.register(
+        f"scengen/{_name}-v0",
+        "scengen.envs.gym:PoolEnv",
+        vector_entry_point="scengen.envs.vector:PoolVectorEnv",
+        kwargs={"task": _name},
+    )

@@ -13,12 +13,14 @@ Folders = str | Path | Sequence[str | Path]
 """Folder of a pool, or several folders."""
 
 
-def rows_of(pool: Folders | None, task: str) -> Library:
-    """The scenarios of some pools.
+def rows_of(pool: Folders | Library | None, task: str) -> Library:
+    """The scenarios of some pools; those of a library, which has been checked, as they are.
 
     Raises:
         PoolError: no pool is given, or one is missing, damaged, empty, or of another version or task.
     """
+    if isinstance(pool, Library):
+        return pool
     folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
     if not folders:
         raise PoolError("no pool was given; give pool=FOLDER or a list of folders; scengen generate makes pools")

@@ -9,21 +9,17 @@ import os
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from rich.table import Table
 
 from .. import compose, task_files
 from ..certificate import CHECKS
-from ..control import native
 from ..control.loop import ACTION, Loop
 from ..envs.gym import PoolEnv
 from ..episode import Actions, Episode
@@ -39,11 +35,11 @@ from ..validate.playable import stored_world
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..validate.settings import QUICK
+from .timing import SLICE, Measure, Promise, Side, alternated, ratio, step_with
+from .vector_speed import vector_ratios
 
 PERIODS = 200
 """Number of control periods of the comparison with robosuite: two seconds."""
-SLICE = 10
-"""Number of control periods in a slice: 2 to 20 ms of work, below the time that an operating system gives a process."""
 MAX_SPREAD = 0.1
 """Largest spread of a measure, as a share of its median, of a quiet machine. Twice what an idle one shows."""
 MAX_LOAD = 0.5
@@ -56,39 +52,6 @@ NEGLIGIBLE_COST = 0.05
 """Processor time below which a check is left out of the cost of a certificate [s]."""
 CAMERA_PERIODS = 20
 """Number of control periods with a camera, which takes a hundred times as long without a graphics card."""
-
-
-@dataclass(frozen=True)
-class Promise:
-    """A promised limit of a measure."""
-
-    limit: float
-    side: str
-    """Side of the limit: `at most` or `at least`."""
-    what: str
-    """Description of the measure."""
-
-    def holds(self, value: float) -> bool:
-        """Whether a measured value satisfies the limit."""
-        return value <= self.limit if self.side == "at most" else value >= self.limit
-
-
-@dataclass(frozen=True)
-class Measure:
-    """Values of a measure in the repetitions of a run."""
-
-    values: tuple[float, ...]
-    """One value for each repetition."""
-
-    @property
-    def median(self) -> float:
-        """Median of the values."""
-        return statistics.median(self.values)
-
-    @property
-    def spread(self) -> float:
-        """Largest minus smallest value."""
-        return max(self.values) - min(self.values)
 
 
 PROMISES = {
@@ -107,6 +70,15 @@ PROMISES = {
     "scenario_to_first_step_ms": Promise(20.0, "at most", "from parameter values to the first physics step, warm (ms)"),
     "env_step_to_raw": Promise(
         1.4, "at most", "the Gymnasium environment's step, proprioception only / mj_step of the same states"
+    ),
+    "vector_to_raw": Promise(
+        1.15, "at most", "a step of 16 slots in one thread, proprioception only / mj_step of the same 16 simulations"
+    ),
+    "vector_two_threads": Promise(
+        1.7, "at least", "steps in a second of 16 slots in two threads / of one Gymnasium environment"
+    ),
+    "vector_to_async": Promise(
+        3.0, "at least", "steps in a second of 16 slots, one thread a core / of AsyncVectorEnv with 16 processes"
     ),
     "env_reset_ms": Promise(20.0, "at most", "the Gymnasium environment's reset of a loaded scenario (ms)"),
 }
@@ -128,6 +100,8 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
         "scenario_to_first_step_ms": scenario_to_first_step(repeats),
         **gym_costs(repeats),
     }
+    with _pool() as pool:
+        found |= vector_ratios(str(pool.folder), next(pool.rows()), repeats)
     ran, waited = (now - before for now, before in zip(_scheduled(), begin, strict=True))
     table = Table("measure", "median", "spread", "limit", "what", title="bench", title_justify="left")
     for name, measure in found.items():
@@ -201,37 +175,6 @@ def _certificate(task: Task) -> dict[str, float]:
     return {name: seconds for name, seconds in cost.items() if seconds >= NEGLIGIBLE_COST}
 
 
-Side = Callable[[], Iterator[None]]
-"""Starts one side of a comparison, which yields after each slice of its work."""
-
-
-def alternated(sides: Sequence[Side], repeats: int) -> list[tuple[float, ...]]:
-    """Processor time of each side in each repetition [s]. The sides work by turns, a slice each.
-
-    A first repetition, which compiles code and fills caches, does not count.
-    """
-    found = []
-    for _ in range(repeats + 1):
-        spent, running = [0.0] * len(sides), [side() for side in sides]
-        going = list(range(len(sides)))
-        while going:
-            for number in list(going):
-                start = time.thread_time()
-                if next(running[number], _END) is _END:
-                    going.remove(number)
-                spent[number] += time.thread_time() - start
-        found.append(tuple(spent))
-    return found[1:]
-
-
-_END = object()
-"""Sentinel that no side yields."""
-
-
-def _ratio(pairs: Iterable[tuple[float, ...]]) -> Measure:
-    return Measure(tuple(above / below for above, below in pairs))
-
-
 def rollout_to_raw(repeats: int) -> Measure:
     """Ratio of the time of an oracle rollout to that of the bare mj_step calls through the same states."""
     task = compose.load_task("domino_single")
@@ -248,7 +191,7 @@ def rollout_to_raw(repeats: int) -> Measure:
             if number % SLICE == SLICE - 1:
                 yield
 
-    return _ratio(alternated([rollout, _bare(bare, recorded)], repeats))
+    return ratio(alternated([rollout, _bare(bare, recorded)], repeats))
 
 
 def two_arms(repeats: int) -> dict[str, Measure]:
@@ -267,8 +210,8 @@ def two_arms(repeats: int) -> dict[str, Measure]:
 
     found = alternated([play(two, double), play(one, single), _bare(bare, double)], repeats)
     return {
-        "two_arms_to_raw": _ratio((pair, raw) for pair, _, raw in found),
-        "two_arms_to_one": _ratio((pair, lone) for pair, lone, _ in found),
+        "two_arms_to_raw": ratio((pair, raw) for pair, _, raw in found),
+        "two_arms_to_one": ratio((pair, lone) for pair, lone, _ in found),
     }
 
 
@@ -279,7 +222,7 @@ def gym_costs(repeats: int) -> dict[str, Measure]:
     env.reset()
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
     ratios = alternated([_steps_of(env, row.witness), _bare(stored_world(row), row.witness)], repeats)
-    return {"env_step_to_raw": _ratio(ratios), "env_reset_ms": Measure(tuple(resets))}
+    return {"env_step_to_raw": ratio(ratios), "env_reset_ms": Measure(tuple(resets))}
 
 
 def costs(repeats: int) -> dict[str, float]:
@@ -388,7 +331,7 @@ def _bare(world: World, actions: Actions) -> Side:
         world.reset()
         for start in range(0, len(controls), SLICE * substeps):
             part = controls[start : start + SLICE * substeps]
-            _step_with(world.model._address, world.data._address, world.data.ctrl, part)
+            step_with(world.model._address, world.data._address, world.data.ctrl, part)
             yield
 
     return raw
@@ -405,7 +348,7 @@ def robosuite_to_ours(repeats: int) -> Measure:
         loop.reset()
         return _sliced(loop.step, actions)
 
-    return _ratio(alternated([_steps_of(env, actions), ours], repeats))
+    return ratio(alternated([_steps_of(env, actions), ours], repeats))
 
 
 def _lift() -> Any:
@@ -448,11 +391,3 @@ def _seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
-
-
-@njit(nogil=True, cache=True)
-def _step_with(model: int, data: int, ctrl: NDArray[np.float64], controls: NDArray[np.float64]) -> None:
-    """Bare mj_step calls with recorded controls, without Python in between."""
-    for row in controls:
-        ctrl[:] = row
-        native.step(model, data)

@@ -3,9 +3,12 @@
 import time
 
 import pytest
+from helpers import REFERENCE
 
-from scengen.evaluate import speed
+from scengen.envs.vector import PoolVectorEnv
+from scengen.evaluate import speed, vector_speed
 from scengen.evaluate.speed import Measure, alternated, disturbance
+from scengen.pool import Pool
 
 
 def busy(seconds, slices, order, name):
@@ -53,6 +56,20 @@ def test_the_sliced_rollout_is_the_rollout_of_a_certificate(monkeypatch):
     monkeypatch.setattr(speed, "alternated", played)
     speed.rollout_to_raw(1)
     assert (ends[0] == ends[1]).all()
+
+
+def test_the_slots_and_the_bare_simulations_end_in_the_same_state(monkeypatch):
+    """Both sides do the work that they are said to do: the slots go through the states of the bare simulations."""
+    monkeypatch.setattr(vector_speed, "SLOTS", 2)
+    row = next(Pool.open(REFERENCE).rows())
+    envs = PoolVectorEnv(row.task, REFERENCE, 2, scenario=row.id)
+    actions = row.witness[:40]
+    bare = vector_speed._bare(row, actions)
+    for side in (vector_speed._stepping(envs, actions), bare):
+        assert sum(1 for _ in side()) == 40
+    cells = {name: cell.cell_contents for name, cell in zip(bare.__code__.co_freevars, bare.__closure__, strict=True)}
+    assert all((world.data.qpos == envs.envs[0].world.data.qpos).all() for world in cells["worlds"])
+    assert (envs.envs[0].world.data.qpos == envs.envs[1].world.data.qpos).all()
 
 
 def test_a_machine_that_was_not_quiet_is_told():

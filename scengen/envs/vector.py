@@ -1,0 +1,288 @@
+"""Many environments in one process: `gymnasium.make_vec("scengen/domino_single-v0", num_envs=16, pool="generated/id")`.
+
+Every slot has a simulation of its own. Threads step the slots: the compiled control loop releases Python's lock.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from ..control.teleop import unfiltered
+from ..errors import BadConfig, UnknownName
+from ..pool import PoolRow
+from ..work.machine import cores
+from .gym import INFOS, RESET_OPTIONS, PoolEnv, clipped
+from .observations import Reading
+from .pools import Folders
+
+MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+"""Modes in which a slot begins its next episode: in the step after the end, or at once."""
+MAX_SLOTS = 4096
+"""Largest number of slots."""
+MAX_TAKEN = 4
+"""Largest number of slots that a thread takes at a time."""
+
+Steps = tuple[dict[str, Reading], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+"""Observations, rewards, terminations, truncations and infos of all slots."""
+
+
+class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[Any]]):
+    """`num_envs` environments as `PoolEnv`, called slots, over the scenarios of one task.
+
+    Observations, rewards and infos have the slots along their first axis and are new arrays in every step. They have
+    the bits of single environments, with any number of threads.
+
+    Scenarios are handed out in the order of the pools: `reset(seed=s)` begins number s in the first slot, s + 1 in the
+    second, and so on. A slot whose episode ends gets the next one that no slot has had; among several slots the first
+    comes first. After the last scenario the first one follows.
+
+    With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and begins the next
+    one. With `AutoresetMode.SAME_STEP` the step that ends an episode returns the first observation of the next one;
+    `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one.
+    """
+
+    def __init__(
+        self,
+        task: str,
+        pool: Folders | None = None,
+        num_envs: int = 1,
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        **settings: Any,
+    ):
+        """Open the pools.
+
+        Args:
+            task: name of the task.
+            pool: folder of a pool, or several folders.
+            num_envs: number of slots.
+            threads: number of threads that step slots; None for the available cores.
+            autoreset_mode: `NEXT_STEP` or `SAME_STEP`.
+            settings: further arguments of `PoolEnv`, such as `observations` and `action_repeat`.
+
+        Raises:
+            ScengenError: a setting is not valid, or a pool as in `PoolEnv`.
+        """
+        self.num_envs, most = _count("num_envs", num_envs, MAX_SLOTS), cores() if threads is None else threads
+        self.threads = min(_count("threads", most, MAX_SLOTS), self.num_envs)
+        mode = _mode(autoreset_mode)
+        first = PoolEnv(task, pool, **settings)
+        shared = {**settings, "scenario": None, "split": None}
+        self.envs = [first, *(PoolEnv(task, first._rows, **shared) for _ in range(self.num_envs - 1))]
+        """Environments of the slots."""
+        self.metadata = {**first.metadata, "autoreset_mode": mode}
+        self.render_mode = first.render_mode
+        self.single_observation_space, self.single_action_space = first.observation_space, first.action_space
+        self.observation_space = batch_space(first.observation_space, self.num_envs)
+        self.action_space = batch_space(first.action_space, self.num_envs)
+        self._same_step = mode == AutoresetMode.SAME_STEP
+        self._rows, self._next = first._rows, 0
+        self._labels = False
+        self._over: NDArray[np.bool_] | None = None
+        self._readings = {name: np.zeros((self.num_envs, *s.shape)) for name, s in first.streams.items()}
+        self._reads = [[(s.read, self._readings[name]) for name, s in env.streams.items()] for env in self.envs]
+        size = (self.num_envs, first.observed.height, first.observed.width, 3)
+        self._pictures = {name: np.zeros(size, np.uint8) for name in first.cameras}
+        self._crew = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Reading], dict[str, Any]]:
+        """Begin an episode in every slot.
+
+        Args:
+            seed: number of the first slot's scenario, or the numbers for all slots; None for those that come next.
+            options: `scenario` names the scenario of all slots, or of each; `labels` adds to `info` which scenario
+                runs, in later episodes too.
+
+        Raises:
+            UnknownName: there is no such scenario or option.
+            BadConfig: several ids have this prefix, or there are not as many names or seeds as slots.
+        """
+        if unknown := set(options or {}) - set(RESET_OPTIONS):
+            raise UnknownName("reset option", unknown.pop(), RESET_OPTIONS)
+        self._labels = bool((options or {}).get("labels"))
+        numbers = self._numbers(seed, (options or {}).get("scenario"))
+        infos = self._begin({slot: self._rows[number] for slot, number in enumerate(numbers)})
+        self._over = np.zeros(self.num_envs, np.bool_)
+        return self._observed(), self._gathered(infos)
+
+    def step(self, actions: ArrayLike) -> Steps:
+        """Take a step in every slot.
+
+        Args:
+            actions: shape (num_envs, size of an action).
+
+        Raises:
+            ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
+        """
+        given = self._checked(actions)
+        if self._over is None:
+            raise BadConfig("no scenario is running; call reset first")
+        fresh = {} if self._same_step else self._handed_out(self._over)
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
+        infos: dict[int, dict[str, Any]] = {}
+
+        def play(slot: int) -> None:
+            rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._play(given[slot])
+
+        self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh])
+        infos |= self._begin(fresh)
+        self._over = terminated | truncated
+        seen, final = self._observed(), dict[int, dict[str, Any]]()
+        if self._same_step and self._over.any():
+            for slot in np.flatnonzero(self._over).tolist():
+                told = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
+                final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": told}
+            infos |= self._begin(self._handed_out(self._over))
+            seen = self._observed()
+        return seen, rewards, terminated, truncated, self._gathered(infos, final)
+
+    def render(self) -> tuple[Reading | None, ...] | None:  # type: ignore[override]
+        """A picture of every slot as `PoolEnv.render`, or None without a render mode."""
+        return None if self.render_mode is None else tuple(env.render() for env in self.envs)
+
+    def close_extras(self, **_: Any) -> None:
+        """Stop the threads and free the renderers."""
+        if self._crew:
+            self._crew.shutdown()
+        for env in self.envs:
+            env.close()
+
+    def call(self, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
+        """An attribute of every slot's environment, or what its method of that name returns."""
+        found = (getattr(env, name) for env in self.envs)
+        return tuple(each(*arguments, **named) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every slot's environment."""
+        return tuple(getattr(env, name) for env in self.envs)
+
+    # --- scenarios ------------------------------------------------------------------------
+
+    def _numbers(self, seed: int | Sequence[int | None] | None, named: Any) -> list[int]:
+        """Numbers of the scenarios with which the slots begin."""
+        count = self.num_envs
+        if named is not None:
+            names = [named] * count if isinstance(named, str) else list(named)
+            if len(names) != count:
+                raise BadConfig(f"{len(names)} scenarios for {count} slots; give one name, or one for each slot")
+            numbers = [self._rows.find(str(name)) for name in names]
+        elif seed is not None:
+            seeds = [int(seed) + slot for slot in range(count)] if isinstance(seed, (int, np.integer)) else list(seed)
+            if len(seeds) != count:
+                raise BadConfig(f"{len(seeds)} seeds for {count} slots; give one number, or one for each slot")
+            numbers = [self._following() if each is None else int(each) % len(self._rows) for each in seeds]
+        else:
+            numbers = [self._following() for _ in range(count)]
+        self._next = (numbers[-1] + 1) % len(self._rows)
+        return numbers
+
+    def _following(self) -> int:
+        """Number of the scenario that comes next."""
+        number, self._next = self._next, (self._next + 1) % len(self._rows)
+        return number
+
+    def _handed_out(self, over: NDArray[np.bool_]) -> dict[int, PoolRow]:
+        """The next scenarios for the slots whose episodes are over."""
+        return {slot: self._rows[self._following()] for slot in np.flatnonzero(over).tolist()}
+
+    def _begin(self, rows: Mapping[int, PoolRow]) -> dict[int, dict[str, Any]]:
+        """Begin episodes in some slots, and return their infos."""
+        infos: dict[int, dict[str, Any]] = {}
+
+        def load(slot: int) -> None:
+            env = self.envs[slot]
+            env._load(rows[slot])
+            infos[slot] = {**env._info("", False), **(env._labels() if self._labels else {})}
+
+        self._each(load, list(rows))
+        return infos
+
+    # --- work of the threads --------------------------------------------------------------
+
+    def _each(self, work: Callable[[int], None], slots: Sequence[int]) -> None:
+        """Do some work for each of some slots and read its observation, in all threads.
+
+        A thread takes a few slots at a time and reads them together: the interpreter's code stays in the cache, which
+        the simulation of each slot empties. An error is raised when all threads have stopped.
+        """
+        size = max(1, min(MAX_TAKEN, len(slots) // self.threads))
+        queue = iter([slots[start : start + size] for start in range(0, len(slots), size)])  # threads may share it
+
+        def drain() -> None:
+            for some in queue:
+                for slot in some:
+                    work(slot)
+                for slot in some:
+                    self._read(slot)
+
+        others = [self._crew.submit(drain) for _ in range(min(self.threads, len(slots)) - 1)] if self._crew else []
+        try:
+            drain()
+        finally:
+            errors = [other.exception() for other in others]
+        for error in errors:
+            if error is not None:
+                raise error
+
+    def _read(self, slot: int) -> None:
+        """Read the observation of a slot."""
+        env = self.envs[slot]
+        world = env.world
+        for read, readings in self._reads[slot]:
+            readings[slot] = read(world)
+        for name, camera in env.observed.cameras.items():
+            self._pictures[name][slot] = env._picture(camera)
+
+    def _observed(self) -> dict[str, Reading]:
+        """The observations that were read last, as new arrays."""
+        streams = self.envs[0].streams
+        found: dict[str, Reading] = {
+            name: clipped(value, streams[name].bound) for name, value in self._readings.items()
+        }
+        return {**found, **{name: value.copy() for name, value in self._pictures.items()}}
+
+    def _gathered(
+        self, infos: Mapping[int, Mapping[str, Any]], final: Mapping[int, Mapping[str, Any]] | None = None
+    ) -> dict[str, Any]:
+        """The infos of the slots in arrays, as Gymnasium's vector environments give them."""
+        found: dict[str, Any] = {}
+        for slot in sorted(final or {}):
+            found = self._add_info(found, {**final[slot]}, slot)  # type: ignore[index]
+        for name, kind in INFOS.items():  # `_add_info` would take a tenth of the time of a step
+            found[name] = np.array([infos[slot][name] for slot in range(self.num_envs)], kind)
+            found[f"_{name}"] = np.ones(self.num_envs, np.bool_)
+        for slot in sorted(infos) if self._labels else ():
+            labels = {name: value for name, value in infos[slot].items() if name not in INFOS}
+            found = self._add_info(found, labels, slot)
+        return found
+
+    def _checked(self, actions: ArrayLike) -> NDArray[np.float32]:
+        """The actions as an array of the action space's shape."""
+        given = np.asarray(actions, np.float32)
+        if given.shape != self.action_space.shape:
+            raise ValueError(f"actions have the shape {self.action_space.shape}, not {given.shape}")
+        if not np.isfinite(given).all():
+            slot = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
+            raise ValueError(f"actions must be finite; that of slot {slot} is {np.array2string(given[slot])}")
+        return given if self.envs[0].action_filter else unfiltered(given)
+
+
+def _count(name: str, given: Any, most: int) -> int:
+    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or not 1 <= given <= most:
+        raise BadConfig(f"{name} = {given!r}; it must be a whole number in [1, {most}]")
+    return int(given)
+
+
+def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    for mode in MODES:
+        if given in (mode, mode.value, mode.name):
+            return mode
+    raise UnknownName("autoreset_mode", str(getattr(given, "value", given)), [mode.value for mode in MODES])
