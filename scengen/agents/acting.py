@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..assets.prop import TABLE_TOP
+from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..control.loop import Loop
 from ..envs.gym import Observation, PoolEnv
 from ..envs.object_state import xyzw
@@ -72,6 +72,7 @@ class Episode:
             robot=robot(self.exam.row.embodiment),
             controller=controller(self.exam.row.embodiment),
             table=TABLE_TOP,
+            half=TABLE_HALF,
             time=f"{self.env.world.time:.1f} s",
             reading=told(self.observation),
             poses=self.poses(),

@@ -78,20 +78,13 @@ def take_handle(arm: Arm, hook: Hook, body: str, stretch: float) -> Plan:
 
 
 Leg = tuple[float, float, float]
-"""Target of `slide`: bearing, inside, beside."""
-
-
-def pull(arm: Arm, hook: Hook, body: str, cube: str, half: float, to: float, mirror: float = 1.0) -> Plan:
-    """Pass the held hook by a cube on the side away from its tip, put the tip behind the cube, and pull.
-
-    See `pull_legs` for the arguments.
-    """
-    for leg in pull_legs(arm, hook, cube, half, to, mirror):
-        yield from slide(arm, hook, body, *leg)
+"""Arguments of `slide`: bearing [rad], inside [m], beside [m]."""
 
 
 def pull_legs(arm: Arm, hook: Hook, cube: str, half: float, to: float, mirror: float = 1.0) -> list[Leg]:
-    """The four legs of a pull: before the cube, past it, the tip behind it, and back with the cube.
+    """Legs by which a held hook passes a cube on the side away from its tip, comes behind it, and pulls.
+
+    The first three end before the cube, beyond it, and with the tip behind it; the last one draws it in.
 
     Args:
         arm: the arm.

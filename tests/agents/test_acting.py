@@ -44,8 +44,16 @@ def test_a_list_written_by_hand_from_the_poses_topples_every_chain(tmp_path, mon
     assert sum(result["grades"]["right"] for result in found) >= 3, [r["grades"]["reason"] for r in found]
 
 
-@pytest.mark.parametrize(("model", "pool"), [(by_hand.Block, "mirror_id"), (by_hand.Carry, "ycb_id")])
-def test_lists_written_by_hand_lift_the_block_and_follow_the_square(tmp_path, monkeypatch, model, pool):
+@pytest.mark.parametrize(
+    ("model", "pool"),
+    [
+        (by_hand.Block, "mirror_id"),
+        (by_hand.Carry, "ycb_id"),
+        (by_hand.Chains, "select_id"),
+        (by_hand.Lip, "edge_id"),
+    ],
+)
+def test_lists_written_by_hand_solve_tasks_from_the_poses_alone(tmp_path, monkeypatch, model, pool):
     (result,) = played(tmp_path, monkeypatch, model(), pool=BASE / pool)
     assert result["grades"]["right"], result["grades"]
 
