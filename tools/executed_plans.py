@@ -4,7 +4,7 @@
 
 The plan of conf/facts/<task>.yaml is played in n feasible training scenarios, with and without its optional sub-goals.
 Wrong plans are played in the first ones: with a required sub-goal missing, with two neighbours that have an order
-exchanged, and with a wrong sub-goal after the first k ones in place of the rest. The last kind counts if the wrong
+exchanged, and with a wrong sub-goal in place of all or in place of the second half. The last kind counts if the wrong
 sub-goal was begun, because nothing is wrong where the goal is reached before it. Results are lines of
 records/executed_plans.jsonl; a repeated call plays only what the file lacks under today's code.
 """
@@ -44,7 +44,7 @@ def plans(order: Order, n: int, wrong: int) -> Iterator[tuple[str, tuple[str, ..
         yield MISSING, (*right[:k], *right[k + 1 :]), wrong
         if k and (right[k - 1], left_out) in order.before:
             yield ORDER, (*right[: k - 1], left_out, right[k - 1], *right[k + 1 :]), wrong
-    for k in range(len(right)):
+    for k in (0, len(right) // 2):
         for name in order.wrong:
             yield WRONG, (*right[:k], name), min(wrong, 1)
 

@@ -138,7 +138,7 @@ class Lip:
         yaw = 2 * math.atan2(quat[2], quat[3])
         half = (abs(math.sin(yaw)) * long + abs(math.cos(yaw)) * wide) / 2
         behind, low = y - side * (half + 0.03), z + 0.011
-        edge = -float(re.search(r"reaches from (-[\d.]+)\s", text)[1])
+        edge = -float(re.search(r"reaches from\s(-[\d.]+)\s", text)[1])
         left = edge + 0.06 - half - abs(y)  # from where the plate is to where it sticks out by 6 cm
 
         def slide(speed):
