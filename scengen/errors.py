@@ -90,6 +90,7 @@ MAX_SETTINGS = {
     "comparisons": 1_000_000,
     "epochs": 1_000_000,
     "films": 100_000,
+    "explore": 100,
     "first": 1_000_000_000,
     "fps": 100,  # control periods in a second
     "frames": 200,  # a strip of them is a picture of some 100 000 pixels' width

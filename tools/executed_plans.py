@@ -78,12 +78,14 @@ def main(*arguments: str) -> None:
                     found = execution.execute(names, order, scenario, world_of(scenario, task.embodiment), task.horizon)
                     assert found
                     record = {"digest": digest, "task": name, "scenario": index, "kind": kind, "plan": " ".join(names)}
-                    known[digest] = {
-                        **record,
+                    began = sum(end != execution.NOT_BEGUN for _, end in found.steps)
+                    result = {
                         "success": found.success,
                         "reason": found.reason,
                         "seconds": found.seconds,
+                        "began": began,
                     }
+                    known[digest] = {**record, **result}
                     with RECORDS.open("a") as file:
                         file.write(json.dumps(known[digest]) + "\n")
                     if found.success != (kind in (RIGHT, OPTIONAL)):

@@ -2,6 +2,7 @@
 
 import re
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,6 +47,8 @@ class Episode:
     exam: Exam
     mode: str
     """One of `MODES`."""
+    trials: "Trials"
+    """Free trials so far."""
     observation: Observation
     """Last observation."""
     memory: deque[str] = field(default_factory=lambda: deque(maxlen=HISTORY))
@@ -57,6 +60,10 @@ class Episode:
     over: str = ""
     """Reason of the end; empty while it is open."""
     success: bool = False
+    refused: int = 0
+    """Number of calls that were refused."""
+    steps: list[str] = field(default_factory=list)
+    """Every primitive, and why it stopped."""
 
     def look(self) -> None:
         """Add the present pictures to the history."""
@@ -78,6 +85,7 @@ class Episode:
             poses=self.poses(),
             frames=list(frames),
             memory=list(self.memory),
+            trials=self.trials,
             left=left,
             fault=fault,
         )
@@ -102,6 +110,17 @@ class Episode:
             number = f" {counts[name]}" if counts[name] > 1 else ""
             found.append(f"{name}{number}: position {told_[0]}, quaternion xyzw {told_[1]}, size {told_[2]}")
         return found
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What became of it, as plain data."""
+        return {
+            "right": self.success,
+            "reason": self.neutral(self.over),
+            "steps": self.steps,
+            "refused": self.refused,
+            "seconds": round(self.ticks * Loop.PERIOD, 2),
+        }
 
     def neutral(self, text: str) -> str:
         """A text with neutral names in place of those of bodies."""
@@ -131,32 +150,56 @@ class Episode:
         return f"{self.neutral(why)}, after {(self.ticks - before) * Loop.PERIOD:.2f} s, hand at ({at})"
 
 
-def act(exam: Exam, calls: Calls, env: PoolEnv, mode: str) -> Result:
-    """Let a model act in one scenario, from its start to the end of the episode."""
-    observation, _ = env.reset(options={"scenario": exam.row.id})
-    episode = Episode(env, exam, mode, observation)
+def act(exam: Exam, calls: Calls, env: PoolEnv, mode: str, twins: Sequence[str] = ()) -> Result:
+    """Let a model act in one scenario, from its start to the end of the episode.
+
+    Args:
+        exam: the scenario.
+        calls: journal of the calls.
+        env: environment of the task.
+        mode: one of `MODES`.
+        twins: ids of training scenarios in which the model may try first; it remembers these trials, and they do not
+            count.
+    """
+    trials = Trials(len(twins))
+    for twin in twins:
+        about = {**exam.about, "trial": len(trials.told) + 1}
+        trials.told.append(_play(Episode(env, exam, mode, trials, _start(env, twin)), about, calls).told)
+    episode = _play(Episode(env, exam, mode, trials, _start(env, exam.row.id)), exam.about, calls)
+    explored = {"explored": trials.told} if twins else {}
+    return Result(exam.about, ACT, len(episode.steps), "", {**episode.told, **explored})
+
+
+@dataclass
+class Trials:
+    """Free trials before the one that counts."""
+
+    total: int
+    """Number of free trials."""
+    told: list[dict[str, Any]] = field(default_factory=list)
+    """What became of those that are over, see `Episode.told`."""
+
+
+def _start(env: PoolEnv, scenario: str) -> Observation:
+    observation, _ = env.reset(options={"scenario": scenario})
+    return observation
+
+
+def _play(episode: Episode, about: Mapping[str, Any], calls: Calls) -> Episode:
+    """Ask and act until the episode is over."""
     episode.look()
-    refused = 0
-    steps: list[str] = []
-    while not episode.over and len(steps) < MAX_STEPS:
-        about = {**exam.about, "stage": ACT, "mode": mode, "attempt": len(steps) + 1}
-        chosen, faults = _choose(episode, about, calls, MAX_STEPS - len(steps))
-        refused += faults
+    while not episode.over and len(episode.steps) < MAX_STEPS:
+        asked = {**about, "stage": ACT, "mode": episode.mode, "attempt": len(episode.steps) + 1}
+        chosen, faults = _choose(episode, asked, calls, MAX_STEPS - len(episode.steps))
+        episode.refused += faults
         if chosen.name == DONE:
             episode.over = "the model says that it is done"
-            steps.append(chosen.told)
+            episode.steps.append(chosen.told)
             break
-        why = episode.carry_out(chosen)
-        steps.append(f"{chosen.told}: {why}")
-        episode.memory.append(f"{len(steps)}. {steps[-1]}")
-    grades = {
-        "right": episode.success,
-        "reason": episode.over or f"{MAX_STEPS} primitives are used up",
-        "steps": steps,
-        "refused": refused,
-        "seconds": round(episode.ticks * Loop.PERIOD, 2),
-    }
-    return Result(exam.about, ACT, len(steps), "", grades)
+        episode.steps.append(f"{chosen.told}: {episode.carry_out(chosen)}")
+        episode.memory.append(f"{len(episode.steps)}. {episode.steps[-1]}")
+    episode.over = episode.over or f"{MAX_STEPS} primitives are used up"
+    return episode
 
 
 def _choose(episode: Episode, about: dict[str, Any], calls: Calls, left: int) -> tuple[Primitive, int]:

@@ -58,6 +58,7 @@ class AgentSettings:
     spacing: float = 0.5
     budget: Budget = Budget()
     mode: str = SEE
+    explore: int = 0
     execute: bool = True
     dry: bool = False
 
@@ -74,9 +75,11 @@ class AgentSettings:
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
-        at_least(self, seeds=1, width=16)
+        at_least(self, seeds=1, width=16, explore=0)
         if self.stage not in STAGES:
             raise BadConfig(f"stage = {self.stage}; it must be 1 (understand), 2 (plan) or 3 (act)")
+        if self.explore and self.stage != ACT:
+            raise BadConfig(f"explore = {self.explore}; free trials belong to stage=3, and stage = {self.stage}")
         if self.mode not in MODES:
             raise UnknownName("mode", self.mode, MODES)
         if not self.temperatures or not all(0.0 <= t <= 2.0 for t in self.temperatures):
@@ -184,7 +187,7 @@ def run(
         results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
         try:
             for work, exam, env in exams(settings, todo, ask, search):
-                found = _stages(settings, exam, calls, env)
+                found = _stages(settings, exam, calls, env, twins(settings, todo, work))
                 if settings.stage == PLAN and executions:
                     found[-1] = _executed(work, exam, found[-1], executions)
                 results += [{**_labels(work), **each.plain()} for each in found]
@@ -197,10 +200,28 @@ def run(
         return Outcome(results, calls.new, calls.tokens, priors, stopped)
 
 
-def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv) -> list[Result]:
+def twins(settings: AgentSettings, todo: Sequence[Work], work: Work) -> list[str]:
+    """Ids of the training scenarios in which a model may try before the trial that counts: first the twin of the same
+    index, then those of the next indices.
+
+    Raises:
+        BadConfig: the pools hold too few.
+    """
+    row = work.row
+    others = [one.row for one in todo if (one.task.name, one.row.split) == (row.task, ID) and one.row.id != row.id]
+    others.sort(key=lambda other: (other.seed != row.seed, other.index < row.index, other.index))
+    if len(others) < settings.explore:
+        raise BadConfig(
+            f"explore = {settings.explore} needs as many other training scenarios of {row.task}, and the pools give "
+            f"{len(others)}; add a pool of split id, or more seeds="
+        )
+    return [other.id for other in others[: settings.explore]]
+
+
+def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv, trials: Sequence[str]) -> list[Result]:
     """Results of the stage, and of stage 1 before stage 2."""
     if settings.stage == ACT:
-        return [act(exam, calls, env, settings.mode)]
+        return [act(exam, calls, env, settings.mode, trials)]
     artefact, first = understand(exam, calls)
     return [first] if settings.stage == UNDERSTAND else [first, make_plan(exam, artefact, calls)]
 

@@ -124,7 +124,7 @@ def _dry(settings: AgentSettings, search: Sequence[str]) -> int:
         for number, picture in enumerate(picture for turn in turns for picture in turn.pictures):
             write(settings.folder / "prompts" / f"{name}-{number}.jpg", picture)
         count, tokens = count + 1, (tokens[0] + asked, tokens[1] + answered)
-    per = {1: 1, 2: 3, 3: 24}[settings.stage]
+    per = {1: 1, 2: 3, 3: 24 * (1 + settings.explore)}[settings.stage]
     say(f"{count} prompts in {settings.folder / 'prompts'}; nothing was asked")
     total = f"{per * tokens[0]} tokens of prompts, {per * tokens[1]} of answers"
     say(f"estimate without repeated attempts: {count * per} calls, {total}")

@@ -14,15 +14,16 @@ from scengen.agents.models import Call, Reply
 from scengen.agents.primitives import BadCall, primitive, tools
 from scengen.agents.runner import AgentSettings, run
 from scengen.envs.gym import PoolEnv
+from scengen.errors import BadConfig
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 """Stored pools of the checker, with one scenario each."""
 
 
-def played(folder, monkeypatch, model, seeds=1, mode="poses", pool=REFERENCE):
+def played(folder, monkeypatch, model, seeds=1, mode="poses", pool=REFERENCE, **changes):
     monkeypatch.setattr(runner, "made", lambda name: model)
     settings = AgentSettings(
-        model="my:model", pool=str(pool), stage=3, seeds=seeds, pictures=False, mode=mode, to=str(folder)
+        model="my:model", pool=str(pool), stage=3, seeds=seeds, pictures=False, mode=mode, to=str(folder), **changes
     )
     return run(settings, lambda *_: None).results
 
@@ -75,6 +76,40 @@ def test_the_memory_says_why_a_primitive_stopped_with_neutral_names(tmp_path, mo
     last = model.prompts[-1]
     assert "Descend(z=0.7): the hand stayed" in last and "touching" in last and "CloseGripper(): finished" in last
     assert "tile_" not in last and "slab" not in last.replace("red slab", "")
+
+
+def test_free_trials_on_training_twins_are_remembered_and_do_not_count(tmp_path, monkeypatch):
+    model = Scripted(
+        ("CloseGripper", {}), ("Done", {"reason": "1"}), ("Lift", {"dz": 0.05}), ("Done", {"reason": "2"}),
+        ("Done", {"reason": "3"}),
+    )  # fmt: skip
+    results = played(tmp_path, monkeypatch, model, seeds=3, explore=2)
+    first, *_ = results
+    assert [len(trial["steps"]) for trial in first["grades"]["explored"]] == [2, 2]
+    assert first["grades"]["steps"] == ['Done(reason="3")'] and not first["grades"]["right"]
+    start, _, second, _, counted, *_ = model.prompts
+    assert "free trial 1 of 2" in start and "CloseGripper" not in start.partition("TRIALS")[2].partition("OBSERV")[0]
+    assert "free trial 2 of 2" in second and "1. CloseGripper(): finished" in second
+    assert "This one counts" in counted and "Lift(dz=0.05)" in counted and "the model says that it is done" in counted
+    assert not [result for result in results if result["scenario"] in counted]
+
+
+def test_free_trials_without_enough_training_scenarios_are_one_line(tmp_path, monkeypatch):
+    with pytest.raises(BadConfig, match="explore = 3 needs as many other training scenarios of domino_single, and the"):
+        played(tmp_path, monkeypatch, Scripted(), seeds=3, explore=3)
+    with pytest.raises(BadConfig, match="belong to stage=3"):
+        AgentSettings(model="facts", stage=2, explore=1).check()
+
+
+def test_the_first_trial_is_in_the_twin_of_the_same_index(monkeypatch):
+    def work(split, index, seed=0):
+        row = SimpleNamespace(task="t", split=split, index=index, seed=seed, id=f"{split}{seed}{index}")
+        return SimpleNamespace(task=SimpleNamespace(name="t"), row=row)
+
+    todo = [work("id", k, seed) for k in range(4) for seed in (1, 0)]
+    settings = AgentSettings(stage=3, explore=4)
+    assert runner.twins(settings, todo, work("far", 2)) == ["id02", "id03", "id00", "id01"]
+    assert runner.twins(settings, todo, work("id", 2)) == ["id03", "id00", "id01", "id12"]
 
 
 def test_poses_are_told_only_in_their_modes(tmp_path, monkeypatch):
