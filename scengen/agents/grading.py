@@ -1,5 +1,6 @@
 """Grades of stage 1 and stage 2, by code alone."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -80,26 +81,52 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
     """
     names = [step.subgoal for step in plan.steps]
     errors: list[tuple[PlanError, str]] = []
-    known = {*map(str.lower, objects), *ALWAYS}
-    for name in (name for step in plan.steps for name in step.objects if _plain(name) not in known):
+    told = " ".join([*objects, *order.vocabulary.values()]).lower()
+    for name in (name for step in plan.steps for name in step.objects if not _exists(name, told)):
         errors.append(("hallucinated object", name))
     for name in (name for name in names if name in order.wrong):
         errors.append(("affordance", name))
     for name in (name for name in order.required if name not in names):
         errors.append(("missing", name))
     for position, name in enumerate(names):
-        again = name in names[:position] and not (name in order.subgoals and order.subgoals[name].repeats)
+        again = name in names[:position] and not (name in order.subgoals and order.subgoals[name].again)
         if name == OTHER or (again and name not in order.wrong):
             errors.append(("additional", plan.steps[position].outcome if name == OTHER else name))
-    for one, other in sorted(order.before):
-        if one in names and other in names and names.index(other) < names.index(one):
-            errors.append(("wrong order", f"{other} before {one}"))
+    errors += [("wrong order", f"{one} before {other}") for one, other in _misplaced(names, order)]
     return PlanGrade(tuple(errors), _conditions(plan, order), order.sensing)
 
 
-def _plain(name: str) -> str:
-    """A name of an object without its article, in small letters."""
-    return name.strip().lower().removeprefix("the ")
+def _exists(name: str, told: str) -> bool:
+    """Whether an object is in every scene, or named in a text: those of the sheet, in small letters."""
+    plain = name.strip().lower().removeprefix("the ")
+    return plain in ALWAYS or (bool(plain) and re.search(rf"\b{re.escape(plain)}\b", told) is not None)
+
+
+def _misplaced(names: Sequence[str], order: Order) -> list[tuple[str, str]]:
+    """Pairs of sub-goals of a plan, of which the first one comes before the second one and must not.
+
+    The plan is gone through with the conditions that its steps give. A look that comes too early tells nothing; it is
+    an error only if the plan does not look again in time. What may be repeated may not follow what ends it.
+    """
+    givers = {c: name for name, subgoal in order.subgoals.items() if name in names for c in subgoal.gives}
+    found, given, early = dict[tuple[str, str], None](), set[str](), dict[str, str]()
+    for name in (name for name in names if name in order.subgoals):
+        subgoal = order.subgoals[name]
+        lacking = [givers[c] for c in subgoal.needs if c in givers and c not in given]
+        if lacking and subgoal.senses:
+            early[name] = lacking[0]
+            continue
+        for giver in lacking:
+            found[(giver, early[giver]) if giver in early else (name, giver)] = None
+        given.update(subgoal.gives)
+        early.pop(name, None)
+    found |= dict.fromkeys((name, giver) for name, giver in early.items() if name in order.required)
+    for one, other in order.before:
+        round_, end = order.subgoals[one], order.subgoals[other]
+        if one in names and other in names and round_.repeats and not (round_.senses or end.again):
+            if len(names) - 1 - names[::-1].index(one) > names.index(other) and (other, one) not in found:
+                found[other, one] = None
+    return sorted(found)
 
 
 def _conditions(plan: Planned, order: Order) -> float:

@@ -24,6 +24,11 @@ class Subgoal:
     repeats: bool = False
     """Whether a right plan may have it several times, as a trial and a look at its result."""
 
+    @property
+    def again(self) -> bool:
+        """Whether a right plan may have it several times: to look twice is never wrong."""
+        return self.repeats or self.senses
+
 
 @dataclass(frozen=True)
 class Order:

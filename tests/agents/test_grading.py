@@ -1,91 +1,56 @@
 """Plans written by hand are graded as a person grades them: right orders pass, and each kind of error is named."""
 
+from typing import get_args
+
 import pytest
+from plans_by_hand import ALL_RIGHT, ALL_WRONG, RIGHT, WRONG
 from sheets import STATED
 
 from scengen import load_task
 from scengen.agents import facts
-from scengen.agents.grading import grade_plan, grade_understanding
-from scengen.agents.replies import Audit, Claim, Planned, Step, Understanding, Unknown, Why
+from scengen.agents.grading import PlanError, grade_plan, grade_understanding
+from scengen.agents.replies import OTHER, Audit, Claim, Planned, Step, Understanding, Unknown, Why
 
-RIGHT = {
-    "domino_single": [
-        "reach_behind tip_first chain_falls",
-        "close_jaw reach_behind tip_first step_back chain_falls",
-        "reach_behind close_jaw tip_first chain_falls step_back",
-    ],
-    "edge_slide": [
-        "reach_inner_side slide_out reach_lip pinch lift",
-        "reach_inner_side slide_out leave_plate reach_lip pinch lift",
-    ],
-    "mass_sort": [
-        "weigh_left weigh_middle weigh_right place_lightest place_middle place_heaviest",
-        "weigh_right weigh_left weigh_middle place_heaviest place_lightest place_middle",
-        "weigh_middle weigh_right weigh_left place_middle place_heaviest place_lightest",
-    ],
-    "mirror_pick_place": ["find_frame go_above come_down grasp lift"],
-    "seesaw_balance": [
-        "take_weight put_on_arm look correct level",
-        "take_weight put_on_arm look correct look correct look level",
-    ],
-}
-"""Right plans by task."""
-WRONG = {
-    "domino_single": {
-        "tip_first chain_falls": "missing",
-        "tip_first reach_behind chain_falls": "wrong order",
-        "reach_behind tip_first tip_first chain_falls": "additional",
-        "reach_behind tip_first chain_falls push_slab": "affordance",
-        "push_slab": "affordance",
-    },
-    "edge_slide": {
-        "reach_lip pinch lift": "missing",
-        "close_from_above lift": "affordance",
-        "reach_inner_side slide_out pinch reach_lip lift": "wrong order",
-        "reach_inner_side slide_out reach_lip pinch lift other": "additional",
-    },
-    "mass_sort": {
-        "weigh_left weigh_middle place_lightest place_middle place_heaviest": "missing",
-        "weigh_left weigh_middle place_lightest weigh_right place_middle place_heaviest": "wrong order",
-        "place_lightest place_middle place_heaviest": "missing",
-    },
-    "mirror_pick_place": {
-        "go_above come_down grasp lift": "missing",
-        "find_frame go_where_shown come_down grasp lift": "affordance",
-        "go_above find_frame come_down grasp lift": "wrong order",
-    },
-    "seesaw_balance": {
-        "take_weight put_on_arm level": "missing",
-        "take_weight put_on_arm correct look level": "wrong order",
-        "take_weight put_on_arm look correct level hold_level": "affordance",
-    },
-}
-"""Wrong plans by task, and the kind of error that a person sees first."""
+MAX_REFUSED = 0.03
+"""Largest share of plans that are right in a person's eyes and may be refused."""
 
 
-def planned(names, objects=()):
-    steps = [Step(name, "something else" if name == "other" else name, list(objects), [], [], "x") for name in names]
-    return Planned(Why("x", "so"), steps, Audit(True, True, True))
+def graded(task, steps):
+    sheet = facts.load(load_task(task))
+    assert {name for name, _ in steps} <= {*sheet.plan.vocabulary, OTHER}
+    told = [Step(name, "something else" if name == OTHER else name, objects, [], [], "x") for name, objects in steps]
+    return grade_plan(Planned(Why("x", "so"), told, Audit(True, True, True)), sheet.plan, sheet.objects)
 
 
 def grade(task, text, objects=()):
-    sheet = facts.load(load_task(task))
-    return grade_plan(planned(text.split(), objects), sheet.plan, sheet.objects)
+    return graded(task, [(name, list(objects)) for name in text.split()])
 
 
-@pytest.mark.parametrize(("task", "text"), [(task, text) for task, texts in RIGHT.items() for text in texts])
-def test_every_right_order_passes(task, text):
-    found = grade(task, text)
-    assert found.right, found.errors
-    assert all(found.audits.values())
+def test_plans_written_by_hand_are_at_least_120_for_12_tasks():
+    assert len(RIGHT) == len(WRONG) == 12 and len(ALL_RIGHT) + len(ALL_WRONG) >= 120
+    assert {kind for kinds in WRONG.values() for kind in kinds} == set(get_args(PlanError))
 
 
-@pytest.mark.parametrize(
-    ("task", "text", "kind"), [(task, text, kind) for task, texts in WRONG.items() for text, kind in texts.items()]
-)
-def test_each_wrong_plan_is_refused_with_its_kind_of_error(task, text, kind):
-    found = grade(task, text)
-    assert not found.right and kind in {each for each, _ in found.errors}
+def test_plans_that_are_right_in_a_persons_eyes_pass():
+    refused = [(task, steps) for task, steps in ALL_RIGHT if not graded(task, steps).right]
+    assert len(refused) <= MAX_REFUSED * len(ALL_RIGHT), refused
+
+
+@pytest.mark.parametrize(("task", "steps", "kind"), ALL_WRONG)
+def test_no_wrong_plan_passes_and_its_kind_of_error_is_named(task, steps, kind):
+    found = graded(task, steps)
+    assert not found.right and kind in {each for each, _ in found.errors}, found.errors
+
+
+@pytest.mark.parametrize(("task", "steps"), ALL_RIGHT)
+def test_a_right_plan_has_all_audits(task, steps):
+    assert all(graded(task, steps).audits.values())
+
+
+def test_a_look_too_early_is_no_error_if_the_plan_looks_again_in_time():
+    assert grade("seesaw_balance", "look take_weight put_on_arm look correct level").right
+    found = grade("seesaw_balance", "look take_weight put_on_arm correct look level")
+    assert ("wrong order", "look before put_on_arm") in found.errors and not found.audits["F3 no dropped probing step"]
 
 
 @pytest.mark.parametrize("task", STATED)
