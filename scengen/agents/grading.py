@@ -92,7 +92,8 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
         again = name in names[:position] and not (name in order.subgoals and order.subgoals[name].again)
         if name == OTHER or (again and name not in order.wrong):
             errors.append(("additional", plan.steps[position].outcome if name == OTHER else name))
-    errors += [("wrong order", f"{one} before {other}") for one, other in _misplaced(names, order)]
+    for one, other in _misplaced(names, order):
+        errors.append(("wrong order", f"{one} before {other}"))
     return PlanGrade(tuple(errors), _conditions(plan, order), order.sensing)
 
 
