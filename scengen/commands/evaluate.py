@@ -1,34 +1,68 @@
-"""measure the success rate of a policy, in and out of distribution, with intervals"""
+"""measure the success rate of policies, in and out of distribution, with intervals"""
 
 from rich.table import Table
 
-from ..evaluate.rollouts import EvaluateSettings, evaluate
-from ..evaluate.table import cells, markdown, plain, table
+from ..evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
+from ..evaluate.policies import find_policy
+from ..evaluate.rollouts import evaluate
+from ..evaluate.settings import EvaluateSettings
 from ..pool import Pool
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
-from . import FAILED, OK, Arguments, err, names, out, say, warn, write, write_json
+from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write, write_json
 from .settings import read
 
 
 def command(arguments: Arguments) -> int:
     settings = read("evaluate", arguments, EvaluateSettings)
-    with ProgressBar(err, f"evaluate {settings.policy}", 1, settings.workers) as progress_bar:
-        found = evaluate(settings, progress_bar.of, search_path(arguments))
-    lines = table(found.episodes)
-    title = f"{settings.policy}: success [%], {settings.rules} rules"
-    shown = Table("", "split", "ID", "OOD", "difference", title=title, title_justify="left")
-    for line in lines:
-        shown.add_row(*cells(line))
+    every = settings.several()
+    for one in every:  # before any of them plays for hours
+        one.check()
+        find_policy(one.name, client=one.remote)
+    results = []
+    for one in every:
+        with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
+            results.append(PolicyResult(one, evaluate(one, progress_bar.of, search_path(arguments))))
+    compared = Comparison(results)
+    _show(compared, settings)
+    write(settings.folder / "table.md", compared.markdown)
+    write_json(str(settings.folder / "table.json"), compared.plain)
+    incomplete = [_report(result) for result in results]
+    if len(results) > 1:
+        for result in results:
+            say(f"wrote {result.settings.folder}: episodes.jsonl")
+    say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
+    return FAILED if any(incomplete) else OK
+
+
+def _show(compared: Comparison, settings: EvaluateSettings) -> None:
+    """Print the tables and the headlines."""
+    title = f"{', '.join(one.name for one in settings.several())}: success [%], {settings.rules} rules"
+    shown = Table(*compared.head, title=title, title_justify="left")
+    for row in compared.rows():
+        shown.add_row(*row)
     out.print(shown)
-    write(settings.folder / "table.md", markdown(lines, settings))
-    told = {"policy": settings.policy, "rules": settings.rules, "table": plain(lines)}
-    write_json(str(settings.folder / "table.json"), told)
+    if every := list(compared.failure_rows()):
+        why = Table(*compared.failure_head, title="failures", title_justify="left")
+        for row in every[:MAX_SHOWN]:
+            why.add_row(*row)
+        out.print(why)
+        if (more := len(every) - MAX_SHOWN) > 0:
+            say(f"{more} more reasons are in table.md")
+    for line in compared.headlines:
+        say(line)
+
+
+def _report(result: PolicyResult) -> bool:
+    """Print what is to be known about the run of one policy. Returns whether episodes are missing."""
+    settings, found = result.settings, result.evaluation
     called = names(map(Pool.open, settings.folders), found.lost)
     for scenario, why in found.lost.items():
         warn(f"UNKNOWN {called[scenario]}: {why}; its episodes are left out")
+    crashed = [e for e in found.episodes if e.get("crashed")]
+    if crashed:
+        remark(f"{settings.name} crashed in {len(crashed)} of {len(found.episodes)} episodes, which are in no rate")
     if found.earlier:
         what = "the pools, the settings and the policy are the same; fresh=true repeats them"
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
-    say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl")
-    return FAILED if found.lost else OK
+    return bool(found.lost or crashed)

@@ -4,96 +4,23 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..compose import load_task
-from ..control.teleop import check_filter
-from ..envs.gym import PoolEnv
-from ..episode import STRICT, check_rules
-from ..errors import BadConfig, PoolError, ScengenError, at_least
-from ..learn.store import is_policy, read_settings
-from ..pool import Pool, collection
-from ..pool.library import Library
-from ..samplers.keyed import unit
+from ..errors import BadConfig, PoolError
+from ..pool import Pool
 from ..samplers.split import ID
+from ..task_files import about as about_task
 from ..validate.playable import unplayable
 from ..work.log import Log
-from ..work.parallel import Workers, each
+from ..work.parallel import each
 from ..work.targets import refused, try_folder
-from .policies import FULL_RATE_POLICIES, REPLAY, Policy, find_policy, identity, make_policy, policy_errors
-from .remote.client import ClientSettings, address_of, is_address, read_client
-
-
-class BadPolicy(ScengenError):
-    """A policy returned an invalid action."""
-
-
-@dataclass(frozen=True)
-class EvaluateSettings:
-    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them."""
-
-    policy: str = ""
-    pool: str | list[str] = ""
-    seeds: int = 20
-    rollouts: int = 5
-    observations: list[str] | None = None
-    width: int = 256
-    height: int = 256
-    workers: Workers = 1
-    to: str | None = None
-    version: str | None = None
-    fresh: bool = False
-    action_filter: str | None = None
-    action_repeat: int = 1
-    rules: str = STRICT
-    client: str | None = None
-
-    @cached_property
-    def folders(self) -> list[str]:
-        """Folders of the pools."""
-        return collection.folders(self.pool)
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the results."""
-        return Path(self.to or Path("generated/evaluation", re.sub(r"[^\w.-]+", ".", self.policy)))
-
-    @cached_property
-    def remote(self) -> ClientSettings | None:
-        """Names of observations and actions of a policy behind a socket; None for other policies."""
-        return read_client(self.client, address_of(self.policy)) if is_address(self.policy) else None
-
-    def check(self) -> None:
-        """Raise `ScengenError` if a setting is not valid."""
-        check_filter(self.action_filter)
-        check_rules(self.rules)
-        at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
-        if self.action_repeat != 1 and self.policy in FULL_RATE_POLICIES:
-            raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.policy} acts at 100 Hz: leave it out")
-        if self.remote:
-            for name, free in (("observations", None), ("action_repeat", 1)):
-                if getattr(self, name) != free:
-                    raise BadConfig(f"{name} = {getattr(self, name)}; {self.remote.file} decides it: leave it out")
-        elif self.client is not None:
-            raise BadConfig(f"client = {self.client}; policy {self.policy} is not behind a socket: leave it out")
-
-
-@dataclass(frozen=True, order=True)
-class RolloutId:
-    """The identity of a rollout: number `rollout` of a scenario."""
-
-    task: str
-    pool: str
-    scenario: str
-    rollout: int
+from .player import PolicyPlayer
+from .settings import PAPER, EvaluateSettings, RolloutId, completed
 
 
 @dataclass(frozen=True)
@@ -123,11 +50,11 @@ def evaluate(
     Raises:
         ScengenError: a pool, a policy or a setting is not valid.
     """
-    settings = _completed(settings)
+    settings = completed(settings)
     settings.check()
     try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
-    about, lost = _scenarios(pools, settings)
+    about, lost = _scenarios(pools, settings, search)
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
     path = settings.folder / "episodes.jsonl"
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
@@ -138,12 +65,13 @@ def evaluate(
         depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
         if settings.fresh:
             _move_aside(path)
-        play = player if settings.workers == 1 else PolicyPlayer(_for_workers(settings), search)  # one for each worker
         with Log(path, depends, remedy) as log:
             todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
             done = len(wanted) - len(todo)
             progress(done, len(wanted))
-            for count, episode in enumerate(each(play, todo, settings.workers), done + 1):
+            player.strict = not done
+            play = player if settings.workers == 1 else _for_workers(player)
+            for count, episode in enumerate(each(play, todo, settings.workers, lost=_crashed), done + 1):
                 log.add({"task": about[episode["pool"], episode["scenario"]]["task"], **episode})
                 progress(count, len(wanted))
             records = log.records
@@ -154,15 +82,6 @@ def evaluate(
     return Evaluation(episodes, done, lost)
 
 
-def _completed(settings: EvaluateSettings) -> EvaluateSettings:
-    """Settings with the observations and the rate of a policy that names them, unless they were chosen."""
-    if not is_policy(settings.policy):
-        return settings
-    own = read_settings(settings.policy)
-    repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
-    return replace(settings, observations=settings.observations or list(own.streams), action_repeat=repeat)
-
-
 def _id(episode: Mapping[str, Any]) -> RolloutId:
     return RolloutId(**{f.name: episode[f.name] for f in fields(RolloutId)})
 
@@ -171,7 +90,9 @@ Scenarios = dict[tuple[str, str], dict[str, Any]]
 """Columns of scenarios that the table needs, by the pool's folder and the scenario's id."""
 
 
-def _scenarios(pools: Sequence[Pool], settings: EvaluateSettings) -> tuple[Scenarios, dict[str, str]]:
+def _scenarios(
+    pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[str]
+) -> tuple[Scenarios, dict[str, str]]:
     """The scenarios that can be played, and those that cannot, with the reasons.
 
     Raises:
@@ -179,24 +100,60 @@ def _scenarios(pools: Sequence[Pool], settings: EvaluateSettings) -> tuple[Scena
     """
     about: Scenarios = {}
     for pool in pools:
-        about |= _first_scenarios(pool, settings.seeds)
-    first = itertools.chain.from_iterable(itertools.islice(pool.rows(), settings.seeds) for pool in pools)
-    if lost := dict(unplayable(first, settings.workers)):
+        about |= _first_scenarios(pool, settings, search)
+    if not about:
+        named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
+        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; say splits=all")
+    rows = (
+        row
+        for pool in pools
+        for row in itertools.islice(pool.rows(), _last(pool, about))
+        if (str(pool.folder), row.id) in about
+    )
+    if lost := dict(unplayable(rows, settings.workers)):
         about = {(pool, id_): a for (pool, id_), a in about.items() if id_ not in lost}
         if not about:
             raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     return about, lost
 
 
-def _first_scenarios(pool: Pool, seeds: int) -> Scenarios:
-    """The first scenarios of a pool."""
+def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
+    """The first scenarios of a pool, of the chosen splits.
+
+    Raises:
+        BadConfig: the pool holds fewer.
+    """
     if not len(pool):
         raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
-    if len(pool) < seeds:
-        raise BadConfig(f"seeds = {seeds}, but {pool.folder} holds {len(pool)} scenarios; say seeds={len(pool)}")
-    names = ("task", "category", "split", "seed", "index")
-    rows = itertools.islice(pool.columns("id", *names), seeds)
-    return {(str(pool.folder), id_): dict(zip(names, told, strict=True)) for id_, *told in rows}
+    names: tuple[str, ...] = ("task", "category", "split", "seed", "index")
+    every = [(str(id_), dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)]
+    wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
+    if wanted and len(wanted) < settings.seeds:
+        remedy = f"say seeds={len(wanted)}"
+        raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
+    return {(str(pool.folder), id_): told for id_, told in wanted[: settings.seeds]}
+
+
+def _is_wanted(task: str, split: str, splits: str, search: Sequence[str]) -> bool:
+    """Whether a split belongs to a set of splits."""
+    return splits != PAPER or split == ID or split in _paper_axes(task, tuple(search))
+
+
+@cache
+def _paper_axes(task: str, search: tuple[str, ...]) -> tuple[str, ...]:
+    return about_task(task, search).paper_axes
+
+
+def _last(pool: Pool, about: Scenarios) -> int:
+    """Number of rows of a pool up to the last chosen one."""
+    numbers = [n for n, (id_,) in enumerate(pool.columns("id"), 1) if (str(pool.folder), id_) in about]
+    return max(numbers, default=0)
+
+
+def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
+    """The record of a rollout whose process died twice."""
+    key = {"pool": which.pool, "scenario": which.scenario, "rollout": which.rollout}
+    return {**key, "success": False, "reason": "", "seconds": 0.0, "phase": "", "crashed": f"the process {reason}"}
 
 
 def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
@@ -205,14 +162,17 @@ def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, An
     chosen = {name: getattr(settings, name) for name in names}
     if settings.remote:
         chosen["client"] = settings.remote.identity()
+    if not settings.settle:
+        chosen["settle"] = False
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 
-def _for_workers(settings: EvaluateSettings) -> EvaluateSettings:
-    """Settings for workers, which may run in another folder: with absolute paths."""
+def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
+    """The player of each worker, which may run in another folder: with absolute paths."""
+    settings = player.settings
     folders = [str(Path(folder).resolve()) for folder in settings.folders]
     client = settings.remote and str(Path(settings.remote.file).resolve())
-    return replace(settings, pool=folders, client=client, workers=1)
+    return PolicyPlayer(replace(settings, pool=folders, client=client, workers=1), player.search, player.strict)
 
 
 def _move_aside(path: Path) -> None:
@@ -224,88 +184,3 @@ def _move_aside(path: Path) -> None:
         path.rename(free)
     except OSError as error:
         raise refused(path, error) from None
-
-
-class PolicyPlayer:
-    """Plays rollouts. It keeps one environment and one policy as long as the task stays the same."""
-
-    def __init__(self, settings: EvaluateSettings, search: Sequence[str] = ()):
-        self.settings, self.search = settings, search
-        self._running: tuple[PoolEnv, Policy] | None = None
-
-    def __call__(self, which: RolloutId) -> dict[str, Any]:
-        """Play one rollout, from reset to its end.
-
-        Raises:
-            BadPolicy: the policy returned an invalid action.
-        """
-        env, policy = self._prepared_for(which.task)
-        observation, info = env.reset(options={"scenario": which.scenario})
-        name, where = self.settings.policy, f"on scenario {env.row.name}"
-        with policy_errors(name, f"its reset {where}"):
-            policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
-        over = False
-        while not over:
-            with policy_errors(name, f"its act {where}"):
-                action = np.asarray(policy.act(observation), float)
-            try:
-                observation, _, terminated, truncated, info = env.step(action)
-            except (ValueError, TypeError) as error:
-                raise BadPolicy(f"policy {name} {where}: {error}") from None
-            over = terminated or truncated
-        return {
-            "pool": which.pool,
-            "scenario": which.scenario,
-            "rollout": which.rollout,
-            "success": bool(info["success"]),
-            "reason": info["reason"],
-            "seconds": round(info["time"], 3),
-        }
-
-    def identities(self, tasks: set[str]) -> dict[str, str]:
-        """Hashes of the policy by task, see `policies.identity`."""
-        return {task: self._identity(task) for task in sorted(tasks)}
-
-    def _identity(self, task: str) -> str:
-        _, policy = self._prepared_for(task)
-        factory = find_policy(self.settings.policy, client=self.settings.remote)
-        return identity(self.settings.policy, factory, policy)
-
-    def _prepared_for(self, task: str) -> tuple[PoolEnv, Policy]:
-        if self._running and self._running[0].task.name != task:
-            self.close()
-        if not self._running:
-            settings, remote = self.settings, self.settings.remote
-            folders = [f for f in settings.folders if task in Pool.open(f).kinds("task")[0]]
-            env = PoolEnv(
-                task,
-                folders,
-                remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations,
-                width=settings.width,
-                height=settings.height,
-                action_filter=settings.action_filter,
-                action_repeat=remote.repeat if remote else settings.action_repeat,
-                rules=check_rules(settings.rules),
-                settle=True,
-                search=self.search,
-            )
-            memory = _training(folders) if settings.policy == REPLAY else None
-            factory = find_policy(settings.policy, memory, remote)
-            self._running = env, make_policy(settings.policy, factory, env)
-        return self._running
-
-    def close(self) -> None:
-        """Close the environment, and the policy if it has a method `close`."""
-        if self._running:
-            env, policy = self._running
-            env.close()
-            if callable(close := getattr(policy, "close", None)):
-                with policy_errors(self.settings.policy, "its close"):
-                    close()
-            self._running = None
-
-
-def _training(folders: Sequence[str]) -> Library | None:
-    """The training scenarios of the pools; None if there are none."""
-    every = Library([Pool.open(folder) for folder in folders])
-    return every.of_split(ID) if ID in every.kinds("split") else None

@@ -6,7 +6,6 @@ from typing import Any
 
 from ..samplers.split import ID
 from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
-from .rollouts import EvaluateSettings
 
 
 @dataclass(frozen=True)
@@ -23,6 +22,8 @@ class TableLine:
     """Success rate out of distribution; None if no other pool was given."""
     difference: Difference | None
     """Difference OOD minus ID; None if a rate is missing."""
+    crashed: int = 0
+    """Number of episodes in which the policy crashed. They are in no rate."""
 
 
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
@@ -35,7 +36,7 @@ def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
     """
     lines, whole = [], []
     for task in _values(episodes, "task"):
-        cells = _outcomes_by_split(e for e in episodes if e["task"] == task)
+        cells = _outcomes_by_split(e for e in episodes if e["task"] == task and not e.get("crashed"))
         training, axes = cells.pop(ID, {}), cells
         lines += [_line(task, axis, training, [shares]) for axis, shares in axes.items()]
         every = _line(task, "all", training, list(axes.values()))
@@ -47,17 +48,15 @@ def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
         whole.append((category, every))
     for category in dict.fromkeys(name for name, _ in whole):
         lines.append(_mean_line(category, [line for name, line in whole if name == category]))
-    return [*lines, _mean_line("all", [line for _, line in whole])]
+    found = [*lines, _mean_line("all", [line for _, line in whole])]
+    crashed = [e for e in episodes if e.get("crashed")]
+    return [replace(line, crashed=sum(_belongs(e, line) for e in crashed)) for line in found]
 
 
-def markdown(lines: Sequence[TableLine], settings: EvaluateSettings) -> str:
-    """The table as Markdown, rates and 95 % intervals in percent."""
-    head = (
-        f"Policy `{settings.policy}`: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
-        f"{settings.rollouts} rollouts each, {settings.rules} rules\n\n"
-        "| | split | ID | OOD | difference |\n|---|---|---|---|---|\n"
-    )
-    return head + "".join(f"| {' | '.join(cells(line))} |\n" for line in lines)
+def _belongs(episode: Mapping[str, Any], line: TableLine) -> bool:
+    """Whether a line of the table is about an episode."""
+    about = line.what in (episode["task"], episode["category"], "all")
+    return about and (line.split == "all" or episode["split"] in (ID, line.split))
 
 
 def cells(line: TableLine) -> list[str]:

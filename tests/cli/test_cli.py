@@ -22,7 +22,7 @@ from scengen.cli.verbs import RENAMED
 from scengen.commands.settings import read
 from scengen.demos.generate import DemosSettings
 from scengen.errors import BadConfig
-from scengen.evaluate import rollouts
+from scengen.evaluate.settings import EvaluateSettings
 from scengen.export import recording
 from scengen.export.mjcf import export, without_slashes
 from scengen.ood import axis_card
@@ -282,7 +282,7 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
         ("demos", DemosSettings, {}),
         ("probe", axis_card.AxisSettings, {"axis": "diagonal"}),
         ("discover", discovery.DiscoverSettings, {}),
-        ("evaluate", rollouts.EvaluateSettings, {"policy": "idle", "pool": "here"}),
+        ("evaluate", EvaluateSettings, {"policy": "idle", "pool": "here"}),
         ("record", recording.RecordSettings, {"pool": "here", "to": "there"}),
     ],
 )

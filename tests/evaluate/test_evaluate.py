@@ -9,7 +9,11 @@ import helpers
 import pytest
 
 from scengen import cli
-from scengen.evaluate.rollouts import EvaluateSettings, evaluate
+from scengen.errors import BadConfig
+from scengen.evaluate import rollouts
+from scengen.evaluate.comparison import PolicyResult
+from scengen.evaluate.rollouts import Evaluation, evaluate
+from scengen.evaluate.settings import EvaluateSettings
 from scengen.evaluate.table import table
 from scengen.tasks.domino_single import DominoSingle
 
@@ -41,6 +45,8 @@ def test_a_goal_has_to_last_as_in_a_certificate(tmp_path, monkeypatch):
     monkeypatch.setattr(DominoSingle, "success", lambda self, world: 0.2 < world.time < 0.7)
     (episode,) = run(tmp_path, "idle", seeds=1)
     assert not episode["success"] and "did not last" in episode["reason"]
+    (episode,) = run(tmp_path / "at once", "idle", seeds=1, settle=False)
+    assert episode["success"] and episode["seconds"] == pytest.approx(0.2, abs=0.011)
 
 
 def test_actions_can_be_held(tmp_path, monkeypatch):
@@ -232,3 +238,74 @@ def test_a_fault_of_a_policy_is_called_one(mine, capsys, monkeypatch, tmp_path, 
     assert says in told and told.count("\n") == 1 and "unforeseen" not in told
     traces = list(tmp_path.glob("scengen-*.txt"))
     assert len(traces) == ("the fault is the policy's" in told) and all(str(t) in told for t in traces)
+
+
+def test_several_policies_stand_in_one_table(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    argv = ("evaluate", "policy=[idle,oracle]", f"pool={REFERENCE}", "seeds=2", "rollouts=1", "to=out")
+    assert cli.run(argv) == 0
+    told = json.loads((tmp_path / "out" / "table.json").read_text())["policies"]
+    assert [(each["policy"], each["table"][-1]["id"]["value"]) for each in told] == [("idle", 0.0), ("oracle", 1.0)]
+    lines = (tmp_path / "out" / "table.md").read_text().splitlines()
+    assert "| domino_single | id | idle |" in lines[4] and "| domino_single | id | oracle |" in lines[5]
+    (failure,) = told[0]["failures"]
+    assert failure["episodes"] == 2 and failure["phase"] == "before contact" and "not reached" in failure["reason"]
+    assert told[1]["failures"] == []
+    assert (tmp_path / "out" / "idle" / "episodes.jsonl").exists()
+    capsys.readouterr()
+    assert cli.run(argv) == 0 and capsys.readouterr().out.count("2 of 2 episodes are from an earlier run") == 2
+
+
+def test_a_comparison_lets_a_policy_keep_its_own_rate():
+    every = EvaluateSettings(policy=["replay", "mine:Up", "ws://host:1"], action_repeat=4, observations=["a"]).several()
+    assert [(one.action_repeat, one.observations) for one in every] == [(1, ["a"]), (4, ["a"]), (1, None)]
+    assert [one.folder.name for one in every] == ["replay", "mine.Up", "ws.host.1"]
+    with pytest.raises(BadConfig, match="name different policies"):
+        EvaluateSettings(policy=["idle", "idle"]).several()
+
+
+CRASHING = (
+    "class Up:\n"
+    "    episodes = 0\n"
+    "    def __init__(self, env): pass\n"
+    "    def reset(self, *_):\n"
+    "        Up.episodes += 1\n"
+    "        self.bad = Up.episodes == 2\n"
+    "    def act(self, _):\n"
+    "        if self.bad: raise RuntimeError('no GPU')\n"
+    "        return [0] * 7\n"
+)
+
+
+def test_a_crash_of_a_policy_is_counted_beside_the_rate(mine, tmp_path, capsys):
+    assert mine("seeds=3", source=CRASHING) == 1
+    assert "crashed in 1 of 3 episodes, which are in no rate" in capsys.readouterr().err
+    told = json.loads((tmp_path / "out" / "table.json").read_text())
+    line = told["table"][-1]
+    assert line["crashed"] == 1 and line["id"]["scenarios"] == 2
+    assert any("RuntimeError: no GPU" in failure["reason"] for failure in told["failures"])
+    assert "| crashed |" in (tmp_path / "out" / "table.md").read_text()
+
+
+def test_the_papers_splits_are_training_and_the_papers_conditions(monkeypatch, tmp_path):
+    paper = {"domino_single": "diagonal"}
+    for split, wanted in (("id", True), ("diagonal", True), ("wide_gaps", False)):
+        assert rollouts._is_wanted("domino_single", split, "paper", ()) is wanted
+        assert rollouts._is_wanted("domino_single", split, "all", ())
+    assert rollouts._paper_axes("domino_single", ()) == (paper["domino_single"],)
+    monkeypatch.setattr(rollouts, "_is_wanted", lambda *_: False)
+    with pytest.raises(BadConfig, match="these pools have none of them, but id; say splits=all"):
+        run(tmp_path, "idle", splits="paper")
+
+
+def test_the_headline_compares_the_same_episodes():
+    def episode(split, index, success):
+        about = {"task": "a", "category": "P3", "split": split, "pool": split, "scenario": f"{split}{index}"}
+        return {**about, "rollout": 0, "success": success, "seed": 0, "index": index, "reason": "slow", "phase": ""}
+
+    episodes = [episode("id", k, True) for k in range(4)] + [episode("far", k, k < 1) for k in range(4)]
+    result = PolicyResult(EvaluateSettings(policy="mine"), Evaluation(episodes, 0, {}))
+    assert result.headline.startswith("mine: -75.0 points [")
+    assert result.headline.endswith("against the same episodes without the axis (4 twins)")
+    alone = PolicyResult(EvaluateSettings(policy="mine"), Evaluation(episodes[:4], 0, {}))
+    assert alone.headline == ""

@@ -15,7 +15,8 @@ from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.evaluate.remote.client import address_of, read_client
 from scengen.evaluate.remote.wire import BadMessage, msgpack_numpy_array, openpi_array, unpacked
-from scengen.evaluate.rollouts import EvaluateSettings, evaluate
+from scengen.evaluate.rollouts import evaluate
+from scengen.evaluate.settings import EvaluateSettings
 from scengen.pool import Pool
 from scengen.task_files import conf_dir
 

@@ -14,7 +14,8 @@ from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, PoolError
 from scengen.evaluate.policies import find_policy
-from scengen.evaluate.rollouts import EvaluateSettings, evaluate
+from scengen.evaluate.rollouts import evaluate
+from scengen.evaluate.settings import EvaluateSettings
 from scengen.learn.features import LARGEST_INPUT, Features
 from scengen.learn.player import TrainedPolicy
 from scengen.learn.store import StoredPolicy

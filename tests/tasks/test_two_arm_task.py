@@ -23,8 +23,9 @@ from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import cameras_of, proprioception, streams_of
 from scengen.errors import BadConfig, PoolError
 from scengen.evaluate import policies
-from scengen.evaluate.rollouts import BadPolicy, PolicyPlayer, RolloutId
-from scengen.evaluate.rollouts import EvaluateSettings as Evaluation
+from scengen.evaluate.player import BadPolicy, PolicyPlayer
+from scengen.evaluate.settings import EvaluateSettings as Evaluation
+from scengen.evaluate.settings import RolloutId
 from scengen.pool import Pool
 from scengen.pool.untrusted import Malformed
 from scengen.sim.world import World

@@ -1,0 +1,167 @@
+"""Evaluations of one policy or several side by side: the table, the headline, and why episodes fail."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+from .rollouts import Evaluation
+from .settings import EvaluateSettings
+from .table import TableLine, cells, plain, table
+
+MAX_SHOWN = 20
+"""Largest number of reasons in a printed list."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Failed episodes of one policy with the same reason, in the same phase."""
+
+    policy: str
+    """Name of the policy."""
+    task: str
+    """Name of the task."""
+    split: str
+    """Name of the split."""
+    reason: str
+    """Reason of the failure, or what crashed."""
+    phase: str
+    """Phase at the end of the episodes (`player.PHASES`); empty for episodes of older versions."""
+    episodes: int
+    """Number of episodes."""
+
+
+@dataclass(frozen=True)
+class PolicyResult:
+    """The evaluation of one policy."""
+
+    settings: EvaluateSettings
+    """Settings of the evaluation."""
+    evaluation: Evaluation
+    """Its episodes."""
+
+    @cached_property
+    def lines(self) -> list[TableLine]:
+        """The lines of its table."""
+        return table(self.evaluation.episodes)
+
+    @cached_property
+    def failures(self) -> list[Failure]:
+        """Its failures, the most frequent first."""
+        found = Counter(
+            (e["task"], e["split"], f"crashed: {e['crashed']}" if e.get("crashed") else e["reason"], e.get("phase", ""))
+            for e in self.evaluation.episodes
+            if not e["success"]
+        )
+        return [Failure(self.settings.name, *about, count) for about, count in found.most_common()]
+
+    @property
+    def headline(self) -> str:
+        """The drop of all tasks together; empty without two sides."""
+        drop = self.lines[-1].difference
+        if drop is None:
+            return ""
+        low, high = 100 * drop.low, 100 * drop.high
+        against = (
+            f"the same episodes without the axis ({drop.twins} twins)" if drop.twins else "other scenarios, unpaired"
+        )
+        return f"{self.settings.name}: {100 * drop.value:+.1f} points [{low:+.1f}, {high:+.1f}] against {against}"
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """The result as plain data."""
+        settings = self.settings
+        return {
+            "policy": settings.name,
+            "version": settings.version,
+            "rules": settings.rules,
+            "splits": settings.splits,
+            "settle": settings.settle,
+            "headline": self.headline,
+            "table": plain(self.lines),
+            "failures": [asdict(failure) for failure in self.failures],
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The evaluations of some policies on the same pools."""
+
+    results: Sequence[PolicyResult]
+    """Result of each policy."""
+
+    @property
+    def head(self) -> list[str]:
+        """Titles of the columns."""
+        crashed = ["crashed"] if self._crashed else []
+        return ["", "split", *self._if_several("policy"), "ID", "OOD", "difference", *crashed]
+
+    def rows(self) -> Iterator[list[str]]:
+        """The cells of the table: for each task and split, and each category, a row for each policy."""
+        order = dict.fromkeys((line.what, line.split) for result in self.results for line in result.lines)
+        tables = [{(line.what, line.split): line for line in result.lines} for result in self.results]
+        sections = [key for key in order if key != ("all", "all")] + [("all", "all")]
+        for key in sections:
+            for result, lines in zip(self.results, tables, strict=True):
+                if key in lines:
+                    what, split, *rates = cells(lines[key])
+                    crashed = [str(lines[key].crashed)] if self._crashed else []
+                    yield [what, split, *self._if_several(result.settings.name), *rates, *crashed]
+
+    @property
+    def failure_head(self) -> list[str]:
+        """Titles of the columns of the failures."""
+        return [*self._if_several("policy"), "task", "split", "reason", "phase", "episodes"]
+
+    def failure_rows(self) -> Iterator[list[str]]:
+        """The cells of the failures of all policies, the most frequent first."""
+        every = [failure for result in self.results for failure in result.failures]
+        for f in sorted(every, key=lambda failure: -failure.episodes):
+            yield [*self._if_several(f.policy), f.task, f.split, f.reason, f.phase, str(f.episodes)]
+
+    @property
+    def headlines(self) -> list[str]:
+        """The drop of each policy that has both sides."""
+        return [result.headline for result in self.results if result.headline]
+
+    @property
+    def plain(self) -> Mapping[str, Any]:
+        """The comparison as plain data; that of one policy alone is its result."""
+        if len(self.results) == 1:
+            return self.results[0].plain
+        return {"policies": [result.plain for result in self.results]}
+
+    @property
+    def markdown(self) -> str:
+        """The comparison as Markdown, rates and 95 % intervals in percent."""
+        settings = self.results[0].settings
+        names = ", ".join(f"`{result.settings.name}`" for result in self.results)
+        settling = "" if settings.settle else ", goals counted at once"
+        head = (
+            f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
+            f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
+        )
+        parts = [head, _table(self.head, self.rows())]
+        if self.headlines:
+            parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
+        if rows := list(self.failure_rows()):
+            parts.append(_table(self.failure_head, rows))
+        return "\n\n".join(parts) + "\n"
+
+    def _if_several(self, cell: str) -> list[str]:
+        """A cell of a column that only a comparison of several policies has."""
+        return [cell] if len(self.results) > 1 else []
+
+    @property
+    def _crashed(self) -> bool:
+        return any(result.lines[-1].crashed for result in self.results)
+
+
+def _table(head: Sequence[str], rows: Any) -> str:
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    return "\n".join([*lines, *(f"| {' | '.join(map(_escaped, row))} |" for row in rows)])
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

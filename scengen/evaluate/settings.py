@@ -1,0 +1,137 @@
+"""Settings of an evaluation."""
+
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from ..control.teleop import check_filter
+from ..episode import STRICT, check_rules
+from ..errors import BadConfig, UnknownName, at_least, cut
+from ..learn.store import is_policy, read_settings
+from ..pool import collection
+from ..work.parallel import Workers
+from .policies import FULL_RATE_POLICIES
+from .remote.client import ClientSettings, address_of, is_address, read_client
+
+ALL = "all"
+"""Name of all splits of the pools."""
+PAPER = "paper"
+"""Name of the training split and the OOD conditions of the paper (App. I)."""
+SPLITS = (ALL, PAPER)
+"""Names of sets of splits."""
+MAX_FOLDER_NAME = 100
+"""Largest length of the name of a folder that is made from the names of policies."""
+
+
+@dataclass(frozen=True)
+class EvaluateSettings:
+    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them."""
+
+    policy: str | list[str] = ""
+    pool: str | list[str] = ""
+    seeds: int = 20
+    rollouts: int = 5
+    observations: list[str] | None = None
+    width: int = 256
+    height: int = 256
+    workers: Workers = 1
+    to: str | None = None
+    version: str | None = None
+    fresh: bool = False
+    action_filter: str | None = None
+    action_repeat: int = 1
+    rules: str = STRICT
+    client: str | None = None
+    splits: str = ALL
+    settle: bool = True
+
+    @cached_property
+    def folders(self) -> list[str]:
+        """Folders of the pools."""
+        return collection.folders(self.pool)
+
+    @property
+    def name(self) -> str:
+        """Name of the policy, of settings for one alone."""
+        assert isinstance(self.policy, str)
+        return self.policy
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results; for several policies, that of their comparison."""
+        names = [self.policy] if isinstance(self.policy, str) else self.policy
+        return Path(self.to or Path("generated/evaluation", "+".join(map(_folder_name, names))[:MAX_FOLDER_NAME]))
+
+    def several(self) -> "list[EvaluateSettings]":
+        """The settings for each policy alone.
+
+        A policy that decides something itself, such as its rate, does not get that setting.
+
+        Raises:
+            BadConfig: there is no policy, or one is named twice.
+        """
+        if isinstance(self.policy, str):
+            return [self]
+        if not self.policy or len({_folder_name(name) for name in self.policy}) < len(self.policy):
+            raise BadConfig(
+                f"policy = {cut(str(self.policy))}; name different policies: policy=[replay,my_package:mine]"
+            )
+        return [self._alone(name) for name in self.policy]
+
+    def _alone(self, name: str) -> "EvaluateSettings":
+        to = self.to and str(Path(self.to, _folder_name(name)))
+        remote, own_rate = is_address(name), is_address(name) or name in FULL_RATE_POLICIES
+        return replace(
+            self,
+            policy=name,
+            to=to,
+            client=self.client if remote else None,
+            observations=None if remote else self.observations,
+            action_repeat=1 if own_rate else self.action_repeat,
+        )
+
+    @cached_property
+    def remote(self) -> ClientSettings | None:
+        """Names of observations and actions of a policy behind a socket; None for other policies."""
+        return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
+
+    def check(self) -> None:
+        """Raise `ScengenError` if a setting is not valid."""
+        check_filter(self.action_filter)
+        check_rules(self.rules)
+        if self.splits not in SPLITS:
+            raise UnknownName("splits", self.splits, SPLITS)
+        at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
+        if self.action_repeat != 1 and self.name in FULL_RATE_POLICIES:
+            raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.name} acts at 100 Hz: leave it out")
+        if self.remote:
+            for name, free in (("observations", None), ("action_repeat", 1)):
+                if getattr(self, name) != free:
+                    raise BadConfig(f"{name} = {getattr(self, name)}; {self.remote.file} decides it: leave it out")
+        elif self.client is not None:
+            raise BadConfig(f"client = {self.client}; policy {self.name} is not behind a socket: leave it out")
+
+
+@dataclass(frozen=True, order=True)
+class RolloutId:
+    """The identity of a rollout: number `rollout` of a scenario."""
+
+    task: str
+    pool: str
+    scenario: str
+    rollout: int
+
+
+def completed(settings: EvaluateSettings) -> EvaluateSettings:
+    """Settings with the observations and the rate of a policy that names them, unless they were chosen."""
+    if not is_policy(settings.name):
+        return settings
+    own = read_settings(settings.name)
+    repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
+    return replace(settings, observations=settings.observations or list(own.streams), action_repeat=repeat)
+
+
+def _folder_name(policy: str) -> str:
+    """Name of the folder of a policy's results."""
+    return re.sub(r"[^\w.-]+", ".", policy)
