@@ -125,8 +125,10 @@ def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[st
     """
     if not len(pool):
         raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
-    names: tuple[str, ...] = ("task", "category", "split", "seed", "index")
-    every = [(str(id_), dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)]
+    names = ("task", "category", "split", "seed", "index")
+    every: list[tuple[str, dict[str, Any]]] = [
+        (id_, dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)
+    ]
     wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
     if wanted and len(wanted) < settings.seeds:
         remedy = f"say seeds={len(wanted)}"
