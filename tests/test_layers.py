@@ -33,6 +33,7 @@ LAYERS = (
     ("analysis", "agents"),
     ("demos", "curate"),
     ("ood", "drift", "teleop"),
+    ("studio",),
     ("conformance",),
     ("commands",),
     ("cli",),

@@ -4,8 +4,9 @@ from collections import Counter
 
 from rich.table import Table
 
-from ..curate.curation import DECISIONS, FOLDER, CurateSettings, curate
+from ..curate.curation import FOLDER, CurateSettings, curate
 from ..curate.page import write_page
+from ..curate.people import DECISIONS
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import OK, Arguments, err, out, say

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from importlib import import_module
 from types import ModuleType
@@ -58,9 +59,17 @@ def _source(settings: TeleopSettings, arguments: Arguments) -> Source:
             raise BadConfig(f"id = {settings.id} names a scenario of a pool; give pool=FOLDER, or index= with task=")
         task = compose.load_task(name, [*search_path(arguments), *task_overrides(arguments)])
         return Source.of_task(task, compose.certify_levels(task)["quick"], settings)
-    pool = Pool.open(one(settings.pool)).check()
+    return source_of_pool(Pool.open(one(settings.pool)).check(), search_path(arguments), settings.id)
+
+
+def source_of_pool(pool: Pool, search: Sequence[str], id: str | None) -> Source:
+    """The scenarios of a pool, or one of them.
+
+    Raises:
+        ScengenError: its task cannot be loaded, or there is no such scenario.
+    """
     certify_settings = typed("certify", CertifySettings, dict(pool.manifest.config.certify))
-    return Source.of_pool(pool, task_of(pool, search_path(arguments)), certify_settings, settings.id)
+    return Source.of_pool(pool, task_of(pool, search), certify_settings, id)
 
 
 def _drive_all(run: Run, device: Device, timing: Timing, screen: "Screen | None") -> str:

@@ -11,7 +11,6 @@
 Only the recording itself is read: nothing in it depends on results of policies.
 """
 
-import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,25 +20,20 @@ from typing import Any
 import numpy as np
 
 from .. import compose
-from ..errors import BadConfig, PoolError, cut
+from ..errors import PoolError
 from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT
 from ..pool.files import replace_file, sha256
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
 from .checks import Subject, check_rows, found
-from .findings import SCHEMA, EpisodeReport, Finding
+from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
+from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
 from .replays import Recorded, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
 from .videos import check_video
 
 FOLDER = "curation"
 """Folder of the results, below that of the recording."""
-SCORES = "scores.csv"
-DECISIONS = "decisions.csv"
-VERDICTS = ("accept", "reject")
-"""Verdicts of people."""
-MAX_CSV = 1_000_000
-"""Size of the largest table of people that is read [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +43,6 @@ class CurateSettings:
     data: str = ""
     replay: bool = True
     workers: Workers = 1
-
-
-@dataclass(frozen=True)
-class Decision:
-    """Decision of a person about an episode."""
-
-    verdict: str
-    who: str
-    why: str
 
 
 @dataclass(frozen=True)
@@ -92,7 +77,7 @@ def curate(settings: CurateSettings, progress: Callable[[int, int], None], searc
     recording = Recording.open(settings.data)
     folder = recording.folder / FOLDER
     count = len(recording.episodes)
-    people, decisions = _scores(folder / SCORES, count), _decisions(folder / DECISIONS, count)
+    people, decisions = scores_by_people(folder / SCORES, count), decisions_of_people(folder / DECISIONS, count)
     reports, jobs = _examined(recording, settings, search, lambda done: progress(done, 2 * count))
     for done, (number, finding) in enumerate(_replays(jobs, settings.workers), 1):
         progress(count + done, 2 * count)
@@ -185,10 +170,26 @@ def _decided(recording: Recording, reports: tuple[EpisodeReport, ...], decisions
     return Curated(recording, reports, decisions, tuple(kept), funnel)
 
 
+def decided_again(recording: Recording) -> Curated:
+    """The last curation of a recording with what people have said since; its results are written.
+
+    Raises:
+        ScengenError: it was not curated yet, or a table of people cannot be read.
+    """
+    folder, count = recording.folder / FOLDER, len(recording.episodes)
+    people, decisions = scores_by_people(folder / SCORES, count), decisions_of_people(folder / DECISIONS, count)
+    reports = tuple(_with_score(report, people.get(report.episode)) for report in read_reports(folder / REPORTS))
+    if [report.episode for report in reports] != list(range(count)):
+        raise PoolError(f"{folder / REPORTS} is of another recording; run scengen curate data={recording.folder}")
+    curated = _decided(recording, reports, decisions)
+    _write(curated, folder)
+    return curated
+
+
 def _write(curated: Curated, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     lines = "".join(json.dumps(report.plain(), sort_keys=True) + "\n" for report in curated.reports)
-    replace_file(folder / "reports.jsonl", lines.encode())
+    replace_file(folder / REPORTS, lines.encode())
     replace_file(folder / "report.schema.json", _json(SCHEMA))
     replace_file(folder / "kept.json", _json(list(curated.kept)))
     about = curated.recording.folder / "meta" / "scengen.json"
@@ -199,62 +200,3 @@ def _write(curated: Curated, folder: Path) -> None:
 
 def _json(content: Any) -> bytes:
     return (json.dumps(content, indent=1) + "\n").encode()
-
-
-# --- tables of people ---------------------------------------------------------------------------------
-
-
-def _scores(path: Path, count: int) -> dict[int, int]:
-    """Scores of a person by episode.
-
-    Raises:
-        BadConfig: one line of the table has no meaning.
-    """
-    found = {}
-    for place, row in _table(path, ("episode", "score"), count):
-        if row["score"].strip() not in "12345" or not row["score"].strip():
-            raise BadConfig(f"{path}, line {place}: score = {cut(row['score'])!r}; it must be 1 to 5")
-        found[int(row["episode"])] = int(row["score"])
-    return found
-
-
-def _decisions(path: Path, count: int) -> dict[int, Decision]:
-    """Decisions of people by episode; lines without a verdict are still open.
-
-    Raises:
-        BadConfig: one line of the table has no meaning.
-    """
-    found = {}
-    for place, row in _table(path, ("episode", "verdict", "who", "why"), count):
-        verdict = row["verdict"].strip()
-        if verdict and verdict not in VERDICTS:
-            raise BadConfig(f"{path}, line {place}: verdict = {cut(verdict)!r}; it must be {' or '.join(VERDICTS)}")
-        if verdict:
-            found[int(row["episode"])] = Decision(verdict, row["who"].strip(), row["why"].strip())
-    return found
-
-
-def _table(path: Path, columns: Sequence[str], count: int) -> list[tuple[int, dict[str, str]]]:
-    """Lines of a table with their numbers; none if there is no such file.
-
-    Raises:
-        BadConfig: it lacks a column, or names an episode that does not exist.
-        PoolError: it cannot be read.
-    """
-    if not path.exists():
-        return []
-    try:
-        if path.stat().st_size > MAX_CSV:
-            raise PoolError(f"{path} has more than {MAX_CSV} bytes; it is no table of episodes")
-        with open(path, newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            rows = [(reader.line_num, {name: str(row.get(name) or "") for name in columns}) for row in reader]
-            named = reader.fieldnames or []
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); correct or remove it") from None
-    if missing := [name for name in columns if name not in named]:
-        raise BadConfig(f"{path} lacks the column {missing[0]}; its first line must be {','.join(columns)}")
-    for place, row in rows:
-        if not (row["episode"].isdecimal() and row["episode"].isascii() and int(row["episode"][:9]) < count):
-            raise BadConfig(f"{path}, line {place}: episode = {cut(row['episode'])!r}; it must be 0 to {count - 1}")
-    return rows

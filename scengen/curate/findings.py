@@ -2,8 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal
 
+from ..errors import PoolError
+from ..pool.untrusted import check_text, check_whole, demand, read_json
+
+REPORTS = "reports.jsonl"
+"""File of the reports of a curation."""
 Severity = Literal["error", "warning"]
 """`error`: the episode stays out unless a person accepts it. `warning`: worth a look, and no reason to stay out."""
 
@@ -52,6 +58,43 @@ class EpisodeReport:
         plain["checks"] = list(self.checks)
         plain["findings"] = [{**asdict(f), "frames": list(f.frames)} for f in self.findings]
         return plain
+
+
+def read_reports(path: Path) -> list[EpisodeReport]:
+    """The reports in a file that `curate` has written.
+
+    Raises:
+        PoolError: there is none, or it holds something else.
+    """
+    try:
+        return [_report(read_json(line)) for line in path.read_text().splitlines()]
+    except FileNotFoundError:
+        raise PoolError(f"no reports at {path}; run scengen curate first") from None
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        why = " ".join(str(error).split())[:120]
+        raise PoolError(f"{path} is damaged ({why}); run scengen curate again") from None
+
+
+def _report(plain: Any) -> EpisodeReport:
+    """A report from its plain data.
+
+    Raises:
+        ValueError, TypeError, KeyError: it is none.
+    """
+    findings = []
+    for one in plain["findings"]:
+        frames = tuple(one["frames"])
+        for frame in frames:
+            check_whole("a frame", frame)
+        demand(one["severity"] in ("error", "warning"), "a severity is neither error nor warning")
+        for name in ("check", "explanation"):
+            check_text(name, one[name])
+        findings.append(Finding(**{**one, "frames": frames}))
+    check_whole("episode", plain["episode"])
+    check_whole("score", plain["score"], 5)
+    for name in ("scenario", "task", "style", "scored_by"):
+        check_text(name, plain[name])
+    return EpisodeReport(**{**plain, "checks": tuple(plain["checks"]), "findings": tuple(findings)})
 
 
 _NUMBERS = {"type": "object", "additionalProperties": {"type": "number"}}

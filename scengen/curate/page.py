@@ -17,8 +17,9 @@ from ..pictures.plots import svg
 from ..pictures.report import template
 from ..pool.files import replace_file
 from ..robots.panda import Names
-from .curation import VERDICTS, Curated, Decision
+from .curation import Curated
 from .findings import EpisodeReport
+from .people import VERDICTS, Decision
 
 MAX_CARDS = 200
 """Largest number of episodes with plots on the page; the table lists all."""
@@ -52,7 +53,7 @@ def write_page(curated: Curated, path: Path) -> None:
         if (report := flagged.get(episode.number)) and len(cards) < MAX_CARDS:
             decision = curated.decisions.get(episode.number)
             cards.append(
-                Card(report, decision, _plot(episode, report, curated.recording), _strip(episode, report, curated))
+                Card(report, decision, plot(episode, report, curated.recording), _strip(episode, report, curated))
             )
     shown = {card.report.episode for card in cards}
     others = [_line(number, told) for number, told in sorted(curated.decisions.items()) if number not in shown]
@@ -75,7 +76,7 @@ def _line(number: int, decision: Decision) -> str:
     return buffer.getvalue()
 
 
-def _plot(episode: EpisodeData, report: EpisodeReport, recording: Recording) -> str:
+def plot(episode: EpisodeData, report: EpisodeReport, recording: Recording) -> str:
     """Positions of the hands and actions over time, with the frames of the findings shaded."""
     columns: Mapping[str, np.ndarray] = episode.columns
     positions = [name for number in range(2) if (name := f"{Names(number).arm}eef_pos") in columns]

@@ -65,11 +65,13 @@ def contact_sheet(
         figures: list[Markup] = []
         share = (LARGEST_PAGE - size) // (len(pools) - number_of_pool)
         for number, row in enumerate(islice(pool.rows(), images)):
-            entry = SheetEntry(row, [_moved(task, name, value) for name, value in row.shifted.items()])
+            entry = SheetEntry(row, [moved(task, name, value) for name, value in row.shifted.items()])
             if not remark:
                 try:
                     entry.picture, where = thumbnail(row.scene_xml, row.embodiment)
-                    entry.twin = thumbnail(_twin(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
+                    entry.twin = (
+                        thumbnail(twin_scene(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
+                    )
                     entry.strip = _strip(task, row) if number < films else ""
                 except render.NoPictures as error:
                     remark = str(error)
@@ -86,8 +88,12 @@ def contact_sheet(
     return remark
 
 
-def _twin(pool: Pool, task: Task, row: PoolRow) -> str:
-    """The scene of a scenario's training twin, made again from its seed and index."""
+def twin_scene(pool: Pool, task: Task, row: PoolRow) -> str:
+    """The scene of a scenario's training twin, made again from its seed and index.
+
+    Raises:
+        ScengenError: the family has changed since, so that it is another scenario.
+    """
     trained = task.draw(ID, row.seed, row.index, task.design(pool.manifest.config.sampler)).scenario
     if trained.id != row.id_twin:
         raise ScengenError(
@@ -103,7 +109,7 @@ def _strip(task: Task, row: PoolRow) -> str:
     return render.address(render.encode(film.strip(take, *STRIP)), "webp")
 
 
-def _moved(task: Task, name: str, value: float) -> str:
+def moved(task: Task, name: str, value: float) -> str:
     """Description of a moved parameter: `tile height 0.055 m (training 0.07 to 0.09)`."""
     named = name.replace(".", " ").replace("_", " ")
     return f"{named} {value:.4g} {_unit(task, name)} (training {spell(task.training[name])})".replace("  ", " ")

@@ -14,6 +14,7 @@ from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, OPERATOR, TELEOP, DemonstrationConfig
 from ..pool.row import DemonstrationRow
 from ..runs.journal import Journal, Record
+from ..samplers.split import ID
 from ..samplers.task import Draw, Task
 from ..validate.certify import Trial
 from ..validate.labels import made_with
@@ -35,22 +36,22 @@ MAX_LOST = 100
 class TeleopSettings:
     """Settings of `scengen teleop`; conf/command/teleop.yaml explains them."""
 
-    pool: str | None
-    id: str | None
-    split: str
-    sampler: str
-    seed: int
-    index: int
-    n: int
-    takes: int
-    limit: int | None
-    device: str
-    operator: str
-    to: str | None
-    view: bool | None
-    camera: str | None
-    width: int
-    height: int
+    pool: str | None = None
+    id: str | None = None
+    split: str = ID
+    sampler: str = "iid"
+    seed: int = SEED
+    index: int = 0
+    n: int = 10
+    takes: int = 10
+    limit: int | None = None
+    device: str = "gamepad"
+    operator: str = "op0"
+    to: str | None = None
+    view: bool | None = None
+    camera: str | None = None
+    width: int = 640
+    height: int = 480
 
     def check(self) -> None:
         """Raise `ScengenError` for settings that are not valid."""

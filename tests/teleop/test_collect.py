@@ -15,8 +15,6 @@ from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_de
 from scengen.pool.files import sha256
 from scengen.teleop.pad import read_events
 
-HERE = Path(__file__).parent
-
 
 def teleop(folder, *given, **changed):
     """Drive `domino_single` with a program; return the exit status."""

@@ -13,6 +13,8 @@ REST = 0.24
 CREEP = 0.12
 """Deflection beyond the dead zone that still moves the hand."""
 
+PUSH = 0.014
+"""Distance ahead of the hand that it is sent to while it pushes [m]: slowly, so that it can stop in time."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -123,7 +125,7 @@ class Domino(Hands):
         for _ in range(200):
             if self.tilt(tiles[0]) > 0.35:
                 break
-            yield self.towards(self.hand() + 0.03 * along)
+            yield self.towards(self.hand() + PUSH * along)
         yield from self.go(start - 0.04 * along + height)
         while True:
             yield {}

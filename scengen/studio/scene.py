@@ -1,0 +1,167 @@
+"""Scenes in three dimensions: bodies of MuJoCo as meshes in the browser, moved by their poses."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+
+from ..control.loop import Loop
+from ..episode import Actions, Episode
+from ..errors import PoolError
+from ..pictures.render import hide_hulls
+from ..scenario import Scenario
+from ..sim.world import World
+
+MAX_FACES = 2_000_000
+"""Largest number of triangles of a scene that is sent; a robot has 130 000."""
+SHOWN_GROUPS = 3
+"""Number of MuJoCo's geom groups that are shown, from 0: those of pictures."""
+STILL = 1e-5
+"""Smallest change of a pose that is sent [m, and of a quaternion]."""
+FRAME_PERIODS = 4
+"""Number of control periods between two frames: 25 frames a second."""
+Poses = NDArray[np.float32]
+"""Poses of all bodies, shape (bodies, 7): position [m], orientation wxyz."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """Poses of a rollout over time."""
+
+    frames: NDArray[np.float32]
+    """Poses, shape (frames, bodies, 7)."""
+    outcome: str
+    """What became of the episode, in words."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration [s]."""
+        return (len(self.frames) - 1) * FRAME_PERIODS * Loop.PERIOD
+
+
+def poses_of(world: World) -> Poses:
+    """Poses of all bodies now."""
+    return np.concatenate([world.data.xpos, world.data.xquat], axis=1).astype(np.float32)
+
+
+def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float) -> Film:
+    """Replay actions in a world, and keep the poses."""
+    world.reset()
+    episode, frames, told = Episode(scenario, world, horizon), [poses_of(world)], "no outcome"
+    for period, action in enumerate(actions, 1):
+        before = episode.outcome
+        if episode.step(action) != before:
+            told = f"{episode.outcome} at {world.time:.2f} s" + (f": {episode.reason}" if episode.reason else "")
+        if period % FRAME_PERIODS == 0:
+            frames.append(poses_of(world))
+    return Film(np.array(frames), told)
+
+
+class SceneView:
+    """The bodies of a world in the browser."""
+
+    def __init__(self, api: viser.SceneApi, root: str):
+        """
+        Args:
+            root: name of the node that holds everything, such as `/scene`.
+        """
+        self._api, self._root = api, root
+        self._frames: dict[int, viser.FrameHandle] = {}
+        self._sent: Poses | None = None
+
+    def show(self, world: World, offset: Iterable[float] = (0.0, 0.0, 0.0), robot: bool = True) -> None:
+        """Show a world in place of what was shown.
+
+        Args:
+            world: a world with visual geoms.
+            offset: position of its origin [m].
+            robot: whether to show the robot.
+
+        Raises:
+            PoolError: it has too many triangles.
+        """
+        hide_hulls(world.model)
+        meshes = {i: _meshes(world.model, i) for i in range(world.model.nbody) if robot or i not in world.own}
+        if (faces := sum(len(mesh.faces) for parts in meshes.values() for mesh, _ in parts)) > MAX_FACES:
+            raise PoolError(f"the scene has {faces} triangles; at most {MAX_FACES} are shown")
+        self.clear()
+        self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
+        poses = poses_of(world)
+        for body, parts in meshes.items():
+            if not parts:
+                continue
+            # Nodes have numbers for names: those of a stranger's bodies could hold anything, such as slashes.
+            self._frames[body] = self._api.add_frame(
+                f"{self._root}/{body}", show_axes=False, position=poses[body, :3], wxyz=poses[body, 3:]
+            )
+            for number, (mesh, colour) in enumerate(parts):
+                self._api.add_mesh_simple(
+                    f"{self._root}/{body}/{number}",
+                    np.asarray(mesh.vertices, np.float32),
+                    np.asarray(mesh.faces, np.uint32),
+                    color=np.round(255 * colour[:3]).astype(np.uint8),
+                    opacity=None if colour[3] >= 1.0 else float(colour[3]),
+                    flat_shading=True,
+                )
+        self._sent = poses
+
+    def move(self, poses: Poses) -> None:
+        """Move the bodies; those that stay are not sent."""
+        if self._sent is None or len(poses) != len(self._sent):
+            return
+        moved = np.flatnonzero(np.abs(poses - self._sent).max(axis=1) > STILL)
+        for body in moved.tolist():
+            if (frame := self._frames.get(body)) is not None:
+                frame.position, frame.wxyz = poses[body, :3], poses[body, 3:]
+        self._sent = poses.copy()
+
+    def clear(self) -> None:
+        """Show nothing."""
+        if self._sent is not None:
+            self._api.remove_by_name(self._root)
+        self._frames, self._sent = {}, None
+
+
+def _meshes(model: mujoco.MjModel, body: int) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
+    """The visible geoms of a body in its axes, joined by colour."""
+    found: dict[bytes, list[trimesh.Trimesh]] = {}
+    for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
+        material = int(model.geom_matid[geom])
+        colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+        if model.geom_group[geom] >= SHOWN_GROUPS or colour[3] == 0.0 or model.geom_rgba[geom][3] == 0.0:
+            continue
+        if (mesh := _mesh(model, geom)) is not None:
+            transform, turn = np.eye(4), np.zeros(9)
+            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+            transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
+            mesh.apply_transform(transform)
+            found.setdefault(np.round(colour, 3).astype(np.float32).tobytes(), []).append(mesh)
+    joined = ((trimesh.util.concatenate(parts), np.frombuffer(key, np.float32)) for key, parts in found.items())
+    return [(mesh, colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
+
+
+def _mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
+    """A geom in its own axes; None for one that cannot be shown, such as an endless plane."""
+    kinds, (a, b, c) = mujoco.mjtGeom, model.geom_size[geom]
+    match kinds(model.geom_type[geom]):
+        case kinds.mjGEOM_BOX:
+            return trimesh.creation.box((2 * a, 2 * b, 2 * c))
+        case kinds.mjGEOM_SPHERE:
+            return trimesh.creation.icosphere(3, a)
+        case kinds.mjGEOM_CYLINDER:
+            return trimesh.creation.cylinder(a, 2 * b, sections=32)
+        case kinds.mjGEOM_CAPSULE:
+            return trimesh.creation.capsule(2 * b, a, count=(16, 16))
+        case kinds.mjGEOM_ELLIPSOID:
+            return trimesh.creation.icosphere(3, 1.0).apply_scale((a, b, c))
+        case kinds.mjGEOM_MESH:
+            mesh = int(model.geom_dataid[geom])
+            vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+            faces = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]]
+            return trimesh.Trimesh(vertices.copy(), faces.copy(), process=False)
+        case _:
+            return None

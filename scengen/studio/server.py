@@ -1,0 +1,121 @@
+"""The web server of the studio: viser's, behind a token.
+
+viser has no hook for requests and answers everyone. Its server is therefore opened with `websockets.serve` replaced by
+one that asks for the token first. The token is the first part of every path: viser's page derives the address of its
+websocket from its own, so that requests of both kinds have it, without cookies, which other servers on this machine
+would see.
+"""
+
+import hmac
+import secrets
+from collections.abc import Awaitable, Callable, Mapping
+from http import HTTPStatus
+from typing import Any
+from unittest.mock import patch
+
+import viser
+import viser._messages
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+POLICY = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob: data:; "
+    "connect-src 'self' data: blob: ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""Content security policy. viser's page is one file that unpacks its own script, which needs the two `unsafe` words;
+what could run in spite of escaping still reaches no other host."""
+HEADERS = {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff", "Cache-Control": "no-store"}
+"""Further headers of every answer. The address holds the token, which must go to no other page."""
+SHARING = ("ShareUrlRequest", "ShareUrlDisconnect")
+"""Messages with which viser's page asks for a public tunnel; they are not answered."""
+Socket = Callable[[ServerConnection], Awaitable[None]]
+"""Function that serves a websocket."""
+
+
+def new_token() -> str:
+    """A token that cannot be guessed."""
+    return secrets.token_urlsafe(24)
+
+
+class Guard:
+    """Decides which requests are answered."""
+
+    def __init__(
+        self,
+        token: str,
+        sockets: Mapping[str, Socket] | None = None,
+        scripts: Mapping[str, bytes] | None = None,
+        page: Callable[[bytes], bytes] = lambda page: page,
+    ):
+        """
+        Args:
+            sockets: functions for websockets of our own, by their paths.
+            scripts: contents of scripts of our own, by their paths.
+            page: changes the page that viser serves.
+        """
+        self._token, self._sockets, self._scripts, self._page = token.encode(), sockets or {}, scripts or {}, page
+
+    def serve(self, handler: Socket, host: str, port: int, **options: Any) -> Any:
+        """`websockets.serve` with the guard before viser's functions."""
+        answer = options.pop("process_request")
+
+        def guarded(connection: ServerConnection, request: Request) -> Response | None:
+            if not self.admits(request):
+                return _answer(HTTPStatus.FORBIDDEN)
+            if request.headers.get("Upgrade", "").lower() == "websocket":
+                return None
+            path = request.path.partition("?")[0]
+            if path in self._scripts:
+                return _answer(HTTPStatus.OK, self._scripts[path], {"Content-Type": "application/javascript"} | HEADERS)
+            is_page = path == "/"
+            if is_page:  # it is changed below, which is simpler before it is packed
+                del request.headers["Accept-Encoding"]
+            response = answer(connection, request)
+            if is_page:
+                response.body = self._page(response.body)
+                del response.headers["Content-Length"]
+                response.headers["Content-Length"] = str(len(response.body))
+            response.headers["Content-Security-Policy"] = POLICY.format(host=request.headers.get("Host", ""))
+            for name, value in HEADERS.items():
+                response.headers[name] = value
+            return response
+
+        async def served(connection: ServerConnection) -> None:
+            path = connection.request.path if connection.request else "/"
+            await self._sockets.get(path, handler)(connection)
+
+        return _serve(served, host, port, process_request=guarded, **options)
+
+    def admits(self, request: Request) -> bool:
+        """Whether a request has the token and comes from the studio's own page; then its path loses the token."""
+        _, _, rest = request.path.partition("/")
+        given, slash, path = rest.partition("/")
+        given = given.partition("?")[0] if not slash else given
+        if not hmac.compare_digest(given.encode("utf-8", "replace"), self._token):
+            return False
+        origin = request.headers.get("Origin")
+        if origin is not None and origin != f"http://{request.headers.get('Host')}":
+            return False
+        request.path = f"/{path}"
+        return True
+
+
+_serve = websockets.asyncio.server.serve
+
+
+def _answer(status: HTTPStatus, body: bytes = b"", headers: Mapping[str, str] | None = None) -> Response:
+    told = {"Content-Length": str(len(body)), "Connection": "close", **(headers or {})}
+    return Response(status, status.phrase, Headers(told), body)
+
+
+def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
+    """Open the server; the next free port is taken if this one is in use."""
+    replaced = patch.object(websockets.asyncio.server, "serve", guard.serve)
+    with replaced, patch("rich.print"):  # viser would print an address without the token
+        server = viser.ViserServer(host, port, label="scengen studio", verbose=False)
+    for name in SHARING:
+        server._websock_server.unregister_handler(getattr(viser._messages, name))
+    return server

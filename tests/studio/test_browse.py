@@ -1,0 +1,146 @@
+"""Browsing in a real browser: scenarios, twins, films; a hostile pool shows its texts and runs nothing."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from helpers import REFERENCE
+from pools import make, rewritten
+from studios import running
+
+from scengen.analysis.redraw import task_of
+from scengen.pool import Pool
+
+pytestmark = pytest.mark.slow  # a browser that draws in software takes minutes on two cores
+
+PAYLOADS = [
+    "<script>window.hacked=1</script>",
+    "<img src=x onerror='window.hacked=1'>",
+    "<svg/onload=window.hacked=1>",
+    "<iframe srcdoc='<script>parent.hacked=1</script>'></iframe>",
+    "</div></p><style>*{display:none}</style>",
+    "{{ 7*7 }}{% raw %}${window.hacked=1}",
+    "[x](javascript:window.hacked=1) ![x](x onerror=hacked=1)",
+    '"><a href="javascript:window.hacked=1" autofocus onfocus="window.hacked=1">x</a>',
+]
+"""Texts that would run a script in a careless page."""
+
+
+def corpus_texts():
+    """All texts with markup in the sources of the checker's corpus."""
+    found = set()
+    for path in (Path(__file__).parents[1] / "checker").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 500:
+                if set("<>&\x1b\u202e{}") & set(node.value):
+                    found.add(node.value)
+    return sorted(found)
+
+
+def content_of(*folders):
+    from scengen.studio.app import Content
+    from scengen.studio.browse import Shelf
+
+    pools = [Pool.open(folder).check() for folder in folders]
+    return Content(Shelf(pools, {str(pool.folder): task_of(pool) for pool in pools}))
+
+
+@pytest.fixture(scope="module")
+def shifted(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pool") / "wide"
+    make(folder, "split=wide_gaps", n=2)
+    return folder
+
+
+def test_browse_play_scrub_find_and_see_the_twin(chromium, opened, shifted, tmp_path):
+    with running(content_of(REFERENCE, shifted)) as studio:
+        tab = opened(studio.address)
+        page = tab.page
+        page.wait_for_selector(".studio-scenario")
+        first, *_, last = Pool.open(REFERENCE).names()
+        assert str(first) in tab.text() and "a scenario of training: nothing was moved" in tab.text()
+        assert f"scengen try task=domino_single split=id seed=0 index={first.index}" in tab.text()
+        page.get_by_text("witness: success at").wait_for()
+        tab.press("play")
+        tab.wait(lambda: tab.time() > 0.3, "a film that plays")
+        tab.press("pause")
+        tab.wait(tab.rested, "a film that stands")
+        assert 0 < tab.time() < 5
+        tab.press("start")
+        tab.wait(lambda: tab.time() == 0, "the start")
+        page.locator("[role=slider]").first.focus()
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+        tab.wait(lambda: abs(tab.time() - 0.2) < 1e-6, "a time that was scrubbed to")
+        (client,) = studio.server.get_clients().values()
+        browser = studio._pages[client.client_id].browser
+        browser._find.value = last.id
+        page.get_by_text(str(last)).first.wait_for()
+        browser._pool.value = browser._pool.options[1]
+        page.get_by_text("moved out of training").wait_for()
+        assert "tile" in tab.text() or "gap" in tab.text()
+        assert "(training" in tab.text()
+        tab.wait(lambda: browser._label is not None, "a training twin")
+        assert len(browser._twin._frames) < len(browser._view._frames)  # a twin has no robot
+        page.wait_for_timeout(3000)
+        page.screenshot(path=str(tmp_path / "browse.png"))
+        browser._what.value = browser._what.options[1]
+        browser._run(browser._play)
+        page.get_by_text(f"{browser._what.value}: ").wait_for()
+        assert not tab.faults
+
+
+def test_two_tabs_look_at_different_scenarios_and_a_reload_starts_again(chromium, opened):
+    with running(content_of(REFERENCE)) as studio:
+        one, other = opened(studio.address), opened(studio.address)
+        names = [str(name) for name in Pool.open(REFERENCE).names()]
+        for tab in (one, other):
+            tab.page.get_by_text(names[0]).first.wait_for()
+        other.press("next")
+        other.page.get_by_text(names[1]).first.wait_for()
+        assert names[1] not in one.text() and names[0] in one.text()
+        studio.server._websock_server.disconnect_all_clients()  # a lost connection: the pages come back by themselves
+        for tab in (one, other):
+            tab.page.get_by_text(names[0]).first.wait_for()
+        one.page.reload()
+        one.page.get_by_text(names[0]).first.wait_for()
+        assert not one.faults and not other.faults
+
+
+@pytest.mark.parametrize("texts", [PAYLOADS, corpus_texts()], ids=["payloads", "corpus"])
+def test_a_hostile_pool_runs_no_script(chromium, opened, tmp_path, texts):
+    import shutil
+
+    folder = Path(shutil.copytree(REFERENCE, tmp_path / "hostile"))
+    joined = " ".join(texts)[:20_000]
+
+    def change(row):
+        checks = tuple(replace(check, reason=joined[:900]) for check in row.certificate.checks)
+        scene = row.scene_xml
+        for number, text in enumerate(texts[:6]):
+            name = text.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;").replace("\x1b", "")
+            scene = scene.replace(f'"tile_{number}"', f'"{name}"')
+        certificate = replace(row.certificate, checks=checks)
+        return replace(row, instruction=joined, certificate=certificate, scene_xml=scene)
+
+    rewritten(folder, change)
+    with running(content_of(folder)) as studio:
+        tab = opened(studio.address)
+        tab.page.wait_for_selector(".studio-scenario, [role=alert]")
+        tab.page.wait_for_timeout(4000)
+        assert tab.page.evaluate("window.hacked") is None and not tab.faults
+        shown = tab.page.locator("[role=alert], .studio-scenario").first
+        assert shown.is_visible()
+        assert not tab.page.locator(".studio-scenario img, .studio-scenario script, .studio-scenario iframe").count()
+        assert not tab.page.locator(".studio-scenario svg, .studio-scenario a, .studio-scenario style").count()
+        tab.page.screenshot(path=str(tmp_path / "hostile.png"))
+
+
+def test_the_negative_control_of_the_payloads(chromium):
+    """The same texts run in a page that does not escape them."""
+    page = chromium.new_page()
+    page.set_content(f"<html><body>{PAYLOADS[1]}</body></html>")
+    page.wait_for_timeout(500)
+    assert page.evaluate("window.hacked") == 1
+    page.close()

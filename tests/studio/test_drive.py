@@ -1,0 +1,152 @@
+"""Driving in a real browser: a scripted gamepad solves a scenario, a lost browser pauses, strangers cannot drive."""
+
+import asyncio
+import json
+import time
+
+import pytest
+
+pytest.importorskip("viser", reason="no viser; it is in the extra studio")
+
+import websockets.exceptions
+import websockets.sync.client
+from helpers import REFERENCE
+from pads import Domino
+from studios import running
+
+from scengen import cli
+from scengen.commands.teleop import source_of_pool
+from scengen.pool import Pool
+from scengen.pool.demonstrations import Demonstrations
+from scengen.pool.untrusted import Malformed
+from scengen.studio.app import Content
+from scengen.studio.driving import BrowserPad, Driver, _event
+from scengen.teleop.collect import TeleopSettings
+from scengen.teleop.pad import PadEvent
+from scengen.teleop.session import ENDED, PAUSED, READY
+
+FAKE_PAD = """
+window.pad = {mapping: "standard", connected: true, axes: [0, 0, 0, 0],
+              buttons: Array.from({length: 17}, () => ({value: 0}))};
+navigator.getGamepads = () => [window.pad];
+"""
+"""A gamepad that the test moves."""
+BUTTONS = ["a", "b", "x", "y", "leftshoulder", "rightshoulder", "lefttrigger", "righttrigger", "back", "start"]
+AXES = ["leftx", "lefty", "rightx", "righty"]
+
+
+def content_of(folder, n=1):
+    pool = Pool.open(REFERENCE)
+    settings = TeleopSettings(device="browser", n=n, operator="op3", to=str(folder))
+    return Content(shelf=None, driver=Driver(source_of_pool(pool, (), None), settings))
+
+
+def wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it does not come to that"
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    "message",
+    ["", "[]", '["leftx"]', '["leftx", 2]', '["lefx", 0.5]', '["leftx", "1"]', '["a", 0.5]', '["a", true]', "[" * 90,
+     '["leftx", NaN]', '["leftx", 0.5' + " " * 100 + "]", '{"leftx": 1}'],
+)  # fmt: skip
+def test_a_message_that_is_no_event_is_refused(message):
+    with pytest.raises((Malformed, Exception)) as refused:
+        _event(message)
+    assert not isinstance(refused.value, (RecursionError, MemoryError))
+
+
+def test_the_first_browser_plugs_the_pad_in_and_the_last_one_out():
+    pad = BrowserPad()
+    pad.begin()
+    assert pad.read(None) == [PadEvent("connected", 0.0)]
+
+    class Connection:
+        async def __aiter__(self):
+            yield '["leftx", 0.5]'
+            yield '["a", 1]'
+
+    asyncio.run(pad.serve(Connection()))
+    events = pad.read(None)
+    assert events[:3] == [PadEvent("connected", 1.0), PadEvent("leftx", 0.5), PadEvent("a", 1.0)]
+    assert PadEvent("leftx", 0.0) in events and events[-1] == PadEvent("connected", 0.0)
+
+
+def test_pads_over_the_websocket_drive_and_a_lost_one_pauses(tmp_path):
+    with running(content_of(tmp_path / "driven")) as studio:
+        driver = studio.content.driver
+        port = studio.server.get_port()
+        wait_for(lambda: driver.session is not None)
+        assert not len(driver.session.actions)
+        address, origin = f"ws://127.0.0.1:{port}/{studio.token}/pad", f"http://127.0.0.1:{port}"
+        with websockets.sync.client.connect(address, origin=origin) as pad:
+            wait_for(lambda: driver.session.pad["connected"])
+            if driver.session.phase != READY:
+                for value in (1, 0):
+                    pad.send(json.dumps(["start", value]))
+            pad.send(json.dumps(["lefty", -1]))
+            wait_for(lambda: len(driver.session.actions) > 30)
+        wait_for(lambda: driver.session.phase == PAUSED)
+        assert "unplugged" in driver.session.message
+        for path in ("/pad", f"/{studio.token[:-1]}/pad"):
+            with pytest.raises(websockets.exceptions.InvalidStatus):
+                websockets.sync.client.connect(f"ws://127.0.0.1:{port}{path}", origin=origin)
+        with websockets.sync.client.connect(address, origin=origin) as stranger:
+            stranger.send('["leftx", 7]')
+            with pytest.raises(websockets.exceptions.ConnectionClosed):
+                stranger.recv(timeout=20)
+    assert not len(Demonstrations.open(tmp_path / "driven"))
+
+
+@pytest.mark.slow
+def test_a_scripted_gamepad_in_the_browser_solves_a_scenario(chromium, opened, tmp_path):
+    """The program sees the state line alone, and its events go through the Gamepad API of the page."""
+    folder = tmp_path / "driven"
+    with running(content_of(folder)) as studio:
+        driver = studio.content.driver
+        tab = opened(studio.address, FAKE_PAD, (400, 300))  # small pictures leave the time to drive
+        page = tab.page
+        page.wait_for_selector(".studio-line")
+        tab.wait(lambda: bool(driver.session.pad["connected"]), "a pad")
+        page.screenshot(path=str(tmp_path / "drive.png"))
+        program, session, seen = Domino(), driver.session, -1
+        while not solved(driver):
+            if driver.session is not session:
+                program, session, seen = Domino(), driver.session, -1
+            if session.phase == PAUSED:
+                press(page, "start")
+            elif session.ticks == seen:
+                page.wait_for_timeout(5)  # a program acts once in a control period
+            elif (events := program.read(session.line)) is not None:
+                seen = session.ticks
+                for event in events:
+                    put(page, event)
+            elif session.phase == ENDED:
+                page.screenshot(path=str(tmp_path / "ended.png"))
+                press(page, "start")
+            else:
+                page.wait_for_timeout(50)
+        assert not tab.faults
+    assert cli.run(["verify", f"pool={folder}"]) == 0
+    (row,) = Demonstrations.open(folder).rows()
+    assert row.outcome == "success" and Demonstrations.open(folder).manifest.operator == "op3"
+
+
+def solved(driver):
+    return any("success" in line for line in driver.told)
+
+
+def put(page, event):
+    if event.control in AXES:
+        page.evaluate(f"window.pad.axes[{AXES.index(event.control)}] = {event.value}")
+    elif event.control in BUTTONS:
+        page.evaluate(f"window.pad.buttons[{BUTTONS.index(event.control)}].value = {event.value}")
+
+
+def press(page, control):
+    for value in (1.0, 0.0):
+        put(page, PadEvent(control, value))
+        page.wait_for_timeout(60)
