@@ -45,6 +45,7 @@ APART = {
     "scengen stats": "the recording is not made",
     "scengen evaluate policy=ws://": "needs a server of policies",
     "scengen evaluate policy=zmq://": "needs a server of policies",
+    "scengen studio": "runs until it is interrupted",
     "scengen probe": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
