@@ -28,6 +28,7 @@ demo: setup
 OOD_TASKS := sheltered_grasp pendulum_grasp domino_single tool_retrieve occluder_push slip_recovery balance_medium keyboard_typing
 OOD_SPLITS := opposite_side plane_45 diagonal mirrored_hook stacked_lids two_slips turned unseen_words
 ci:
+	@sh tools/chromium.sh
 	$(MAKE) check
 	$(MAKE) test
 	$(MAKE) slow
