@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample axes attacks drift docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample axes attacks drift baselines docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -115,12 +115,18 @@ VERSIONS ?= 3.5.0,4.0.0
 drift: setup
 	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
 
+# Trains and evaluates small policies and writes docs/baselines.md (about 10 minutes of processor time for each task). TASKS=packing
+# selects tasks. An interrupted call is continued.
+baselines: setup
+	$(BIN)/python tools/baselines.py $(TASKS)
+
 # Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
 docs: setup
 	$(BIN)/python tools/api_page.py
 	$(BIN)/python tools/paper_page.py
 	$(BIN)/python tools/cluster_page.py
 	$(BIN)/python tools/all_axes.py page
+	$(BIN)/python tools/baselines.py page
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # Writes README, docs, axis cards and reports as HTML into SITE.

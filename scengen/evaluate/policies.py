@@ -21,7 +21,7 @@ from ..envs.gym import Observation, PoolEnv
 from ..episode import Actions
 from ..errors import BadConfig, GaveUp, ScengenError, UnknownName, cut
 from ..learn.player import TrainedPolicy
-from ..learn.store import StoredPolicy, is_policy
+from ..learn.store import StoredPolicy
 from ..params import Value
 from ..pool.library import Library
 from ..samplers.task import Task
@@ -163,7 +163,7 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
         return lambda env: NearestReplay(env, memory)
     if name in BUILT_IN:
         return BUILT_IN[name]
-    if is_policy(name):
+    if Path(name).is_dir():
         return partial(TrainedPolicy, StoredPolicy.open(name))
     if client is not None and is_address(name):
         return lambda env: RemotePolicy(env, name, client)

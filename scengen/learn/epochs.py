@@ -9,6 +9,7 @@ import math
 import time
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,15 +113,16 @@ class Training:
         number = len(self.losses)
         random = np.random.default_rng(int(2**31 * unit("noise", self._seed, number)))
         inputs, chunks = _augmented(self.kind, self.learned, random)
-        network = MLPRegressor(
-            hidden_layer_sizes=self.hidden,
-            alpha=DECAY,
-            batch_size=min(BATCH, len(inputs)),
-            learning_rate_init=FIRST_RATE * 0.5 * (1.0 + math.cos(math.pi * min(1.0, self.share))),
-            max_iter=1,
-            warm_start=True,
-            random_state=int(2**31 * unit("epoch", self._seed, number)),
-        )
+        options: dict[str, Any] = {
+            "hidden_layer_sizes": self.hidden,
+            "alpha": DECAY,
+            "batch_size": min(BATCH, len(inputs)),
+            "learning_rate_init": FIRST_RATE * 0.5 * (1.0 + math.cos(math.pi * self.share)),
+            "max_iter": 1,
+            "warm_start": True,
+            "random_state": int(2**31 * unit("epoch", self._seed, number)),
+        }
+        network = MLPRegressor(**options)
         with threadpool_limits(1), warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was asked for
             if self.arrays:

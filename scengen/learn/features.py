@@ -9,6 +9,7 @@ into noise.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,8 @@ class Features:
         return np.hstack([scaled[np.maximum(rows - step, 0)] for step in range(self.steps)]).astype(np.float32)
 
 
-def _quaternions(entries: Sequence[str]) -> list[int]:
+@cache
+def _quaternions(entries: tuple[str, ...]) -> list[int]:
     """Places at which a quaternion begins."""
     names = [name.rpartition(".") for name in entries]
     return [
@@ -74,7 +76,7 @@ def _quaternions(entries: Sequence[str]) -> list[int]:
 
 def number_names(entries: Sequence[str]) -> tuple[str, ...]:
     """Names of the numbers that entries become: those of a quaternion end in `.rot0` to `.rot5`."""
-    starts, found, i = set(_quaternions(entries)), list[str](), 0
+    starts, found, i = set(_quaternions(tuple(entries))), list[str](), 0
     while i < len(entries):
         if i in starts:
             found += [f"{entries[i].rpartition('.')[0]}.rot{k}" for k in range(ROTATION)]

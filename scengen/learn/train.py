@@ -39,7 +39,7 @@ class TrainSettings:
     chunk: int = 8
     played: int = 4
     hidden: list[int] = field(default_factory=lambda: [256, 256])
-    epochs: int = 40
+    epochs: int = 20
     minutes: float | None = None
     seed: int = 0
 

@@ -142,6 +142,11 @@ def test_a_policy_of_another_task_or_other_bodies_is_refused(mine, tmp_path):
         played(mine, tmp_path / "b")
 
 
+def test_a_folder_without_a_policy_is_one_line(tmp_path):
+    with pytest.raises(PoolError, match=r"no policy at .*policy\.json is missing; see scengen train"):
+        find_policy(str(tmp_path))
+
+
 # --- features -----------------------------------------------------------------------------------------
 
 QUAT = tuple(f"cube_quat.{part}" for part in "xyzw")

@@ -1,0 +1,137 @@
+"""Train and evaluate small policies, and write docs/baselines.md: `python tools/baselines.py [task ...]`
+
+`python tools/baselines.py page` writes the page alone. Pools, demonstrations and policies are made in
+generated/baselines, results are stored in records/baselines. A repeated call continues.
+"""
+
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from scengen import cli
+from scengen.learn.models import BC, KNN, MIP
+from scengen.learn.store import read_settings
+from scengen.pool import Pool
+from scengen.samplers.split import ID
+from scengen.statistics import rate
+
+AXES = {
+    "domino_single": ("diagonal", "stout_starter"),
+    "mirror_pick_place": ("small", "far"),
+    "tool_retrieve": ("mirrored_hook", "long_handle"),
+    "seesaw_balance": ("turned", "weight_beyond"),
+    "pick_place_ycb": ("far_jumps", "unseen_item"),
+    "pendulum_grasp": ("plane_45", "wide_swing"),
+}
+"""Axes on which the policies of a task are evaluated."""
+POLICIES = (BC, MIP, KNN)
+"""Trained policies."""
+REPLAY = "replay"
+"""Policy that replays the witness of the nearest other training scenario."""
+SCENARIOS = 20
+"""Number of scenarios of each split."""
+DEMONSTRATIONS = 200
+"""Number of demonstrations of each task, held-out ones included."""
+MADE = Path("generated/baselines")
+"""Folder of pools, demonstrations and policies."""
+RECORDS = Path("records/baselines")
+"""Folder of the results, one file for each task."""
+PAGE = Path("docs/baselines.md")
+HEAD = f"""# Baselines
+
+Written by `make baselines`: success rates of small policies that `scengen train` trains with default settings on
+{DEMONSTRATIONS} demonstrations (`scengen demos`, default styles), on {SCENARIOS} certified scenarios of each split.
+
+**What these figures may not be compared with.** The policies read poses of all bodies and of the hand. The paper's
+policies see pictures, which is a harder problem. A low rate on an axis says that this policy does not transfer, not
+that none can: the oracle solves every scenario, and doing nothing solves none; otherwise it would not be certified.
+
+* **bc**, **mip**, **knn**: see [Training](policies.md#training). They are deterministic: each scenario is played once.
+* **replay**: the witness of the nearest other training scenario, played without looking: the success of pure memory.
+* Brackets: 95 % Wilson interval. **why not**: the most frequent reasons of failures.
+
+"""
+COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
+
+
+def main(*tasks: str) -> None:
+    """Train and evaluate on all tasks, or some, and write the page."""
+    if tasks != ("page",):
+        for task in tasks or AXES:
+            measure(task)
+    PAGE.write_text(page())
+
+
+def measure(task: str) -> None:
+    """Make what is missing for a task, and store its results after each policy."""
+    folder, splits = MADE / task, (ID, *AXES[task])
+    pools = [folder / split for split in splits]
+    for split, pool in zip(splits, pools, strict=True):
+        if not (pool / "manifest.json").is_file():
+            run("generate", f"task={task}", f"split={split}", f"n={SCENARIOS}", f"pool={pool}")
+    demos, data = folder / "demos", folder / "recording"
+    if not data.exists():
+        run("demos", f"task={task}", f"n={DEMONSTRATIONS}", f"to={demos}", f"apart=[{','.join(map(str, pools))}]")
+        run("record", f"pool={demos}", f"to={data}", "cameras=none")
+    found: list[dict[str, Any]] = []
+    RECORDS.mkdir(parents=True, exist_ok=True)
+    for policy in (*POLICIES, REPLAY):
+        trained = folder / policy
+        if policy in POLICIES:
+            run("train", f"policy={policy}", f"data={data}", f"to={trained}")
+        played = folder / f"{policy}-evaluation"
+        name, pooled = str(trained) if policy in POLICIES else policy, ",".join(map(str, pools))
+        run("evaluate", f"policy={name}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={played}")
+        found += _results(task, policy, trained, played, dict(zip(map(str, pools), splits, strict=True)))
+        lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in found)
+        (RECORDS / f"{task}.jsonl").write_text(lines)
+
+
+def run(*argv: str) -> None:
+    """Run a command of scengen; its failure ends the tool."""
+    if cli.run(list(argv)):
+        sys.exit(f"scengen {' '.join(argv)} failed")
+
+
+def _results(task: str, policy: str, trained: Path, played: Path, splits: dict[str, str]) -> list[dict[str, Any]]:
+    """One record for each split."""
+    told: dict[str, Any] = {"task": task, "policy": policy}
+    if policy in POLICIES:
+        own = read_settings(trained)
+        names = ("demonstrations", "rows", "epochs", "data_sha256", "weights_sha256")
+        told |= {name: getattr(own, name) for name in names}
+    episodes = [json.loads(line) for line in (played / "episodes.jsonl").read_text().splitlines()[1:]]
+    records = []
+    for pool, split in splits.items():
+        own = [episode for episode in episodes if episode["pool"] == pool]
+        reasons = Counter(episode["reason"] for episode in own if not episode["success"])
+        counts = {"scenarios": len(own), "solved": sum(episode["success"] for episode in own), "reasons": dict(reasons)}
+        records.append({**told, "split": split, "pool_sha256": Pool.open(pool).sha256, **counts})
+    return records
+
+
+def page() -> str:
+    """The whole page, from the records."""
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    for task in AXES:
+        path = RECORDS / f"{task}.jsonl"
+        records = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
+        order = {split: k for k, split in enumerate((ID, *AXES[task]))}
+        lines += [_line(record) for record in sorted(records, key=lambda record: order[record["split"]])]
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def _line(record: dict[str, Any]) -> str:
+    solved, count = record["solved"], record["scenarios"]
+    interval = rate([[True]] * solved + [[False]] * (count - solved))
+    frequent = sorted(record["reasons"].items(), key=lambda item: -item[1])[:2]
+    why = "; ".join(f"{number} x {reason}" for reason, number in frequent)
+    shown = f"{100 * interval.value:.0f} [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
+    task = f"[{record['task']}](tasks/{record['task']}.md)"
+    return f"| {task} | {record['split']} | {record['policy']} | {solved} of {count} | {shown} | {why} |"
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
