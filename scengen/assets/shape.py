@@ -9,7 +9,8 @@ Two convex bodies touch in one plane. At the slope of the frustum that plane is 
 friction can hold. Any flatter plane touches only the tip, on which a flat face balances and does not stand.
 
 The shapes stand on small spheres, their feet: MuJoCo gives two convex geoms one point of contact, and a flat face on
-one point rocks. The ring of feet is so narrow that a shape can overhang the face below it.
+one point rocks. The ring of feet is so narrow that all of them stand on any other shape of a similar width, whichever
+way it is turned: where a foot hangs beside a face, the single contact of the two faces bears, and the pile trembles.
 """
 
 import math
@@ -45,10 +46,11 @@ TIP_RADIUS = 0.0001
 MIN_COLLAR = 0.004
 """Smallest height of the collar, the straight foot of the frustum, by which a jaw holds it [m]. A slope slips out of
 parallel pads unless the friction exceeds the tangent of its angle to them."""
-MAX_FEET = 4
-"""Largest number of feet. A shape with corners has one foot for each corner, or for every second one."""
-FOOT_RING = 0.65
-"""Radius of the ring of feet, as a share of that of the outline."""
+MAX_FEET = 6
+"""Largest number of feet. A shape with corners has one foot for each corner, a round one below every fourth."""
+FOOT_RING = 0.45
+"""Radius of the ring of feet, as a share of that of the outline. A triangular prism is half as wide across its sides as
+over its corners, so that 0.5 is the most for two alike."""
 BEECH_DENSITY = 700.0
 """Density of beech [kg/m^3]."""
 COLOURS: tuple[Rgba, ...] = (

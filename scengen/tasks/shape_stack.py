@@ -9,27 +9,30 @@ Bottleneck: every shape must stand on the one below, with its centre of mass ove
 frustum: its slope is steeper than friction holds, and its upper face is smaller than any hand is exact. So it must come
 last, and each other shape must be placed over the middle of the one below.
 
-Decisions where the paper (App. B, T30) is silent:
+The shapes are a subset of the paper's five, each at most once: cube, cylinder, hexagonal and triangular prism, cone
+frustum. Decisions where the paper (App. B, T30) is silent:
 
 * A stack has one shape on each. Two shapes beside each other on a third, which a wide one supports, are no stack.
-* All shapes stand on a flat face at the start, and one of them is a frustum; two could not both be on top.
+* All shapes stand on a flat face at the start. The frustum is always among them: without it any order would do.
 * The frustum has a straight foot for the jaw and ends in a tip: with a wide face it would be a base like any other.
-* A shape that is released and topples loses the episode. Otherwise a policy could try what stands on what, or lay the
-  frustum on its side, where two of its faces are parallel enough.
+* A shape that is released and topples loses the episode, and so does one that is set on the frustum, in the hand or
+  not. Otherwise a policy could try what stands on what: a jaw that opens by 3 mm feels a shape lean on it, and closes
+  again. Or it could lay the frustum on its side, where two of its faces are parallel enough.
 * Chance: the shape at one fixed place is the right one for the top in a third of training.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
-from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, Shape
+from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, TRIANGLE, Shape
 from ..geometry import UP, Vec3, about_z
 from ..params import check_bounds, param
 from ..predicates import fallen, still
@@ -55,45 +58,57 @@ CARRY_PACE = Pace(0.30, 0.008)  # pace of the move above the pile to the next sh
 
 
 @dataclass(frozen=True, kw_only=True)
-class Piece:
-    """A shape and its pose at the start."""
+class Place:
+    """A place for a shape at the start."""
 
     x: float = param(-0.16, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
-    shape: Shape = Shape()
 
     def __post_init__(self) -> None:
         check_bounds(self)
 
     @property
     def spot(self) -> Vec3:
-        """Initial position of the shape's foot [m]."""
+        """Position of the foot of a shape that stands here [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
+
+
+class Piece(NamedTuple):
+    """A shape at its place."""
+
+    place: Place
+    shape: Shape
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShapeStack(Scenario):
-    """Three to five shapes on the table."""
+    """Three to five of the paper's five shapes on the table."""
 
     HOLD = 1.0
     NO_ABLATIONS = "every shape is part of what is asked for: none can be taken away"
 
-    count: int = param(4, "", 3, 5)  # number of shapes: the cone, and pieces from the first one on
-    cone_at: int = param(1, "", 0, 4)  # index of the piece whose place the cone takes
+    count: int = param(4, "", 3, 5)  # number of shapes: the cone, and others from the first place on
+    cone_at: int = param(1, "", 0, 4)  # index of the cone's place
+    deal: int = param(0, "", 0, 23)  # index of the permutation of the other four shapes over the other places
+    perched: int = param(0, "", 0, 1)  # 1: the cone starts on the widest shape, and its place is free
     cone: Shape = Shape(kind=FRUSTUM, width=0.042, height=0.041)
-    a: Piece = Piece(y=0.19)
-    b: Piece = Piece()
-    c: Piece = Piece(y=-0.19, shape=Shape(kind=CYLINDER))
-    d: Piece = Piece(x=0.03, y=0.10, shape=Shape(kind=HEXAGON))
-    e: Piece = Piece(x=0.03, y=-0.10)
+    cube: Shape = Shape()
+    cylinder: Shape = Shape(kind=CYLINDER)
+    hexagon: Shape = Shape(kind=HEXAGON)
+    prism: Shape = Shape(kind=TRIANGLE, width=0.050)
+    a: Place = Place(y=0.19)
+    b: Place = Place()
+    c: Place = Place(y=-0.19)
+    d: Place = Place(x=0.03, y=0.10)
+    e: Place = Place(x=0.03, y=-0.10)
 
     # --- scene ----------------------------------------------------------------------------
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
         for name, piece in self.pieces.items():
-            place(scene, piece.shape, name, piece.spot, math.radians(piece.yaw))
+            place(scene, piece.shape, name, self.foot(name), math.radians(piece.place.yaw))
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -112,14 +127,28 @@ class ShapeStack(Scenario):
     def failure(self, world: World) -> str | None:
         if fallen(world, *self.pieces):
             return "a shape fell off the table"
+        if self.cone_tried(world):
+            return Strict("a shape was set on the cone")
         toppled = (n for n in self.pieces if world.tilt(n) > FALL_ANGLE and not world.touching(ROBOT, n))
         return Strict("a shape toppled") if next(toppled, None) else None
+
+    def cone_tried(self, world: World) -> bool:
+        """Whether another shape is on the cone, held or not: it touches the cone with its foot above the collar."""
+        cone = self.order[-1]
+        above = world.pos(cone)[2] + self.cone.collar
+        return any(world.pos(n)[2] > above for n in world.touching_bodies(cone) & self.pieces.keys())
 
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
         """Leave the widest shape in place, stack the others on it, wider ones first and the cone last."""
-        yield from self.pile(world, self.order)
+        *flat, cone = self.order
+        if self.perched:
+            yield from self.take(world, cone)
+            free = self.pieces[cone].place.spot + world.com(cone) - world.pos(cone)
+            yield from put(world.arm, cone, free, on="table", hover=self.lift_height(world, cone))
+            yield from retreat(world.arm, self.lift_height(world, flat[0]))
+        yield from self.pile(world, [*flat, cone])
 
     def pile(self, world: World, order: Sequence[str], offset: float = 0.0) -> Plan:
         """Put each shape on the one before it, with its middle offset from the other's towards the robot [m]."""
@@ -200,13 +229,13 @@ class ShapeStack(Scenario):
             if shape.pointed:
                 held = shape.collar - self.grip_height(shape) + PAD_BELOW
             yield require(held >= needed, "the jaw cannot hold the cone by its collar", held=held, needed=needed)
-        yield on_table("a shape", [piece.spot for piece in pieces], margin=0.05)
-        away = min(math.dist(one.spot, other.spot) for one, other in combinations(pieces, 2))
+        yield on_table("a shape", [piece.place.spot for piece in pieces], margin=0.05)
+        away = min(math.dist(one.place.spot, other.place.spot) for one, other in combinations(pieces, 2))
         needed = PALM_ALONG + max(piece.shape.reach for piece in pieces) + MIN_CLEARANCE
         yield require(away >= needed, "the hand has no room beside the pile", away=away, needed=needed)
         tower = sum(piece.shape.height for piece in pieces) * UP
-        base = self.pieces[self.order[0]].spot
-        yield within_reach("a shape or the top of the pile", base + tower, *(piece.spot for piece in pieces))
+        base = self.pieces[self.order[0]].place.spot
+        yield within_reach("a shape or the top of the pile", base + tower, *(piece.place.spot for piece in pieces))
 
     def features(self) -> Mapping[str, float]:
         """Slenderness, height [m] and least friction of the stack, number of its joints."""
@@ -232,16 +261,28 @@ class ShapeStack(Scenario):
     @cached_property
     def pieces(self) -> dict[str, Piece]:
         """Pieces of the scene, by names that are independent of shapes and places."""
-        places = [piece for field in fields(self) if isinstance(piece := getattr(self, field.name), Piece)]
-        cone = places.pop(self.cone_at)
-        found = places[: self.count - 1]
-        found.insert(self.cone_at, replace(cone, shape=self.cone))
+        places, dealt = [self.a, self.b, self.c, self.d, self.e], list(permutations(self.flat))[self.deal]
+        cone = Piece(places.pop(self.cone_at), self.cone)
+        found = list(map(Piece, places, dealt[: self.count - 1]))
+        found.insert(self.cone_at, cone)
         return {f"shape_{k}": piece for k, piece in enumerate(found)}
+
+    @property
+    def flat(self) -> tuple[Shape, ...]:
+        """The shapes other than the cone."""
+        return self.cube, self.cylinder, self.hexagon, self.prism
 
     @property
     def cone_spot(self) -> Vec3:
         """Position of the foot of the pointed shape that comes last [m]."""
-        return self.pieces[self.order[-1]].spot
+        return self.foot(self.order[-1])
+
+    def foot(self, name: str) -> Vec3:
+        """Initial position of a shape's foot [m]."""
+        base, cone = self.order[0], self.order[-1]
+        if self.perched and name == cone:
+            return self.foot(base) + self.pieces[base].shape.height * UP
+        return self.pieces[name].place.spot
 
     @cached_property
     def order(self) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """A pile stands if the cone is its top; what is put on the cone topples, and two piles are none."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import pytest
 from controls import (
@@ -8,17 +9,18 @@ from controls import (
     load,
     mistaken,
     not_certified,
+    play,
     play_shortcut,
     replayed,
     unguarded,
 )
 
 from scengen import load_task
-from scengen.assets.shape import FRUSTUM, Shape
+from scengen.assets.shape import FRUSTUM, KINDS, Shape
 from scengen.attack.priors import fit
 from scengen.geometry import UP, heading
 from scengen.sim.world import IDLE
-from scengen.tasks.shape_stack import Piece, ShapeStack
+from scengen.tasks.shape_stack import FALL_ANGLE, Place, ShapeStack
 
 TASK = load_task("shape_stack")
 THREE = ShapeStack(count=3)
@@ -41,7 +43,7 @@ def piled(scenario, *orders):
     """The world with piles in these orders, from the bottom up."""
     spots = {}
     for order in orders:
-        spot = scenario.pieces[order[0]].spot
+        spot = scenario.pieces[order[0]].place.spot
         for name in order:
             spots[name], spot = spot, spot + scenario.pieces[name].shape.height * UP
     return put_up(scenario, spots)
@@ -71,20 +73,44 @@ def test_two_piles_or_three_are_not_the_goal(orders):
 
 
 def test_two_shapes_beside_each_other_on_a_third_stand_and_are_no_stack():
-    wide = replace(THREE, a=Piece(y=0.19, shape=Shape(width=0.06)))
-    on_top = wide.a.spot + wide.a.shape.height * UP
+    wide = replace(THREE, cone_at=1, cube=Shape(width=0.06))
+    on_top = wide.a.spot + wide.cube.height * UP
     under, one, other = NAMES
     world = put_up(wide, {one: on_top + 0.022 * Y, other: on_top - 0.0235 * Y})
     assert world.touching(under, one) and world.touching(under, other) and not world.touching(other, "table")
     assert not wide.success(world)
 
 
+def test_training_has_three_to_five_of_the_five_shapes_each_at_most_once():
+    """Paper, App. B, T30: a random subset. Each set of two to four is drawn beside the cone: 11 sets."""
+    drawn = set()
+    for index in range(300):
+        kinds = [piece.shape.kind for piece in TASK.draw("id", 0, index).scenario.pieces.values()]
+        assert 3 <= len(kinds) == len(set(kinds)) <= len(KINDS)
+        drawn.add(frozenset(kinds))
+    assert drawn == {frozenset({*flat, FRUSTUM}) for count in (2, 3, 4) for flat in combinations(range(FRUSTUM), count)}
+
+
 # --- ways around ----------------------------------------------------------------------------
 
 
-def test_what_is_put_on_the_cone_topples_and_would_not_stand_without_the_rule_either():
-    assert play_shortcut(TASK, THREE, "cone_at_the_bottom").reason == "a shape toppled"
-    assert not play_shortcut(TASK, unguarded(ShapeStack)(count=3), "cone_at_the_bottom").solved
+def test_what_is_put_on_the_cone_is_lost_and_would_not_stand_without_the_rules_either():
+    assert play_shortcut(TASK, THREE, "cone_at_the_bottom").reason == "a shape was set on the cone"
+    world = load(TASK, free := unguarded(ShapeStack)(count=3))
+    assert not play_shortcut(TASK, free, "cone_at_the_bottom", world).solved
+    assert any(world.tilt(name) > FALL_ANGLE for name in NAMES)
+
+
+def test_a_cone_that_starts_on_the_widest_shape_must_come_off_first():
+    perched = ShapeStack(count=3, perched=1)
+    assert play(TASK, perched, perched.oracle).solved
+    unmoved = play(TASK, perched, lambda world: perched.pile(world, perched.order))
+    assert unmoved.reason == "a shape was set on the cone"
+
+
+def test_a_cone_that_is_set_on_a_shape_is_not_what_is_set_on_the_cone():
+    world = piled(THREE, THREE.order)
+    assert world.touching(THREE.order[-1], THREE.order[-2]) and not THREE.cone_tried(world)
 
 
 def test_what_lies_on_its_side_is_lost_unless_it_is_held():
@@ -123,19 +149,19 @@ def test_memorised_actions_are_lost_where_the_shapes_are_higher():
 
 
 def test_an_oracle_that_does_not_look_at_the_shapes_is_not_certified():
-    not_certified(TASK, mistaken(ShapeStack, "as_they_stand")(count=3), "solved", "a shape toppled")
+    not_certified(TASK, mistaken(ShapeStack, "as_they_stand")(count=3), "solved", "a shape was set on the cone")
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():
     each_refuted_for_its_own_reason(
         [
-            replace(THREE, a=Piece(y=0.19, shape=THREE.cone)),
+            replace(THREE, cube=THREE.cone),
             replace(THREE, cone=replace(THREE.cone, height=0.027)),
-            replace(THREE, b=Piece(shape=Shape(friction=1.0)), cone_at=0),
+            replace(THREE, cube=Shape(friction=1.0)),
             replace(THREE, cone=replace(THREE.cone, width=0.046, height=0.038)),
-            replace(THREE, a=Piece(y=0.19, shape=Shape(width=0.07))),
-            replace(THREE, a=Piece(y=0.38)),
-            replace(THREE, a=Piece(y=0.10)),
-            replace(THREE, a=Piece(x=0.33, y=0.3)),
+            replace(THREE, cube=Shape(width=0.07)),
+            replace(THREE, a=Place(y=0.38)),
+            replace(THREE, a=Place(y=0.10)),
+            replace(THREE, a=Place(x=0.33, y=0.3)),
         ]
     )
