@@ -5,10 +5,13 @@
 Every split, or those that are named, is drawn from until N scenarios are certified at level quick, or three times N
 draws are spent. The oracle tries M other draws, undisturbed (100), and K witnesses of every split are played in
 robosuite (3). Processor time is that of an otherwise idle machine whose cores are all at work on this. What is not
-measured stays as it was.
+measured stays as it was. A repeated call continues: splits that were measured with the same numbers, distributions and
+code are left out.
 """
 
 import fcntl
+import hashlib
+import inspect
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -27,14 +30,16 @@ from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
 from scengen.task_files import certified
+from scengen.validate.identity import source_sha256
 from scengen.work.parallel import Limits
 
 FILE = Path(__file__).parent.parent / "conf" / "certified.yaml"
 HEAD = """# Results of certification by task and split. Written by tools/certified.py.
 # indices: draws tried; certified among them at level quick; cpu: processor time of each that was [s], with every core
 # of the machine at work; lost: what became of the others; draws: other draws that the oracle was given undisturbed, and
-# solved among them; replays: witnesses played in robosuite, and same: those with the same verdict. Where indices,
-# certified and cpu stand alone they were measured under conjugate gradients, on one core of an idle machine.
+# solved among them; replays: witnesses played in robosuite, and same: those with the same verdict; key: hash of the
+# numbers asked for, the distributions and the code. Where indices, certified and cpu stand alone they were measured
+# under conjugate gradients, on one core of an idle machine.
 """
 OTHER_SEED = 1
 """Seed of the draws that only the oracle plays."""
@@ -72,9 +77,22 @@ def main(n: str, *others: str) -> None:
     for name in [other for other in others if "=" not in other] or list_tasks():
         task = load_task(name)
         for split in wanted.split(",") if wanted else (ID, *task.axes):
-            found = measured(task, split, int(n), int(draws or 100), int(replays or 3))
+            asked = int(n), int(draws or 100), int(replays or 3)
+            key = identity(task, split, *asked)
+            if certified().get(name, {}).get(split, {}).get("key") == key:
+                print(f"{name}/{split} is measured", flush=True)
+                continue
+            found = measured(task, split, *asked) | {"key": key}
             print(f"{name}/{split}", found, flush=True)
             write(name, split, found)
+
+
+def identity(task: Task, split: str, n: int, draws: int, replays: int) -> str:
+    """Hash of what the results of a split follow from: the numbers of draws, the distributions, the code."""
+    family, dists = task.family, {**task.training, **task.shifts(split)}
+    told = (n, draws, replays, sorted((name, str(dist)) for name, dist in dists.items()), task.horizon)
+    code = (source_sha256(family), inspect.getsource(family.oracle))
+    return hashlib.sha256(repr((told, code)).encode()).hexdigest()[:12]
 
 
 def write(task: str, split: str, found: dict[str, Any]) -> None:
