@@ -91,9 +91,9 @@ def page() -> str:
     """The whole page."""
     told = task_files.certified()
     training = [
-        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}"]
+        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}" if found else "not measured"]
         for task in list_tasks()
-        for found in [told.get(task, {}).get(task_files.ID, {"cpu": 0.0})]
+        for found in [told.get(task, {}).get(task_files.ID, {})]
     ]
     lost = [
         f"* {task}, {split}: {times} {reason}"

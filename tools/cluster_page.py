@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from scengen import task_files
+from scengen import list_tasks, task_files
 
 PAGE = Path(__file__).parent.parent / "docs" / "cluster.md"
 BEGIN, END = "<!-- costs: tools/cluster_page.py -->\n", "<!-- end of costs -->\n"
@@ -22,6 +22,7 @@ def table() -> str:
         "| task | one [core s] | 10 thousand [core hours] | 1 million [core days] | 10 million [core days] |",
         "|---|---|---|---|---|",
         *(_line(f"[{task}](tasks/{task}.md)", cpu) for task, cpu in sorted(each.items(), key=lambda x: x[1])),
+        *(f"| [{task}](tasks/{task}.md) | not measured | - | - | - |" for task in list_tasks() if task not in each),
         _line("mean over tasks", sum(each.values()) / len(each)),
     ]
     return "".join(f"{line}\n" for line in lines)
