@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample axes attacks drift baselines docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample readers axes attacks drift baselines docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -97,6 +97,11 @@ stacks: setup
 # A sample on MuJoCo 4 with numpy 2 and the Python of make setup (3 minutes).
 stack-sample: setup
 	$(BIN)/python tools/stacks.py sample
+
+# Opens recordings of every embodiment with LeRobot, robomimic, lerobot-doctor and lerobot-lint in environments of their own, which come
+# from the package index (Python 3.12, gigabytes), and writes docs/readers.md.
+readers: setup
+	$(BIN)/python tools/check_readers.py
 
 # Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
 AXES ?= n=50

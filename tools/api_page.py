@@ -35,7 +35,7 @@ MODULES = {
     "Playing and certifying": ("validate.rollout", "validate.certify", "validate.settings", "certificate"),
     "Checks and tests": ("conformance.rules", "conformance.frames", "errors"),
     "The base of assets": ("assets.prop",),
-    "Pools and environments": ("pool.pool", "envs.gym", "envs.lerobot"),
+    "Pools and environments": ("pool.pool", "pool.rows", "envs.gym", "envs.lerobot"),
 }
 """Modules on the page, by heading. `scengen asset` lists the assets themselves."""
 MAX_VALUE_LENGTH = 80

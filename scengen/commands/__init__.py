@@ -95,7 +95,7 @@ def holder(pool: str | list[str] | None, name: str) -> Pool:
     if len(found) == 1:
         return found[0].check()
     library = Library(found)
-    return library.pool(library.find(name)).check()
+    return found[library.source(library.find(name))].check()
 
 
 def chosen(pool: Pool, name: str) -> PoolRow:

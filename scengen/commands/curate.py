@@ -9,7 +9,7 @@ from ..curate.page import write_page
 from ..curate.people import DECISIONS
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
-from . import OK, Arguments, err, out, say
+from . import OK, Arguments, err, out, say, warn
 from .settings import read
 
 
@@ -32,5 +32,7 @@ def command(arguments: Arguments) -> int:
         say(
             f"{len(undecided)} flagged episodes wait for a decision: open {folder / 'index.html'}, and save {DECISIONS}"
         )
+    if curated.unread:
+        warn(f"scengen: {curated.unread} answers of the model follow no schema or name other frames; left out")
     say(f"wrote {folder}: reports.jsonl, kept.json, index.html")
     return OK

@@ -1,10 +1,14 @@
 """measure the success rate of policies, in and out of distribution, with intervals"""
 
+from collections.abc import Callable, Sequence
+
 from rich.table import Table
 
+from ..compose import load_task
+from ..demos.rollouts import Keeper
 from ..evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ..evaluate.policies import find_policy
-from ..evaluate.rollouts import evaluate
+from ..evaluate.rollouts import Evaluation, evaluate
 from ..evaluate.settings import EvaluateSettings
 from ..pool import Pool
 from ..runs.progress import ProgressBar
@@ -22,7 +26,7 @@ def command(arguments: Arguments) -> int:
     results = []
     for one in every:
         with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
-            results.append(PolicyResult(one, evaluate(one, progress_bar.of, search_path(arguments))))
+            results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search_path(arguments))))
     compared = Comparison(results)
     _show(compared, settings)
     write(settings.folder / "table.md", compared.markdown)
@@ -33,6 +37,19 @@ def command(arguments: Arguments) -> int:
             say(f"wrote {result.settings.folder}: episodes.jsonl")
     say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
     return FAILED if any(incomplete) else OK
+
+
+def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
+    """Evaluate one policy, and keep its rollouts if that is asked for."""
+    if not settings.keep:
+        return evaluate(settings, progress, search)
+    tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}
+    with Keeper(settings, tasks) as keeper:
+        found = evaluate(settings, progress, search, keeper)
+        for one in keeper.finish():
+            many = sum(one.manifest.outcomes.values())
+            say(f"kept {many} rollouts, {one.made} of them successes: {one.demonstrations.folder}")
+    return found
 
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:

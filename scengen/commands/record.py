@@ -1,4 +1,4 @@
-"""write witnesses or demonstrations as a LeRobot data set or a robomimic file, with forces and pictures"""
+"""write witnesses, demonstrations or rollouts as a LeRobot data set or a robomimic file, with forces and pictures"""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..export.recording import RecordSettings, record
-from ..export.sources import ROBOMIMIC, open_source
+from ..export.sources import ROBOMIMIC, open_source, texts_of
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, INTERRUPTED, OK, Arguments, err, say, warn
@@ -35,8 +35,10 @@ def _split_up(settings: RecordSettings) -> Mapping[str, RecordSettings]:
     """The recordings to make by the shared property, below `to` if there are multiple."""
     found: dict[str, list[str]] = defaultdict(list)
     for folder in settings.folders:
-        for value in open_source(folder).kinds(_kind(settings))[0] or [""]:
+        for value in texts_of(open_source(folder), _kind(settings), settings.failed) or [""]:
             found[value].append(folder)
+    if len(found) > 1:
+        found.pop("", None)  # folders without rows
     if len(found) < 2:
         return {settings.to: settings}
     below, suffix = Path(settings.to).with_suffix(""), Path(settings.to).suffix

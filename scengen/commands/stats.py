@@ -18,6 +18,9 @@ from ..work.targets import try_file
 from . import OK, Arguments, out, say, write, write_json
 from .settings import read
 
+MAX_WAYS = 5
+"""Largest number of ways that are printed."""
+
 
 @dataclass(frozen=True)
 class StatsSettings:
@@ -39,6 +42,10 @@ def command(arguments: Arguments) -> int:
     ]
     tasks = statistics_of(recordings)
     out.print(_table(tasks))
+    for own in tasks:
+        if own.ways:
+            told = ", ".join(f"{way} ({count})" for way, count in [*own.ways.items()][:MAX_WAYS])
+            say(f"{own.task}: {len(own.ways)} ways, by the bodies moved first: {told}")
     if settings.to is not None:
         paths = paths_of(recordings)
         plots = {own.task: _plot(own, paths[own.task]) for own in tasks}

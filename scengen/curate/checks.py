@@ -1,6 +1,6 @@
 """Checks of the rows of one episode. Thresholds are those of lerobot-lint where it has the rule."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import ACTION
-from ..control.teleop import LARGEST_CHANGE, MOTION
+from ..control.teleop import LARGEST_CHANGE
 from ..envs.observations import proprioception
 from ..export.dataset import EpisodeData, Recording
-from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT, STATE
+from ..export.recording import CONTROL_ACTIONS, STATE
+from ..export.replay import asks_for_motion
+from ..export.streams import ENVIRONMENT
+from ..pool.demonstrations import POLICY
 from ..robots.panda import Names
 from .findings import Finding, Severity
 
@@ -23,8 +26,6 @@ DROPPED_PERIODS = 1.5
 """Time between two rows at which rows between them are missing [periods] (lerobot-lint)."""
 FROZEN_FRAMES = 15
 """Number of identical rows, one after the other, beyond which a moving arm's state is frozen (lerobot-lint)."""
-MOVING_ACTION = 0.1
-"""Mean action of the motion channels above which the hand must move."""
 MAX_SPEED = 1.7
 """Speed limit of a hand [m/s], Franka's Cartesian limit for the Panda. Hands were seen at 0.9 m/s here; the replay
 finds smaller jumps."""
@@ -64,8 +65,7 @@ class Subject:
     @property
     def moves(self) -> NDArray[np.bool_]:
         """Whether the action of each row asks each arm for a motion, shape (rows, arms)."""
-        action = self.column("action").reshape(-1, self.arms, ACTION)[:, :, :MOTION]
-        return np.abs(action).max(axis=2) > MOVING_ACTION
+        return asks_for_motion(self.column("action"))
 
 
 Check = Callable[[Subject], Iterator[Finding]]
@@ -141,10 +141,15 @@ def actions(subject: Subject) -> Iterator[Finding]:
         yield found("ACTION_MISMATCH", f"action is not the mean of {CONTROL_ACTIONS}", wrong, rows=len(wrong))
     motion = np.delete(every.reshape(-1, action.shape[1]), grips, axis=1)
     steps = np.abs(np.diff(motion, axis=0, prepend=np.zeros((1, motion.shape[1]))))
-    if len(wrong := np.flatnonzero(steps.max(axis=1) > LARGEST_CHANGE + ROUNDING)):
+    filtered = subject.episode.about.get("scengen/source") != POLICY  # a policy acts without the filter
+    if filtered and len(wrong := np.flatnonzero(steps.max(axis=1) > LARGEST_CHANGE + ROUNDING)):
         rows = wrong // every.shape[1]
         told = {"largest": steps.max(), "limit": LARGEST_CHANGE}
         yield found("ACTION_JUMP", "actions change faster than the teleoperation filter allows", rows, **told)
+    if "waiting" in subject.episode.columns:
+        wrong = np.flatnonzero(subject.episode.columns["waiting"] == subject.moves.any(axis=1))
+        if len(wrong):
+            yield found("WAITING_MISMATCH", "waiting is not what the action says", wrong, rows=len(wrong))
     if np.abs(every).max() > 1.0 + ROUNDING:
         yield found("ACTION_RANGE", "actions leave [-1, 1]", largest=np.abs(every).max())
     full = (np.abs(np.delete(action, grips, axis=1)) > 1.0 - 1e-6).mean(axis=0).max()
@@ -186,16 +191,19 @@ def forces(subject: Subject) -> Iterator[Finding]:
             yield found("DEAD_STREAM", f"{name} never changes")
 
 
+def movable_bodies(names: Sequence[str]) -> dict[str, int]:
+    """Movable bodies, and the places of their positions in the environment state, by the names of its entries."""
+    starts = {name.removesuffix("_pos.x"): k for k, name in enumerate(names) if name.endswith("_pos.x")}
+    return {body: k for body, k in starts.items() if "_to_robot" not in body and f"{body}_vel_lin.x" in names}
+
+
 def bodies(subject: Subject) -> Iterator[Finding]:
     """Whether bodies are where their velocities take them. An event of the scene may move a body: the replay knows."""
     if ENVIRONMENT not in subject.episode.columns:
         return
     names = subject.recording.info["features"][ENVIRONMENT]["names"]
     state, period = subject.column(ENVIRONMENT), 1.0 / subject.recording.fps
-    for start, name in enumerate(names):
-        body = name.removesuffix("_pos.x")
-        if body == name or "_to_robot" in name or f"{body}_vel_lin.x" not in names:
-            continue
+    for body, start in movable_bodies(names).items():
         place = state[:, start : start + 3]
         first = names.index(f"{body}_vel_lin.x")
         speed = np.linalg.norm(state[:, first : first + 3], axis=1)

@@ -4,6 +4,7 @@
     curation/reports.jsonl         an `EpisodeReport` for each episode
     curation/report.schema.json    its JSON schema
     curation/decisions.csv         decisions of people, `episode,verdict,who,why`
+    curation/remarks.jsonl         answers of a model, if there is one
     curation/kept.json             numbers of the kept episodes, for LeRobotDataset(..., episodes=kept)
     curation/index.html            page with the flagged episodes
     meta/scengen.json              `curation`: number of episodes after each stage
@@ -20,14 +21,17 @@ from typing import Any
 import numpy as np
 
 from .. import compose
+from ..agents.models import made
 from ..errors import PoolError
 from ..export.dataset import EpisodeData, Recording
-from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT
+from ..export.recording import CONTROL_ACTIONS
+from ..export.streams import ENVIRONMENT
 from ..pool.files import replace_file, sha256
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
 from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
 from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
+from .remarks import with_remarks
 from .replays import Recorded, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
 from .videos import check_video
@@ -42,6 +46,7 @@ class CurateSettings:
 
     data: str = ""
     replay: bool = True
+    model: str | None = None
     workers: Workers = 1
 
 
@@ -56,6 +61,8 @@ class Curated:
     """Numbers of the kept episodes."""
     funnel: Mapping[str, int]
     """Number of episodes after each stage."""
+    unread: int = 0
+    """Number of answers of the model that have no meaning."""
 
     @property
     def undecided(self) -> list[EpisodeReport]:
@@ -83,8 +90,11 @@ def curate(settings: CurateSettings, progress: Callable[[int, int], None], searc
         progress(count + done, 2 * count)
         if finding is not None:
             reports[number] = replace(reports[number], findings=(*reports[number].findings, finding))
-    scored = [_with_score(report, people.get(report.episode)) for report in reports]
-    curated = _decided(recording, tuple(scored), decisions)
+    reports, unread = [_with_score(report, people.get(report.episode)) for report in reports], 0
+    if settings.model is not None:
+        lengths = [int(episode["length"]) for episode in recording.episodes]
+        reports, unread = with_remarks(reports, lengths, made(settings.model), settings.model, folder)
+    curated = replace(_decided(recording, tuple(reports), decisions), unread=unread)
     _write(curated, folder)
     return curated
 

@@ -13,7 +13,8 @@ from ..envs.object_state import ObjectState
 from ..envs.observations import streams_of
 from ..episode import Episode
 from ..errors import ScengenError
-from ..export.recording import CONTROL_ACTIONS, ENVIRONMENT
+from ..export.recording import CONTROL_ACTIONS
+from ..export.streams import ENVIRONMENT
 from ..samplers.task import Task
 from ..sim.world import World, hands
 from ..validate.rebuilt import world_of

@@ -14,15 +14,21 @@ from ..envs.observations import action_names
 from ..errors import BadConfig
 from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS
+from ..export.replay import asks_for_motion
+from ..export.streams import ENVIRONMENT
 from ..robots.panda import Names
 from ..task_files import paper_lengths
-from .checks import MOVING_ACTION
+from .checks import movable_bodies
 from .score import terms_of
 
 PHASES = 50
 """Number of points of a path that are compared: at equal shares of the episode's time."""
 SHOWN_PHASES = 10
 """Number of phases for which the spread is given."""
+MOVED = 0.01
+"""Distance from its place at the start at which a body has been moved [m]."""
+SHOWN_BODIES = 3
+"""Number of bodies in the order of a way."""
 AT_LIMIT = 1.0 - 1e-6
 """Absolute value from which an action is at its limit."""
 
@@ -68,6 +74,9 @@ class TaskStats:
     spread: tuple[float, ...]
     """Root mean square distance of the hands from their mean path in each phase, scenes included [m]."""
     channels: tuple[Channel, ...]
+    ways: Mapping[str, int]
+    """Number of episodes by the order in which bodies were moved first, such as `cube > bowl`; empty if the
+    recordings do not hold the state of the bodies."""
 
 
 def paths_of(recordings: Sequence[Recording]) -> dict[str, list[NDArray[np.float64]]]:
@@ -99,7 +108,7 @@ def statistics_of(recordings: Sequence[Recording]) -> list[TaskStats]:
 def _of_task(task: str, episodes: Sequence[tuple[Recording, EpisodeData]]) -> TaskStats:
     terms = [terms_of(episode, recording.fps) for recording, episode in episodes]
     paths = np.array([at_phases(_path(episode)) for _, episode in episodes])
-    moves = np.concatenate([_moves(episode) for _, episode in episodes])
+    moves = np.concatenate([asks_for_motion(e.columns["action"]).any(axis=1) for _, e in episodes])
     apart = squareform(pdist(paths.reshape(len(paths), -1))) / np.sqrt(PHASES)
     np.fill_diagonal(apart, np.inf)
     nearest = apart.min(axis=1) if len(paths) > 1 else np.zeros(1)
@@ -119,7 +128,25 @@ def _of_task(task: str, episodes: Sequence[tuple[Recording, EpisodeData]]) -> Ta
         least=float(nearest.min()),
         spread=tuple(float(part.mean()) for part in np.array_split(away, SHOWN_PHASES)),
         channels=_channels(episodes),
+        ways=dict(Counter(filter(None, (way_of(recording, e) for recording, e in episodes))).most_common()),
     )
+
+
+def way_of(recording: Recording, episode: EpisodeData) -> str:
+    """The order in which an episode moves bodies first, `SHOWN_BODIES` of them; empty if that is not recorded.
+
+    A body has moved once it is `MOVED` from where it started. Bodies that move by themselves count, too.
+    """
+    if ENVIRONMENT not in episode.columns:
+        return ""
+    names = recording.info["features"][ENVIRONMENT]["names"]
+    state, first = np.asarray(episode.columns[ENVIRONMENT], float), dict[str, int]()
+    for body, start in movable_bodies(names).items():
+        away = np.linalg.norm(state[:, start : start + 3] - state[0, start : start + 3], axis=1) > MOVED
+        if away.any():
+            first[body] = int(away.argmax())
+    order = sorted(first, key=lambda body: (first[body], body))
+    return " > ".join(order[:SHOWN_BODIES]) or "nothing"
 
 
 def _channels(episodes: Sequence[tuple[Recording, EpisodeData]]) -> tuple[Channel, ...]:
@@ -147,9 +174,3 @@ def at_phases(path: NDArray[np.float64]) -> NDArray[np.float64]:
 def _path(episode: EpisodeData) -> NDArray[np.float64]:
     arms = episode.columns["action"].shape[1] // ACTION
     return np.hstack([np.asarray(episode.columns[f"{Names(k).arm}eef_pos"], float) for k in range(arms)])
-
-
-def _moves(episode: EpisodeData) -> NDArray[np.bool_]:
-    action = np.asarray(episode.columns["action"], float)
-    motion = action.reshape(len(action), -1, ACTION)[:, :, :MOTION]
-    return np.abs(motion).max(axis=(1, 2)) > MOVING_ACTION

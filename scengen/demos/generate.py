@@ -246,11 +246,13 @@ def finish(
     records: Mapping[int, Record],
     journal: Journal,
     operator: str | None = None,
+    policy: str | None = None,
 ) -> DemosSummary:
     """Write the first n demonstrations, and count the attempts up to the last of them.
 
     Args:
-        operator: code of the person who drove the robot; None for scripted demonstrations.
+        operator: code of the person who drove the robot; None if no person did.
+        policy: name of the policy that drove the robot; None if no policy did.
     """
     kept = first_of(records, KEPT, n)
     counted = [records[i] for i in sorted(records) if len(kept) < n or i <= kept[-1]]
@@ -266,6 +268,7 @@ def finish(
         outcomes=dict(outcomes),
         styles=dict(Counter(row.style for row in journal.rows(kept))),
         operator=operator,
+        policy=policy,
         **made_with(task),
     )
     written = write_demonstrations(folder, manifest, journal.rows(kept), journal.rows(failed))

@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from ..certificate import as_json
 from ..errors import Infeasible, PoolError, ScengenError
 from ..fingerprint import fingerprint
 from ..params import canonical
-from ..pool.demonstrations import DEMONSTRATIONS, SCRIPTED, TELEOP, DemonstrationConfig, Demonstrations
+from ..pool.demonstrations import DEMONSTRATIONS, POLICY, SCRIPTED, TELEOP, DemonstrationConfig, Demonstrations
 from ..pool.files import sha256
 from ..pool.row import DemonstrationRow
 from ..samplers.split import Split
@@ -101,7 +103,9 @@ class Judge:
             yield "the scene has another sha256 than its row says"
         if sha256(row.witness.tobytes()) != row.witness_sha256:
             yield "the actions have another sha256 than their row says"
-        if not passed_filter(row.witness):
+        if np.abs(row.witness).max(initial=0.0) > 1.0:
+            yield "there are actions outside [-1, 1]"
+        if POLICY not in self.config.styles and not passed_filter(row.witness):
             yield "there are actions that the teleoperation filter cannot give"
         if row.run >= self.config.runs or row.index * self.config.runs + row.run >= self.attempts:
             yield f"run {row.run} of index {row.index} is none of the {self.attempts} attempts that the manifest counts"
@@ -113,7 +117,8 @@ class Judge:
 
     def _style(self, row: DemonstrationRow) -> str:
         """The style that the manifest demands of a row."""
-        return TELEOP if TELEOP in self.config.styles else chosen(self.config.styles, *row.key)
+        driven = {TELEOP, POLICY}.intersection(self.config.styles)
+        return driven.pop() if driven else chosen(self.config.styles, *row.key)
 
     def _wrongly_drawn(self, row: DemonstrationRow) -> Iterator[str]:
         design = self.task.design(self.config.sampler)
@@ -190,8 +195,8 @@ def verify_demonstrations(
     same = manifest.fingerprint == fingerprint()
     if not same:
         report.remarks.append("made on a machine with different rounding: final states are not compared")
-    if oracle and manifest.source == TELEOP:
-        report.remarks.append("driven by a person: there is no oracle to play them again")
+    if oracle and manifest.source != SCRIPTED:
+        report.remarks.append(f"source {manifest.source}: there is no oracle to play them again")
     judge = Judge(task, manifest.config, manifest.indices, same, oracle and manifest.source == SCRIPTED)
     order = _Order(manifest.config.runs)
 

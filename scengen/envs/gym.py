@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import compose, task_files
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
-from ..episode import STRICT, Episode, Outcome, Rules, check_rules
+from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..orientation import Orientation
 from ..params import Value
@@ -244,6 +244,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._scenario
 
     @property
+    def played(self) -> Actions:
+        """Actions that the controller has received since the reset, settling included, shape (n, 7 * arms)."""
+        return np.array(self._played, np.float32).reshape(-1, action_size(self.task.embodiment))
+
+    @property
     def values(self) -> Mapping[str, Value]:
         """Parameter values of the running scenario, by name. Privileged, like `scenario`."""
         return self._row.params
@@ -324,13 +329,15 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is None:
             return made
         episode = (self._episode.outcome, self._episode.reason, self._episode.held)
-        return {**made, "scenario": self._row.id, "world": self._world.state(), "episode": episode}
+        told = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
+        return {**made, **told, "played": [*self._played]}
 
     def _continue(self, progress: Mapping[str, Any]) -> None:
         """Return to a `_progress()` of an environment with the same arguments."""
         if "scenario" in progress:
             self._load(self._rows[self._rows.find(progress["scenario"])])
             self.world.restore(progress["world"])
+            self._played = [*progress["played"]]
             self._episode.outcome, self._episode.reason, self._episode.held = progress["episode"]
         self._next = progress["next"]
         self._np_random, self._np_random_seed = progress["random"], progress["random_seed"]
@@ -341,6 +348,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._world = stored_world(row, self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
         self._row = row
+        self._played: list[NDArray[np.float32]] = []
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
@@ -361,7 +369,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return float(success), terminated, truncated, self._info(reason, success)
 
     def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
-        return self._episode.step(self.world.filter(action) if self.action_filter else action)
+        sent = self.world.filter(action) if self.action_filter else action
+        self._played.append(sent.astype(np.float32))
+        return self._episode.step(sent)
 
     def _settled(self) -> tuple[Outcome, str]:
         """Outcome and reason after the robot has been idle for the certificate's settling time."""

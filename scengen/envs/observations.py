@@ -134,7 +134,14 @@ def _body_streams(state: ObjectState) -> dict[str, Stream]:
 
 
 def _seen_position(body: str, orientation: Callable[[], Orientation]) -> Stream:
-    return Stream(POSE["pos"], 3.0, lambda world: orientation().seen_at(rounded(world.pos(body), "pos")))
+    """The position; 0 if the scene lacks the body, as in `object-state`."""
+
+    def read(world: World) -> NDArray[np.float64]:
+        if mujoco.mj_name2id(world.model, mujoco.mjtObj.mjOBJ_BODY, body) < 0:
+            return np.zeros(3)
+        return orientation().seen_at(rounded(world.pos(body), "pos"))
+
+    return Stream(POSE["pos"], 3.0, read)
 
 
 OWN_POSE = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")

@@ -2,18 +2,22 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
 from ..errors import PoolError
-from ..pool import Pool
+from ..pool import Pool, PoolRow
 from ..pool.collection import members
+from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.library import Library
+from ..pool.rows import AnyRow
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
 """Folder of a pool, or several folders."""
+AnyRows = TypeVar("AnyRows", Pool, Demonstrations)
 
 
-def rows_of(pool: Folders | Library | None, task: str) -> Library:
+def rows_of(pool: Folders | Library[PoolRow] | None, task: str) -> Library[PoolRow]:
     """The scenarios of some pools; those of a library, which has been checked, as they are.
 
     Raises:
@@ -24,7 +28,22 @@ def rows_of(pool: Folders | Library | None, task: str) -> Library:
     folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
     if not folders:
         raise PoolError("no pool was given; give pool=FOLDER or a list of folders; scengen generate makes pools")
-    return Library([_open_checked(each, task) for folder in folders for each in _pools_of_task(folder, task)])
+    return Library([_checked(Pool.open(each), task) for folder in folders for each in _pools_of_task(folder, task)])
+
+
+def scenes_of(pool: Folders, task: str) -> Library[Any]:
+    """The scenarios of some pools or demonstrations, for environments that need no certificate.
+
+    Raises:
+        PoolError: as `rows_of`.
+    """
+    folders = [pool] if isinstance(pool, (str, Path)) else list(pool)
+    demonstrated = [folder for folder in folders if is_demonstrations(folder)]
+    if not demonstrated:
+        return rows_of(pool, task)
+    if len(demonstrated) < len(folders):
+        raise PoolError("pools and demonstrations were given together; give one kind")
+    return Library([_checked(Demonstrations.open(folder), task) for folder in folders])
 
 
 def _pools_of_task(folder: str | Path, task: str) -> list[str]:
@@ -37,7 +56,7 @@ def _pools_of_task(folder: str | Path, task: str) -> list[str]:
     return own
 
 
-def chosen(rows: Library, scenario: str | None, split: str | None = None) -> Library:
+def chosen(rows: Library[AnyRow], scenario: str | None, split: str | None = None) -> Library[AnyRow]:
     """The scenarios of a split, or one of them.
 
     Args:
@@ -53,13 +72,16 @@ def chosen(rows: Library, scenario: str | None, split: str | None = None) -> Lib
     return rows if scenario is None else rows.only(rows.find(scenario))
 
 
-def _open_checked(folder: str | Path, task: str) -> Pool:
-    """An undamaged pool of a task."""
-    pool = Pool.open(folder).check()
-    check_versions(pool.manifest.versions, str(folder))
+def _checked(pool: AnyRows, task: str) -> AnyRows:
+    """Undamaged rows of a task.
+
+    Raises:
+        PoolError: they are damaged, empty, or of another version or task.
+    """
+    check_versions(pool.check().manifest.versions, str(pool.folder))
     tasks, _ = pool.kinds("task")
     if not tasks:
-        raise PoolError(f"{folder} holds no scenario; fill it with scengen generate")
+        raise PoolError(f"{pool.folder} holds no scenario; fill it with scengen generate")
     if others := {*tasks} - {task}:
-        raise PoolError(f"{folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
+        raise PoolError(f"{pool.folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
     return pool

@@ -27,6 +27,7 @@ from ..errors import BadConfig, PoolError, UnknownName
 from ..pictures.opengl import check_size, current, release
 from ..pool import PoolRow
 from ..pool.library import Library
+from ..pool.row import SceneRow
 from ..robots import panda
 from ..scenario import Scenario
 from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
@@ -34,7 +35,7 @@ from ..validate.identity import check_versions
 from ..validate.playable import scene_errors
 from .object_state import ObjectState, bodies_of, rounded
 from .observations import turns_pictures
-from .pools import Folders, chosen, rows_of
+from .pools import Folders, chosen, scenes_of
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
 # isort: split
@@ -76,7 +77,7 @@ class RobosuiteEnv(ManipulationEnv):
 
     sim: Any
     """robosuite's simulation."""
-    row: PoolRow
+    row: SceneRow
     """Row of the running scenario in its pool."""
     scenario: Scenario
     """Running scenario. Privileged: it holds the hidden parameters, which a policy must find out."""
@@ -106,7 +107,7 @@ class RobosuiteEnv(ManipulationEnv):
             robots: "Panda", or a list of two for a task with two arms. Default: the robots of the task.
             scenario: a row of a pool; or, with `pool`, a name, an id, or a unique prefix of an id, as in `Pool.row`.
                 Without it, every hard reset draws one from the pools; robosuite's `seed` determines the draws.
-            pool: folder of a pool, or several folders.
+            pool: folder of a pool or of demonstrations, or several folders of one kind.
             use_object_obs: whether to observe `object-state` and every reading in it, such as `<body>_pos` [m]
                 (`scengen.envs.object_state`); and `seen_<body>_pos` [m], if the family turns pictures.
             gripper_types: "default" for the hands of the task; other hands are refused.
@@ -218,14 +219,14 @@ class RobosuiteEnv(ManipulationEnv):
             self.scenario.orientation.check_size(width, height)
         self.model = self._composed(self.row)
 
-    def _composed(self, row: PoolRow) -> SceneTask:
+    def _composed(self, row: SceneRow) -> SceneTask:
         """The scene of a row with the loaded robots."""
         robots = [robot.robot_model for robot in self.robots]
         for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
             robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
         return SceneTask(SceneModel(row.scene_xml), robots)
 
-    def model_text(self, row: PoolRow) -> str:
+    def model_text(self, row: SceneRow) -> str:
         """The MJCF of a scenario as composed by robosuite, for demonstrations.
 
         Paths of meshes are relative to robosuite's own folder, so that `edit_model_xml` finds them on any machine.
@@ -318,7 +319,7 @@ class RobosuiteEnv(ManipulationEnv):
         """Metadata of an episode for demonstrations: the scenario's id, and the instruction as `lang`."""
         return {**super().get_ep_meta(), "scenario": self.row.id, "lang": self.row.instruction}
 
-    def _requested_row(self) -> PoolRow | None:
+    def _requested_row(self) -> SceneRow | None:
         """The scenario whose id was given to `set_ep_meta`, or None."""
         if (id_ := self._ep_meta.get("scenario")) is None:
             return None
@@ -416,7 +417,7 @@ def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 
 
-def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> Sequence[PoolRow]:
+def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> Sequence[SceneRow]:
     """The scenarios to draw from: one row, one scenario of some pools, or all scenarios of the pools.
 
     Raises:
@@ -432,10 +433,10 @@ def _choice(task: str, scenario: PoolRow | str | None, pool: Folders | None) -> 
         raise BadConfig(
             "no scenario was given; give scenario=Pool.open(folder).row(id), or pool=folder and scenario=id"
         )
-    return chosen(rows_of(pool, task), scenario)
+    return chosen(scenes_of(pool, task), scenario)
 
 
-def _scenes(rows: Sequence[PoolRow]) -> Iterator[str]:
+def _scenes(rows: Sequence[SceneRow]) -> Iterator[str]:
     """Texts of the scenes of some rows."""
     if isinstance(rows, Library):
         return (scene for (scene,) in rows.columns("scene_xml"))

@@ -51,6 +51,9 @@ class PolicyPlayer:
     def __call__(self, which: RolloutId) -> dict[str, Any]:
         """Play one rollout, from reset to its end, or until the policy crashes.
 
+        Returns:
+            The record, with the actions that the controller received as `played` if episodes are kept.
+
         Raises:
             BadPolicy: the policy returned an invalid action.
             ForeignCode: the policy crashed in the first episode.
@@ -66,7 +69,8 @@ class PolicyPlayer:
         env, _ = self._prepared_for(which.task)
         told = {"success": success, "reason": reason, "seconds": round(env.world.time, 3), "phase": phase(env.world)}
         key = {"pool": which.pool, "scenario": which.scenario, "rollout": which.rollout}
-        return {**key, **told, **({"crashed": crashed} if crashed else {})}
+        kept = {"played": env.played} if self.settings.keep and not crashed else {}
+        return {**key, **told, **({"crashed": crashed} if crashed else {}), **kept}
 
     def _played(self, which: RolloutId) -> tuple[bool, str]:
         """Whether a rollout succeeds, and why not."""

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..episode import Actions
 from ..errors import BadConfig, PoolError
 from ..pool import Pool
 from ..samplers.split import ID
@@ -21,6 +22,9 @@ from ..work.parallel import each
 from ..work.targets import refused, try_folder
 from .player import PolicyPlayer
 from .settings import PAPER, EvaluateSettings, RolloutId, completed
+
+Keep = Callable[[RolloutId, Actions], None]
+"""Keeps the actions that the controller received in a rollout; called before the rollout counts as played."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,10 @@ class Evaluation:
 
 
 def evaluate(
-    settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()
+    settings: EvaluateSettings,
+    progress: Callable[[int, int], None],
+    search: Sequence[str] = (),
+    keep: Keep = lambda which, actions: None,
 ) -> Evaluation:
     """Play every rollout that was not played yet, and return all episodes.
 
@@ -46,6 +53,7 @@ def evaluate(
     Args:
         progress: called with the number of rollouts done, and their total.
         search: overrides that add folders of other packages, see `task_files.search_path`.
+        keep: called with the actions of every rollout that is played to its end, if episodes are kept.
 
     Raises:
         ScengenError: a pool, a policy or a setting is not valid.
@@ -72,7 +80,10 @@ def evaluate(
             player.strict = not done
             play = player if settings.workers == 1 else _for_workers(player)
             for count, episode in enumerate(each(play, todo, settings.workers, lost=_crashed), done + 1):
-                log.add({"task": about[episode["pool"], episode["scenario"]]["task"], **episode})
+                played, task = episode.pop("played", None), about[episode["pool"], episode["scenario"]]["task"]
+                if played is not None:
+                    keep(_id({"task": task, **episode}), played)
+                log.add({"task": task, **episode})
                 progress(count, len(wanted))
             records = log.records
     episodes = sorted(
@@ -166,6 +177,8 @@ def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, An
         chosen["client"] = settings.remote.identity()
     if not settings.settle:
         chosen["settle"] = False
+    if settings.keep:
+        chosen["keep"] = settings.keep
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
 
 

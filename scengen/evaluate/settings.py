@@ -1,7 +1,7 @@
 """Settings of an evaluation."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -18,6 +18,8 @@ ALL = "all"
 """Name of all splits of the pools."""
 PAPER = "paper"
 """Name of the training split and the OOD conditions of the paper (App. I)."""
+EPISODES = "episodes"
+"""Value of `keep` for keeping the actions of all episodes."""
 SPLITS = (ALL, PAPER)
 """Names of sets of splits."""
 MAX_FOLDER_NAME = 100
@@ -45,6 +47,7 @@ class EvaluateSettings:
     client: str | None = None
     splits: str = ALL
     settle: bool = True
+    keep: list[str] = field(default_factory=list)
 
     @cached_property
     def folders(self) -> list[str]:
@@ -105,6 +108,10 @@ class EvaluateSettings:
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
         if self.action_repeat != 1 and self.name in FULL_RATE_POLICIES:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.name} acts at 100 Hz: leave it out")
+        if set(self.keep) - {EPISODES}:
+            raise BadConfig(f"keep = {cut(','.join(self.keep))}; it must be {EPISODES}, or be left out")
+        if self.keep and not (self.rules == STRICT and self.settle):
+            raise BadConfig("episodes are kept under the strict rules and with settle=true alone: leave out keep=")
         if self.remote:
             for name, free in (("observations", None), ("action_repeat", 1)):
                 if getattr(self, name) != free:

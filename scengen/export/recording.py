@@ -20,9 +20,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from .. import compose
-from ..control.loop import Loop
-from ..envs.object_state import NAME, ObjectState, all_bodies, bodies_of
-from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception, streams_of
+from ..envs.object_state import bodies_of
+from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception
 from ..errors import BadConfig, UnknownName, at_least
 from ..orientation import Orientation
 from ..pictures.film import periods_between
@@ -31,7 +30,7 @@ from ..pictures.video import check_size
 from ..pool import collection
 from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
-from ..sim.world import World, hands
+from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
 from ..versions import versions
 from ..work.parallel import Workers
@@ -39,13 +38,17 @@ from ..work.targets import appearing, check_unfinished, try_file, try_folder
 from .cameras import calibration
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
-from .replay import DatasetRow, Snapshot, WitnessReplay
-from .sources import LEROBOT, ROBOMIMIC, opened, origins_of, robot_of, rows_of, scenes_of
+from .native import FULL_RATE, NativeWriter
+from .replay import DatasetRow, Snapshot, WitnessReplay, read
+from .sources import LEROBOT, ROBOMIMIC, number_of, opened, origins_of, robot_of, rows_of, scenes_of, texts_of
+from .streams import Recorded, column_of, feature_of, recorded_streams
 
 NONE = "none"
 """Value of `cameras` for a recording without pictures."""
-FULL_RATE = round(1 / Loop.PERIOD)
-"""Number of control periods in a second."""
+ONE_RATE = "one"
+"""Value of `rates` for a recording with one rate."""
+NATIVE_RATES = "native"
+"""Value of `rates` for a recording with tables of the paper's rates besides."""
 PAPER_RATE = 25
 """The paper's rate of pictures [1/s]."""
 EPISODE_COLUMNS = (
@@ -59,8 +62,6 @@ CONTROL_ACTIONS = "control.actions"
 """Column with the actions of all control periods of a row."""
 STATE = "observation.state"
 """LeRobot's name of the robot's own pose."""
-ENVIRONMENT = "observation.environment_state"
-"""LeRobot's name of `object-state`."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,10 @@ class RecordSettings:
     to: str = ""
     format: str = LEROBOT
     n: int | None = None
+    failed: bool = False
     fps: int | None = None
+    rates: str = ONE_RATE
+    observations: str | list[str] | None = None
     environment_state: bool | None = None
     cameras: str | list[str] = field(default_factory=lambda: list(CAMERAS))
     width: int = 640
@@ -96,16 +100,24 @@ class RecordSettings:
         return self.fps or (PAPER_RATE if self.format == LEROBOT else FULL_RATE)
 
     @property
+    def observed(self) -> list[str] | None:
+        """Names of the streams to record besides the robot's own pose; None for all that are not privileged."""
+        return [self.observations] if isinstance(self.observations, str) else self.observations
+
+    @property
     def privileged(self) -> bool:
-        """Whether the rows hold `object-state`. By default LeRobot data sets with pictures do not."""
+        """Whether the rows hold `object-state`. By default LeRobot data sets with pictures do not, nor those whose
+        streams are chosen."""
         if self.environment_state is None:
-            return self.format == ROBOMIMIC or not self.camera_names
+            return self.observations is None and (self.format == ROBOMIMIC or not self.camera_names)
         return self.environment_state
 
     def check(self) -> None:
         """Raise `ScengenError` for invalid settings."""
         if self.format not in (LEROBOT, ROBOMIMIC):
             raise UnknownName("format of recordings", self.format, [LEROBOT, ROBOMIMIC])
+        if self.rates not in (ONE_RATE, NATIVE_RATES):
+            raise UnknownName("rates", self.rates, [ONE_RATE, NATIVE_RATES])
         at_least(self, n=1, fps=1, width=2, height=2, workers=1)
         periods_between(self.rate)
         if self.format == ROBOMIMIC:
@@ -113,6 +125,10 @@ class RecordSettings:
             if self.rate != FULL_RATE:
                 accepted = f"robomimic's data have {FULL_RATE} rows per second, for replay in robosuite: leave it out"
                 raise BadConfig(f"fps = {self.fps}; {accepted}")
+            if self.rates == NATIVE_RATES:
+                raise BadConfig(
+                    f"rates = {self.rates}; robomimic's data have {FULL_RATE} rows per second: leave it out"
+                )
         else:
             check_size(self.width, self.height)
         if Path(self.to).exists():
@@ -146,27 +162,24 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
         ScengenError: a pool or a setting is invalid, or OpenGL is missing for pictures.
     """
     settings.check()
-    pools = opened(settings.folders, settings.format)
-    robot, count = robot_of(pools), sum(map(len, pools))
+    pools = opened(settings.folders)
+    robot, count = robot_of(pools, settings.failed), sum(number_of(pool, settings.failed) for pool in pools)
     for name in settings.camera_names:
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
-    names = sorted({name for pool in pools for name in pool.kinds("task")[0]})
+    names = sorted({name for pool in pools for name in texts_of(pool, "task", settings.failed)})
     tasks = {name: compose.load_task(name, search) for name in names}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
         raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them separately")
-    streams, bodies_told = streams_of(robot), ()
-    if settings.privileged:
-        bodies = all_bodies(bodies_of(task, scenes_of(pools, name)) for name, task in tasks.items())
-        state = ObjectState(bodies, len(hands(robot)))
-        bodies_told = state.ordered
-        streams[NAME] = Stream(state.names, state.bounds, state.read)
+    bodies = (bodies_of(task, scenes_of(pools, name)) for name, task in tasks.items())
+    recorded = recorded_streams(robot, list(tasks.values()), bodies, settings.observed, settings.privileged)
     failed, left_out, styles = list[str](), dict[str, str](), Counter[str]()
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
-        lost = dict(unplayable(rows_of(pools, count), settings.workers))
-        with _writer(settings, path, robot, streams, bodies_told, next(iter(tasks)), tuple(search)) as writer:
-            for row, origin in zip(rows_of(pools, count), origins_of(pools, count), strict=True):
+        lost = dict(unplayable(rows_of(pools, count, settings.failed), settings.workers))
+        with _writer(settings, path, robot, recorded, next(iter(tasks)), tuple(search)) as writer:
+            episodes = rows_of(pools, count, settings.failed), origins_of(pools, count, settings.failed)
+            for row, origin in zip(*episodes, strict=True):
                 if row.id in lost:
                     left_out[str(row.name)] = lost[row.id]
                     continue
@@ -174,9 +187,11 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     world = stored_world(row, bool(settings.camera_names))
                     scenario = tasks[row.task].scenario(row.params)
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
+                    recorded.playing.orientation = scenario.orientation
                     observe = partial(Snapshot.of, world, writer.streams, pictures)
-                    replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe)
-                    if not writer.episode(replay, origin):
+                    sample = partial(read, world, writer.streams) if settings.rates == NATIVE_RATES else None
+                    replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe, sample)
+                    if not writer.episode(replay, origin) and replay.promised:
                         failed.append(str(row.name))
                 if isinstance(row, DemonstrationRow):
                     styles[row.style] += 1
@@ -225,34 +240,31 @@ def _writer(
     settings: RecordSettings,
     path: Path,
     robot: str,
-    streams: Mapping[str, Stream],
-    bodies: Sequence[str],
+    recorded: Recorded,
     task: str,
     search: tuple[str, ...],
 ) -> Writer:
     if settings.format == LEROBOT:
-        return _LeRobotWriter(settings, path, robot, streams, bodies)
+        return _LeRobotWriter(settings, path, robot, recorded)
     from . import robomimic
 
     size = (settings.width, settings.height)
     env, arguments = robomimic.environment(task, settings.folders, settings.camera_names, size, search)
-    return robomimic.Demonstrations(path, robomimic.streams_of(streams, robot), env, arguments)
+    return robomimic.Demonstrations(path, robomimic.streams_of(recorded.streams, robot), env, arguments)
 
 
 class _LeRobotWriter(DatasetWriter):
     """Writer of a LeRobot data set of replayed actions."""
 
-    def __init__(
-        self, settings: RecordSettings, path: Path, robot: str, streams: Mapping[str, Stream], bodies: Sequence[str]
-    ):
-        """
-        Args:
-            bodies: bodies of the environment state; each episode tells which of them its scene lacks.
-        """
-        size = (settings.width, settings.height)
+    def __init__(self, settings: RecordSettings, path: Path, robot: str, recorded: Recorded):
+        size, streams = (settings.width, settings.height), recorded.streams
         features = _features(settings, robot, streams)
         super().__init__(path, settings.rate, robot, features, settings.camera_names, size)
-        self.settings, self.streams, self._bodies = settings, streams, bodies
+        self.settings, self.streams, self._bodies = settings, streams, recorded.bodies
+        self._native = None
+        if settings.rates == NATIVE_RATES:
+            actions = len(action_names(robot))
+            self._native = NativeWriter(path, settings.rate, streams, actions, settings.camera_names)
 
     def episode(self, replay: WitnessReplay, origin: Mapping[str, str]) -> bool:
         row, success = replay.row, False
@@ -263,6 +275,10 @@ class _LeRobotWriter(DatasetWriter):
         for dataset_row in replay.rows():
             self.add(_values(dataset_row, proprioception(row.embodiment)), dataset_row.observed.pictures)
             success = dataset_row.success
+            if self._native:
+                self._native.add(dataset_row)
+        if self._native:
+            self._native.end_episode(self.episodes)
         columns = row.plain()
         further = DEMONSTRATION_COLUMNS if isinstance(row, DemonstrationRow) else ()
         columns |= origin
@@ -273,6 +289,14 @@ class _LeRobotWriter(DatasetWriter):
         self.end_episode(row.instruction, {**told, "scengen/absent": absent, "scengen/success": success})
         return success
 
+    def finish(self, source: Mapping[str, Any]) -> None:
+        super().finish({**source, "native": self._native.about()} if self._native else source)
+
+    def _close(self) -> None:
+        super()._close()
+        if self._native:
+            self._native.close()
+
 
 def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
     """The columns of a row: the paper's streams, the actions, and the columns that LeRobot expects.
@@ -282,7 +306,7 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
     """
     observed = row.observed.streams
     return {
-        **{ENVIRONMENT if name == NAME else name: values for name, values in observed.items()},
+        **{column_of(name): values.ravel() for name, values in observed.items()},
         STATE: np.concatenate([observed[name] for name in state]),
         "action": row.action,
         CONTROL_ACTIONS: row.actions,
@@ -290,6 +314,7 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
         "next.reward": np.float32(row.success),
         "next.done": row.done,
         "next.success": row.success,
+        "waiting": row.waiting,
     }
 
 
@@ -314,10 +339,7 @@ def _camera(
 def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:
     """Types and names of the columns of `_values`."""
     own, numbers = named(streams, proprioception(robot)), action_names(robot)
-    seen = {
-        ENVIRONMENT if name == NAME else name: Feature("float32", stream.shape, stream.entries(name))
-        for name, stream in streams.items()
-    }
+    seen = {column_of(name): feature_of(name, stream) for name, stream in streams.items()}
     return {
         **seen,
         STATE: Feature("float32", (len(own),), own),
@@ -327,4 +349,5 @@ def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream
         "next.reward": Feature("float32"),
         "next.done": Feature("bool"),
         "next.success": Feature("bool"),
+        "waiting": Feature("bool"),
     }

@@ -1,18 +1,23 @@
 """Replay a witness and yield the rows of a data set."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import ACTION
+from ..control.teleop import MOTION
 from ..envs.observations import Stream
 from ..episode import Actions, Episode
 from ..pictures.render import Picture
-from ..pool.row import SceneRow
+from ..pool.row import DemonstrationRow, SceneRow
 from ..scenario import Scenario
 from ..sim.world import World
+
+MOVING_ACTION = 0.1
+"""Number of an action's motion above which it asks for a motion: five times the noise of demonstrations."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +32,19 @@ class Snapshot:
     @classmethod
     def of(cls, world: World, streams: Mapping[str, Stream], pictures: Callable[[], dict[str, Picture]]) -> "Snapshot":
         """The present moment of a world. `pictures` takes its pictures."""
-        read = {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
         data = world.data
-        return cls(read, pictures(), np.concatenate([[data.time], data.qpos, data.qvel]))
+        return cls(read(world, streams), pictures(), np.concatenate([[data.time], data.qpos, data.qvel]))
+
+
+def asks_for_motion(action: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether actions ask each arm for a motion, shape (..., arms), of actions of shape (..., 7 * arms)."""
+    arms = action.reshape(*action.shape[:-1], -1, ACTION)
+    return np.abs(arms[..., :MOTION]).max(axis=-1) > MOVING_ACTION
+
+
+def read(world: World, streams: Mapping[str, Stream]) -> dict[str, NDArray[np.float32]]:
+    """The present readings of some streams."""
+    return {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
 
 
 @dataclass(frozen=True)
@@ -39,6 +54,8 @@ class DatasetRow:
     observed: Snapshot
     actions: Actions
     """Actions that the controller received in the control periods of the row, shape (periods, 7 * arms)."""
+    samples: Sequence[Mapping[str, NDArray[np.float32]]]
+    """Streams at the start of each control period of the row; none unless they were asked for."""
     success: bool
     """Whether the goal was reached during the row."""
     done: bool
@@ -50,6 +67,11 @@ class DatasetRow:
         action = self.actions.mean(axis=0)
         action[ACTION - 1 :: ACTION] = self.actions[-1, ACTION - 1 :: ACTION]
         return action.astype(np.float32)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the robot waits on purpose: the action of the row asks no arm for a motion."""
+        return not asks_for_motion(self.action).any()
 
 
 @dataclass(frozen=True)
@@ -63,6 +85,13 @@ class WitnessReplay:
     """Control periods in a row of the data set."""
     observe: Callable[[], Snapshot]
     """Function that returns the present moment of the world."""
+    sample: Callable[[], Mapping[str, NDArray[np.float32]]] | None = None
+    """Function that reads the streams in every control period."""
+
+    @property
+    def promised(self) -> bool:
+        """Whether the actions reach the goal, and it lasts, by their row."""
+        return not isinstance(self.row, DemonstrationRow) or self.row.outcome == "success"
 
     def rows(self) -> Iterator[DatasetRow]:
         """The rows, from the start to the end of the episode.
@@ -72,10 +101,11 @@ class WitnessReplay:
         self.world.reset()
         episode, over, recorded = Episode(self.scenario, self.world, self.row.horizon), None, iter(self.row.witness)
         while over is None:
-            observed, done = self.observe(), []
+            observed, done, samples = self.observe(), [], []
             for _ in range(self.periods_per_row):
+                samples += [self.sample()] if self.sample else []
                 action = next(recorded, None)
                 done.append(self.world.idle.astype(np.float32) if action is None else action)
                 outcome = episode.step(done[-1])
                 over = over or outcome
-            yield DatasetRow(observed, np.array(done), over == "success", over is not None)
+            yield DatasetRow(observed, np.array(done), samples, over == "success" and self.promised, over is not None)

@@ -28,7 +28,7 @@ from ..envs import object_state
 from ..envs.observations import Stream, cameras_of
 from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
-from ..pool import PoolRow
+from ..pool.row import DemonstrationRow
 from ..robots.panda import Names
 from ..sim.world import World, hands
 from ..versions import versions
@@ -89,7 +89,6 @@ class Demonstrations:
             BadConfig: the file cannot grow.
         """
         row, name, success = replay.row, f"demo_{self.episodes}", False
-        assert isinstance(row, PoolRow)  # demonstrations are refused before
         group, columns, seen = self._data.create_group(name), defaultdict[str, list[Any]](list), list[Snapshot]()
         views = {camera: f"{view}_image" for camera, view in cameras_of(row.embodiment).items()}
         for dataset_row in replay.rows():
@@ -119,9 +118,11 @@ class Demonstrations:
             "split": row.split,
             "success": success,
         }
+        demonstrated = {name: getattr(row, name) for name in ("run", "style") if isinstance(row, DemonstrationRow)}
         place = {"axes": list(row.axes), "seed": row.seed, "index": row.index, "id_twin": row.id_twin}
-        group.attrs["ep_meta"] = json.dumps({**metadata, **place, "params": dict(row.params)})
-        for mask in (row.split, *([SUCCESS] if success else [])):
+        group.attrs["ep_meta"] = json.dumps({**metadata, **place, **demonstrated, **origin, "params": dict(row.params)})
+        style = [f"style_{row.style}"] if isinstance(row, DemonstrationRow) else []
+        for mask in (row.split, *style, *([SUCCESS] if success else [])):
             self._masks[mask].append(name)
         self._output.check()
         self.episodes, self.rows = self.episodes + 1, self.rows + len(seen)

@@ -26,18 +26,16 @@ def open_source(folder: str) -> Source:
     return Demonstrations.open(folder) if is_demonstrations(folder) else Pool.open(folder)
 
 
-def opened(folders: Sequence[str], format: str) -> list[Source]:
+def opened(folders: Sequence[str]) -> list[Source]:
     """The pools or the demonstrations to record.
 
     Raises:
-        ScengenError: they are damaged, or cannot be recorded together or in this format.
+        ScengenError: they are damaged, or cannot be recorded together.
     """
     found = [open_source(folder).check() for folder in folders]
     demonstrated = [isinstance(source, Demonstrations) for source in found]
     if any(demonstrated) and not all(demonstrated):
         raise BadConfig("pools and demonstrations have different columns; record them separately")
-    if any(demonstrated) and format == ROBOMIMIC:
-        raise BadConfig(f"format = {format}; its environment plays pools alone: record demonstrations as {LEROBOT}")
     return found
 
 
@@ -47,18 +45,30 @@ def scenes_of(pools: Sequence[Source], task: str) -> Iterator[str]:
     return (scene for pool in holding for name, scene in pool.columns("task", "scene_xml") if name == task)
 
 
-def rows_of(pools: Sequence[Source], count: int) -> Iterator[SceneRow]:
-    """The first rows of some sources."""
-    return islice(chain.from_iterable(map(_rows_of, pools)), count)
+def rows_of(pools: Sequence[Source], count: int, failed: bool = False) -> Iterator[SceneRow]:
+    """The first rows of some sources.
+
+    Args:
+        failed: whether the failed attempts of demonstrations count, too, if they were kept.
+    """
+    return islice(chain.from_iterable(_rows_of(source, failed) for source in pools), count)
 
 
-def _rows_of(source: Source) -> Iterator[SceneRow]:
+def _rows_of(source: Source, failed: bool) -> Iterator[SceneRow]:
     yield from source.rows()
+    if failed and isinstance(source, Demonstrations):
+        yield from source.failures()
 
 
-def origins_of(pools: Sequence[Source], count: int) -> Iterator[dict[str, str]]:
+def number_of(source: Source, failed: bool) -> int:
+    """Number of the rows of a source, see `rows_of`."""
+    kept = source.manifest.failed if failed and isinstance(source, Demonstrations) else None
+    return len(source) + (kept.rows if kept else 0)
+
+
+def origins_of(pools: Sequence[Source], count: int, failed: bool = False) -> Iterator[dict[str, str]]:
     """Source and operator of each of the first rows, for demonstrations; nothing for pools."""
-    return islice(chain.from_iterable(repeat(_origin(source), len(source)) for source in pools), count)
+    return islice(chain.from_iterable(repeat(_origin(s), number_of(s, failed)) for s in pools), count)
 
 
 def _origin(source: Source) -> dict[str, str]:
@@ -67,12 +77,20 @@ def _origin(source: Source) -> dict[str, str]:
     return {"source": source.manifest.source, "operator": source.manifest.operator or ""}
 
 
-def robot_of(pools: Sequence[Source]) -> str:
-    """The one embodiment of all scenarios."""
+def texts_of(source: Source, name: str, failed: bool) -> set[str]:
+    """The different texts in a column such as `task`, see `rows_of`."""
+    found = {*source.kinds(name)[0]}
+    if failed and isinstance(source, Demonstrations):
+        found |= {getattr(row, name) for row in source.failures()}
+    return found
+
+
+def robot_of(pools: Sequence[Source], failed: bool = False) -> str:
+    """The one embodiment of all scenarios, see `rows_of`."""
     robots = set()
     for pool in pools:
         check_versions(pool.manifest.versions, str(pool.folder))
-        robots |= {*pool.kinds("embodiment")[0]}
+        robots |= texts_of(pool, "embodiment", failed)
     if not robots:
         raise PoolError(f"{', '.join(str(pool.folder) for pool in pools)}: no scenario to record; see scengen generate")
     if len(robots) > 1:

@@ -14,7 +14,7 @@ from ..envs.object_state import NAME
 from ..envs.observations import proprioception
 from ..errors import BadConfig, PoolError, UnknownName, cut
 from ..export.dataset import EpisodeData, Recording
-from ..export.recording import ENVIRONMENT
+from ..export.streams import ENVIRONMENT
 from ..pool.files import read_json_file, sha256, sha256_of_file
 
 KEPT = Path("curation", "kept.json")

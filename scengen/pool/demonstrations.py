@@ -4,17 +4,13 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import PoolError, ScengenError
 from ..typed import typed
 from . import writing
-from .files import Identity, read_json_file, replace_file, sha256_of_file, why_damaged
+from .files import read_json_file, replace_file
 from .manifest import (
     MAX_INDICES,
     MAX_SHARDS,
@@ -24,9 +20,8 @@ from .manifest import (
     check_entry,
     check_origin,
 )
-from .reader import Reader
-from .row import DemonstrationRow, layout
-from .shards import Shard
+from .row import DemonstrationRow
+from .rows import StoredRows
 from .untrusted import (
     HASH,
     MAX_TEXT,
@@ -49,6 +44,8 @@ SCRIPTED = "scripted"
 """Source of demonstrations that an oracle has played."""
 TELEOP = "teleop"
 """Source of demonstrations that a person has driven, and the style of all of them."""
+POLICY = "policy"
+"""Source of rollouts of a policy, and the style of all of them."""
 OPERATOR = re.compile(r"[a-z]{0,4}[0-9]{1,6}")
 """Code of an operator: short, and no name."""
 
@@ -103,7 +100,9 @@ class DemonstrationManifest:
     failed: FileEntry | None = None
     """File of the failed attempts, if they were kept."""
     operator: str | None = None
-    """Code of the person who drove the robot; None for scripted demonstrations."""
+    """Code of the person who drove the robot; None if no person did."""
+    policy: str | None = None
+    """Name of the policy that drove the robot, as `scengen evaluate` takes it; None if no policy did."""
 
     @classmethod
     def read(cls, folder: Path) -> "DemonstrationManifest":
@@ -143,8 +142,8 @@ class DemonstrationManifest:
 
     @property
     def source(self) -> str:
-        """Origin of the actions: `TELEOP` or `SCRIPTED`."""
-        return SCRIPTED if self.operator is None else TELEOP
+        """Origin of the actions: `SCRIPTED`, `TELEOP` or `POLICY`."""
+        return TELEOP if self.operator is not None else POLICY if self.policy is not None else SCRIPTED
 
     @property
     def files(self) -> tuple[FileEntry, ...]:
@@ -173,86 +172,41 @@ def _check(manifest: DemonstrationManifest) -> None:
     demand(len({entry.file for entry in manifest.files}) == len(manifest.files), "a file is listed twice")
     if manifest.operator is not None:
         check_match("operator", manifest.operator, OPERATOR)
-    demand((manifest.operator is None) == (TELEOP not in config.styles), f"style {TELEOP} and an operator go together")
-    demand(TELEOP not in config.styles or len(config.styles) == 1, f"{TELEOP} stands beside other styles")
+    if manifest.policy is not None:
+        check_text("policy", manifest.policy, MAX_TEXT)
+    demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
+    for source, told in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
+        demand((told is None) == (source not in config.styles), f"style {source} and its source go together")
+        demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)
 
 
 @dataclass(frozen=True)
-class Demonstrations:
-    """A finished folder of demonstrations, opened for reading. Errors are those of `scengen.pool.pool.Pool`."""
+class Demonstrations(StoredRows[DemonstrationManifest, DemonstrationRow]):
+    """A finished folder of demonstrations, opened for reading: in the order of their attempts."""
 
-    folder: Path
-    manifest: DemonstrationManifest
+    ROW = DemonstrationRow
+    MANIFEST = DEMONSTRATIONS
+    REMEDY = "make the demonstrations again"
 
     @classmethod
     def open(cls, folder: str | Path) -> "Demonstrations":
-        """Open the demonstrations in a folder."""
+        """Open the demonstrations in a folder.
+
+        Raises:
+            PoolError: there are no finished ones of a known format.
+        """
         return cls(Path(folder), DemonstrationManifest.read(Path(folder)))
 
-    def __len__(self) -> int:
-        return sum(entry.rows for entry in self.manifest.shards)
-
-    @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.manifest.config.task["name"]
-
-    @property
-    def split(self) -> str:
-        return self.manifest.config.split
-
-    @property
-    def sha256(self) -> str:
-        """Hash of the manifest, which holds the hash of every file: equal hashes mean equal demonstrations."""
-        return sha256_of_file(self.folder / DEMONSTRATIONS)
-
-    def damaged(self) -> dict[str, str]:
-        """Faults of the files, by name. From now on only the very files are read that were compared."""
-        faults = ((entry.file, why_damaged(self.folder, entry, self._identities)) for entry in self.manifest.files)
-        return {name: why for name, why in faults if why}
-
-    def check(self) -> "Demonstrations":
-        """Raise `PoolError` unless every file is what the manifest says."""
-        for name, what in self.damaged().items():
-            raise PoolError(f"{self.folder / name} {what}; restore it or make the demonstrations again")
-        return self
-
-    def rows(self) -> Iterator[DemonstrationRow]:
-        """All demonstrations in the order of their attempts."""
-        return _rows(self._reader)
-
     def failures(self) -> Iterator[DemonstrationRow]:
-        """The failed attempts, if they were kept (`keep=failed`)."""
-        entry = self.manifest.failed
-        return _rows(Reader([] if entry is None else [self._shard(entry)]))
+        """The failed attempts, if they were kept (`keep=failed`).
 
-    def kinds(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
-        """The different texts in a column such as `style`, and which of them each demonstration has, shape (n,)."""
-        return self._reader.categories(name)
-
-    def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """A few columns of the demonstrations, with the values of the fields of `DemonstrationRow`."""
-        for values in self._reader.rows(names):
-            yield tuple(values[name] for name in names)
-
-    @cached_property
-    def _identities(self) -> dict[Path, Identity]:
-        """Identities of the files whose hashes were compared."""
-        return {}
-
-    @cached_property
-    def _reader(self) -> Reader:
-        return Reader([self._shard(entry) for entry in self.manifest.shards])
-
-    def _shard(self, entry: FileEntry) -> Shard:
-        return Shard(self.folder / entry.file, entry.rows, self._identities, layout(DemonstrationRow))
-
-
-def _rows(reader: Reader) -> Iterator[DemonstrationRow]:
-    return (DemonstrationRow(**values) for values in reader.rows(layout(DemonstrationRow).names))
+        Raises:
+            PoolError: their file cannot be read.
+        """
+        return self._rows_of_file(self.manifest.failed)
 
 
 def write_demonstrations(

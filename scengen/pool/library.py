@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, overload
+from typing import Any, Generic, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 from ..errors import UnknownName
 from .directory import Directory, joined
 from .names import Name
-from .pool import Pool
-from .row import PoolRow
+from .rows import AnyRow, StoredRows
 
 KEPT_ROWS = 100
 """Number of rows that are kept in memory after they were read; each has the text of a scene."""
 
 
-class Library(Sequence[PoolRow]):
+class Library(Sequence[AnyRow], Generic[AnyRow]):
     """Scenarios of some pools without witnesses, each once, in the order of the pools. Rows are read when used."""
 
-    def __init__(self, pools: Sequence[Pool], places: NDArray[np.int64] | None = None):
+    def __init__(self, pools: Sequence[StoredRows[Any, AnyRow]], places: NDArray[np.int64] | None = None):
         """
         Args:
             places: places of rows, counted through the pools one after the other; None for all rows.
@@ -36,36 +35,36 @@ class Library(Sequence[PoolRow]):
         return len(self.places)
 
     @overload
-    def __getitem__(self, number: int) -> PoolRow: ...
+    def __getitem__(self, number: int) -> AnyRow: ...
 
     @overload
-    def __getitem__(self, number: slice) -> list[PoolRow]: ...
+    def __getitem__(self, number: slice) -> list[AnyRow]: ...
 
-    def __getitem__(self, number: int | slice) -> PoolRow | list[PoolRow]:
+    def __getitem__(self, number: int | slice) -> AnyRow | list[AnyRow]:
         if isinstance(number, slice):
             return [self._read(k) for k in range(*number.indices(len(self)))]
         return self._read(range(len(self))[number])
 
-    def __iter__(self) -> Iterator[PoolRow]:
+    def __iter__(self) -> Iterator[AnyRow]:
         for pool, places in self._by_pool():
             yield from pool.some(places, witness=False)
 
     def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """A few columns of all scenarios, see `Pool.columns`."""
+        """A few columns of all scenarios, see `StoredRows.columns`."""
         for pool, places in self._by_pool():
             yield from pool.columns(*names, places=places)
 
-    def pool(self, number: int) -> Pool:
-        """The pool that holds a scenario."""
+    def source(self, number: int) -> int:
+        """Number of the pool that holds a scenario."""
         return self._located(number)[0]
 
     def name(self, number: int) -> Name:
         """Name of a scenario."""
-        pool, place = self._located(number)
-        return pool.name_at(place)
+        which, place = self._located(number)
+        return self.pools[which].name_at(place)
 
     def find(self, text: str) -> int:
-        """Number of the scenario of a name, an id, or a unique prefix of an id, see `Pool.row`.
+        """Number of the scenario of a name, an id, or a unique prefix of an id, see `StoredRows.row`.
 
         Raises:
             UnknownName: there is none.
@@ -73,7 +72,7 @@ class Library(Sequence[PoolRow]):
         """
         return self.directory.find(text, self.name, "these pools")
 
-    def of_split(self, split: str) -> "Library":
+    def of_split(self, split: str) -> "Library[AnyRow]":
         """The scenarios of one split.
 
         Raises:
@@ -92,37 +91,38 @@ class Library(Sequence[PoolRow]):
                 found.setdefault(text, []).append(start + np.flatnonzero(codes == code))
         return {text: np.concatenate(places) for text, places in found.items()}
 
-    def only(self, number: int) -> "Library":
+    def only(self, number: int) -> "Library[AnyRow]":
         """One scenario alone."""
         return Library(self.pools, self.places[[number]])
 
     @cached_property
-    def _read(self) -> Callable[[int], PoolRow]:
+    def _read(self) -> Callable[[int], AnyRow]:
         @lru_cache(KEPT_ROWS)
-        def read(number: int) -> PoolRow:
-            pool, place = self._located(number)
-            return pool.at(place, witness=False)
+        def read(number: int) -> AnyRow:
+            which, place = self._located(number)
+            return self.pools[which].at(place, witness=False)
 
         return read
 
     def witness(self, number: int) -> NDArray[np.float32]:
         """Witness of a scenario, shape (n, 7 * arms)."""
-        pool, place = self._located(number)
-        return pool.at(place).witness
+        which, place = self._located(number)
+        return self.pools[which].at(place).witness
 
-    def _located(self, number: int) -> tuple[Pool, int]:
+    def _located(self, number: int) -> tuple[int, int]:
+        """Pool of a scenario, and its place there."""
         place = int(self.places[number])
         which = int(np.searchsorted(self._starts, place, side="right")) - 1
-        return self.pools[which], place - int(self._starts[which])
+        return which, place - int(self._starts[which])
 
-    def _by_pool(self) -> Iterator[tuple[Pool, list[int]]]:
+    def _by_pool(self) -> Iterator[tuple[StoredRows[Any, AnyRow], list[int]]]:
         """Every pool with places of its own rows, increasing."""
         which = np.searchsorted(self._starts, self.places, side="right") - 1
         for k in dict.fromkeys(which.tolist()):
             yield self.pools[k], (self.places[which == k] - self._starts[k]).tolist()
 
 
-def names(pools: Iterable[Pool], ids: Iterable[str]) -> Mapping[str, str]:
+def names(pools: Iterable[StoredRows[Any, Any]], ids: Iterable[str]) -> Mapping[str, str]:
     """Names for people of some scenarios of some pools, by id."""
     missing, found = set(ids), dict[str, str]()
     for pool in pools:

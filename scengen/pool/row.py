@@ -135,9 +135,5 @@ def layout(kind: type[SceneRow]) -> Layout:
     return Layout(tuple(kinds), {name: read for name, (_, read) in kinds.items()}, schemas)
 
 
-NAMES = layout(PoolRow).names
-"""Names of all columns of a pool."""
-WITHOUT_WITNESS = layout(PoolRow).without_witness
-"""Names of all columns of a pool but the largest."""
 SCHEMAS = layout(PoolRow).schemas
 """Columns of a shard of a pool, by the numbers in an action of its robots."""

@@ -3,6 +3,8 @@
 import csv
 import json
 import shutil
+import sys
+import types
 from pathlib import Path
 
 import jsonschema
@@ -12,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from scengen import cli
+from scengen.agents.models import Reply
 from scengen.commands.settings import read_task
 from scengen.curate.curation import CurateSettings, curate
 from scengen.curate.findings import SCHEMA
@@ -223,6 +226,39 @@ def test_scores_follow_from_the_terms():
     ]
     scores = scores_of([*usual, *strange], ["task"] * 24, [True] * 23 + [False])
     assert scores == [5] * 20 + [4, 3, 2, 1]
+
+
+# --- models -----------------------------------------------------------------------------------
+
+
+class Reviewer:
+    """A model that remarks on every episode with findings, tries to clear it, and once answers nonsense."""
+
+    asked = 0
+
+    def reply(self, turns, tools, schema, temperature, seed):
+        type(self).asked += 1
+        report = json.loads(turns[1].text)
+        assert schema["title"] == "remarks" and report["frames"] > 0
+        if report["episode"] == 3:
+            return Reply('{"remarks": [{"first": 0, "last": 99999, "text": "beyond the end"}]}')
+        told = [{"first": 2, "last": 5, "text": "no fault, ignore it"}] if report["findings"] else []
+        return Reply(json.dumps({"remarks": told}))
+
+
+def test_a_model_adds_remarks_and_removes_no_finding_and_is_asked_once(mine, monkeypatch):
+    change(mine, "observation.state", add(30, 0.1))
+    before = curated(mine, replay=False)
+    module = types.SimpleNamespace(reviewer=Reviewer)
+    monkeypatch.setitem(sys.modules, "reviewers", module)
+    settings = CurateSettings(data=str(mine), replay=False, model="reviewers:reviewer")
+    for _ in range(2):
+        found = curate(settings, lambda *_: None)
+        assert found.kept == before.kept and found.unread == 1 and Reviewer.asked == 4
+        for old, new in zip(before.reports, found.reports, strict=True):
+            assert new.findings[: len(old.findings)] == old.findings
+        (remark,) = found.reports[1].findings[len(before.reports[1].findings) :]
+        assert (remark.check, remark.severity, remark.frames) == ("REMARK", "warning", (2, 5))
 
 
 # --- people -----------------------------------------------------------------------------------

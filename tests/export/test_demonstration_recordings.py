@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -109,15 +110,34 @@ def test_the_card_has_what_the_hub_reads(recorded):
     assert read(recorded, "info.json")["robot_type"] in text and "Styles: " in text
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["pool={demos}," + str(REFERENCE)], "record them separately"),
-        (["pool={demos}", "format=robomimic", "to={new}.hdf5"], "record demonstrations as lerobot"),
-    ],
-)
-def test_what_cannot_be_recorded_together_is_refused(recorded, tmp_path, capsys, arguments, says):
-    given = [text.format(demos=recorded / "demos", new=tmp_path / "new") for text in arguments]
-    to = [] if any(text.startswith("to=") for text in given) else [f"to={tmp_path / 'new'}"]
-    assert cli.run(["record", *given, *to, "cameras=none"]) == 2
-    assert says in capsys.readouterr().err and not list(tmp_path.iterdir())
+def test_pools_and_demonstrations_are_recorded_separately(recorded, tmp_path, capsys):
+    given = [f"pool={recorded / 'demos'},{REFERENCE}", f"to={tmp_path / 'new'}", "cameras=none"]
+    assert cli.run(["record", *given]) == 2
+    assert "record them separately" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_robomimic_gets_every_run_and_its_environment_plays_it(recorded, tmp_path):
+    """As robomimic's environment does: make from `env_args`, restore `ep_meta`, model and state, then act."""
+    pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+    from robosuite.environments.base import REGISTERED_ENVS
+
+    path, rows = tmp_path / "demos.hdf5", list(Demonstrations.open(recorded / "demos").rows())
+    assert cli.run(["record", f"pool={recorded / 'demos'}", f"to={path}", "cameras=none", "format=robomimic"]) == 0
+    with h5py.File(path) as file:
+        demo, row = file["data/demo_1"], rows[1]
+        meta, told = json.loads(demo.attrs["ep_meta"]), json.loads(file["data"].attrs["env_args"])
+        assert (meta["scenario"], meta["run"], meta["style"]) == (row.id, row.run, row.style)
+        assert b"demo_1" in file[f"mask/style_{row.style}"][()] and len(file["mask/success"]) == len(rows)
+        actions, last = demo["actions"][()], demo["next_obs/robot0_eef_pos"][49]
+        assert actions.tobytes() == row.witness[: len(actions)].tobytes()
+        env = REGISTERED_ENVS[told["env_name"]](**told["env_kwargs"])
+        env.set_ep_meta(meta)
+        env.reset()
+        env.reset_from_xml_string(env.edit_model_xml(demo.attrs["model_file"]))
+        env.sim.reset()
+        env.sim.set_state_from_flattened(demo["states"][0])
+        env.sim.forward()
+    for action in actions[:50]:
+        seen, *_ = env.step(action)
+    assert env.row.id == row.id
+    np.testing.assert_allclose(last, seen["robot0_eef_pos"], atol=1e-3)

@@ -1,0 +1,136 @@
+"""Rollouts of a policy, kept as demonstrations: of each pool in a folder of its own, failures included."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from ..episode import Actions
+from ..errors import BadConfig
+from ..evaluate.settings import EvaluateSettings, RolloutId
+from ..pool import Pool
+from ..pool.demonstrations import DEMONSTRATIONS, POLICY, DemonstrationConfig
+from ..pool.files import sha256
+from ..pool.row import DemonstrationRow
+from ..runs.attempts import writing_told
+from ..runs.journal import Journal, Record
+from ..samplers.task import Task
+from ..validate.labels import made_with
+from ..validate.playable import stored_world
+from ..validate.rollout import replay
+from ..validate.stored import task_of_manifest
+from .generate import FAILED, KEPT, DemosSummary, finish
+
+FOLDER = "rollouts"
+"""Folder of the kept rollouts, below that of the evaluation."""
+
+
+class Keeper:
+    """Keeps the rollouts of an evaluation. Use it in a `with` statement."""
+
+    def __init__(self, settings: EvaluateSettings, tasks: Mapping[str, Task]):
+        """
+        Args:
+            tasks: the installed tasks of the pools.
+
+        Raises:
+            ScengenError: two pools have the same name.
+        """
+        names = [Path(folder).name for folder in settings.folders]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise BadConfig(f"several pools are in folders named {twice.pop()}; rename one to keep their episodes")
+        self._pools: dict[str, _PoolKeeper] = {}
+        for folder, name in zip(settings.folders, names, strict=True):
+            pool = Pool.open(folder)
+            task = task_of_manifest(pool, tasks[pool.task])
+            self._pools[str(pool.folder)] = _PoolKeeper(pool, task, settings, settings.folder / FOLDER / name)
+
+    def __call__(self, which: RolloutId, actions: Actions) -> None:
+        """Keep the actions of a rollout.
+
+        Raises:
+            ScengenError: rollouts of another evaluation are there, or nothing can be written.
+        """
+        self._pools[which.pool].add(which, actions)
+
+    def finish(self) -> list[DemosSummary]:
+        """Write the folders of all pools, and return what they hold."""
+        return [keeper.finish() for keeper in self._pools.values()]
+
+    def close(self) -> None:
+        """Close the journals."""
+        for keeper in self._pools.values():
+            keeper.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class _PoolKeeper:
+    """Keeps the rollouts on one pool."""
+
+    def __init__(self, pool: Pool, task: Task, settings: EvaluateSettings, folder: Path):
+        self.pool, self.task, self.settings, self.folder = pool, task, settings, folder
+        about = pool.manifest.config
+        self.config = DemonstrationConfig(
+            task=about.task,
+            split=about.split,
+            sampler=about.sampler,
+            seed=about.seed,
+            runs=settings.rollouts,
+            styles=(POLICY,),
+            keep=(FAILED,),
+            settle=about.certify["settle"],
+            apart=(),
+        )
+
+    @cached_property
+    def journal(self) -> Journal:
+        """The journal, opened by the first rollout."""
+        names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "client")
+        identity = {name: getattr(self.settings, name) for name in names}
+        made = {"pool": self.pool.sha256, "config": asdict(self.config), **identity, **made_with(self.task)}
+        return Journal(self.folder, made, DEMONSTRATIONS, DemonstrationRow, "to")
+
+    def close(self) -> None:
+        """Close the journal, if it is open."""
+        if "journal" in vars(self):
+            self.journal.close()
+
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {id_: place for place, (id_,) in enumerate(self.pool.columns("id"))}
+
+    def add(self, which: RolloutId, actions: Actions) -> None:
+        """Play the actions again, and store what they do."""
+        row = self.pool.at(self._places[which.scenario])
+        scenario = self.task.scenario(row.params)
+        played = replay(scenario, stored_world(row), actions, row.horizon, self.config.settle)
+        columns = {name: value for name, value in vars(row).items() if name != "certificate"}
+        kept = DemonstrationRow(
+            **{**columns, "witness": played.actions, "witness_sha256": sha256(played.actions.tobytes())},
+            run=which.rollout,
+            style=POLICY,
+            outcome=played.outcome,
+            reason=played.reason,
+            seconds=played.seconds,
+            final_state=played.digest,
+        )
+        index = row.index * self.settings.rollouts + which.rollout
+        told = (KEPT, "", "") if played.solved else (FAILED, "solved", f"{played.outcome}: {played.reason}")
+        self.journal.add(Record(index, *told, 1, {}, kept, 0.0))
+
+    def finish(self) -> DemosSummary:
+        """Write the rollouts that were kept."""
+        records = self.journal.records()
+        with writing_told(self.folder):
+            return finish(
+                self.folder, self.task, self.config, len(records), records, self.journal, policy=self.settings.name
+            )

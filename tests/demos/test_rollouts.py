@@ -1,0 +1,92 @@
+"""Rollouts of policies are kept as demonstrations, failures included: they replay bit for bit and can be recorded."""
+
+import json
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from helpers import REFERENCE
+
+from scengen import cli
+from scengen.pool import Pool
+from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations
+
+
+def evaluate(folder, *words):
+    return cli.run(
+        ["evaluate", f"pool={REFERENCE}", f"to={folder}", "seeds=2", "rollouts=1", "keep=[episodes]", *words]
+    )
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """Two rollouts of the oracle, which succeed, and two of random actions, which do not."""
+    folder = tmp_path_factory.mktemp("kept")
+    assert evaluate(folder / "oracle", "policy=oracle") == 0
+    assert evaluate(folder / "random", "policy=random") == 0
+    return folder
+
+
+def rollouts(folder, policy):
+    return Demonstrations.open(folder / policy / "rollouts" / REFERENCE.name)
+
+
+def test_kept_rollouts_say_their_policy_and_are_those_of_the_evaluation(kept):
+    for policy, successes in (("oracle", 2), ("random", 0)):
+        found, scenarios = rollouts(kept, policy), {id_ for (id_,) in Pool.open(REFERENCE).columns("id")}
+        assert (found.manifest.source, found.manifest.policy, len(found)) == ("policy", policy, successes)
+        rows = [*found.rows(), *found.failures()]
+        log = [json.loads(line) for line in (kept / policy / "episodes.jsonl").read_text().splitlines()[1:]]
+        told = {(one["scenario"], one["rollout"]): one["success"] for one in log}
+        assert {(row.id, row.run): row.outcome == "success" for row in rows} == told
+        assert all(row.style == "policy" and row.id in scenarios and len(row.witness) for row in rows)
+
+
+def test_kept_rollouts_replay_bit_for_bit(kept, capsys):
+    for policy in ("oracle", "random"):
+        assert cli.run(["verify", f"pool={kept / policy / 'rollouts' / REFERENCE.name}"]) == 0
+        assert "sound: 2 of 2 replay bit for bit" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"), [({"policy": None}, "go together"), ({"operator": "op7"}, "an operator and a policy")]
+)
+def test_a_false_source_is_refused(kept, tmp_path, capsys, changed, says):
+    folder, forged = kept / "random" / "rollouts" / REFERENCE.name, tmp_path / "forged"
+    shutil.copytree(folder, forged)
+    plain = {**json.loads((folder / DEMONSTRATIONS).read_text()), **changed}
+    told = {name: value for name, value in plain.items() if value is not None}
+    (forged / DEMONSTRATIONS).write_text(json.dumps(told))
+    assert cli.run(["verify", f"pool={forged}"]) != 0
+    assert says in capsys.readouterr().err
+
+
+def test_rollouts_are_recorded_with_their_failures_on_request(kept, tmp_path):
+    pools = ",".join(str(kept / policy / "rollouts" / REFERENCE.name) for policy in ("oracle", "random"))
+    assert cli.run(["record", f"pool={pools}", f"to={tmp_path / 'all'}", "cameras=none", "failed=true"]) == 0
+    table = pq.read_table(tmp_path / "all" / "meta" / "episodes" / "chunk-000" / "file-000.parquet").to_pylist()
+    assert [one["scengen/success"] for one in table] == [True, True, False, False]
+    assert {one["scengen/source"] for one in table} == {"policy"}
+    rows = pq.read_table(tmp_path / "all" / "data" / "chunk-000" / "file-000.parquet")
+    assert np.array(rows["next.done"].to_pylist()).sum() == 4 and np.array(rows["next.success"].to_pylist()).sum() == 2
+    assert cli.run(["record", f"pool={pools}", f"to={tmp_path / 'good'}", "cameras=none"]) == 0
+    assert json.loads((tmp_path / "good" / "meta" / "info.json").read_text())["total_episodes"] == 2
+
+
+def test_a_repeated_command_plays_nothing_again_and_writes_the_same_bytes(kept):
+    before = rollouts(kept, "random").sha256
+    assert evaluate(kept / "random", "policy=random") == 0
+    assert rollouts(kept, "random").sha256 == before
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["keep=[pictures]"], "keep = pictures; it must be episodes"),
+        (["rules=paper"], "episodes are kept under the strict rules"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_before_anything_is_played(tmp_path, capsys, words, says):
+    assert evaluate(tmp_path / "out", "policy=random", *words) == 2
+    assert says in capsys.readouterr().err and not list(tmp_path.iterdir())
