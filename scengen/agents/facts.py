@@ -45,7 +45,7 @@ class Question:
     right: str | list[str] = field(default_factory=list)
     """Right options, if they are the same in all scenarios; else the family answers."""
     unit: str = ""
-    """Unit of a number."""
+    """Unit of a number; `1` for a share or a count."""
     within: float = 0.0
     """Largest error of a number that counts as right."""
     shortcut: str = ""
@@ -87,7 +87,8 @@ class Fact:
         if not self.options and not self.within:
             return "a whole number"
         if not self.options:
-            return f"a number [{self.unit}], which counts as right within {self.within:g}"
+            unit = "" if self.unit == "1" else f" [{self.unit}]"
+            return f"a number{unit}, which counts as right within {self.within:g}"
         return "all options that hold" if self.many else "one option"
 
     def holds(self, claim: object) -> bool:
