@@ -98,10 +98,12 @@ def _show_executed(settings: AgentSettings, found: Outcome) -> None:
         title = f"{settings.model}: {TITLES[PLAN]} carried out, goal reached [%]"
         _print(title, rows)
         write(settings.folder / "table-2-executed.md", markdown(title, rows))
-        say(
-            f"right plans that reach the goal: {agreed.right_reached} of {agreed.right}; wrong plans that reach it: "
-            f"{agreed.wrong_reached} of {agreed.wrong}"
-        )
+        for what, reached, all_ in (
+            ("right", agreed.right_reached, agreed.right),
+            ("wrong", agreed.wrong_reached, agreed.wrong),
+        ):
+            if all_:
+                say(f"{what} plans that reach the goal: {reached} of {all_}")
     if agreed.no_moves:
         say(f"not carried out, as their sub-goals have no moves: plans of {', '.join(agreed.no_moves)}")
 
