@@ -1,0 +1,81 @@
+"""Compares verdicts: the policy `replay` in lerobot-eval's own rollout, and in `scengen evaluate`.
+
+    python check.py POOL [POOL ...]
+
+Every scenario of the pools is played in both. Exit status 1 if a verdict differs.
+"""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import torch
+from lerobot.scripts.lerobot_eval import rollout
+from lerobot_env_scengen import ScengenEnv
+
+from scengen.envs.gym import PoolEnv
+from scengen.evaluate.policies import NearestReplay
+from scengen.evaluate.rollouts import evaluate
+from scengen.evaluate.settings import EvaluateSettings
+from scengen.pool import Pool
+from scengen.pool.library import Library
+
+
+class Replay(torch.nn.Module):
+    """scengen's policy `replay` for a batch of environments, with the interface of LeRobot's policies."""
+
+    def __init__(self, envs: list[PoolEnv], memory: Library):
+        super().__init__()
+        self.policies, self.begun = [NearestReplay(env, memory) for env in envs], False
+
+    def reset(self) -> None:
+        """Begin an episode. LeRobot calls it before the environments are reset."""
+        self.begun = False
+
+    def select_action(self, batch: dict) -> torch.Tensor:
+        """The next action of every environment, shape (batch, 7)."""
+        if not self.begun:
+            for policy in self.policies:
+                policy.reset({}, {}, 0)
+            self.begun = True
+        return torch.from_numpy(np.array([policy.act({}) for policy in self.policies], np.float32))
+
+
+def lerobot_verdicts(pools: list[str]) -> dict[str, bool]:
+    """Whether each scenario is solved in LeRobot's rollout, by id."""
+    first = next(Pool.open(pools[0]).rows(witness=False))
+    config, found = ScengenEnv(task=first.task, pool=",".join(pools), fps=100), {}
+    memory = Library([Pool.open(folder) for folder in pools]).of_split("id")
+    for vector in (batches[0] for batches in config.create_envs(n_envs=1).values()):
+        env = vector.envs[0].unwrapped
+        policy = Replay([env], memory)
+        for seed in range(1000, 1000 + len(env.scenarios)):
+            played = rollout(vector, policy, _same, _same, _same, _same, seeds=[seed])
+            found[env.scenarios[seed % len(env.scenarios)]] = bool(played["success"].any())
+        vector.close()
+    return found
+
+
+def scengen_verdicts(pools: list[str]) -> dict[str, bool]:
+    """Whether each scenario is solved in `scengen evaluate`, by id."""
+    seeds = min(len(Pool.open(folder)) for folder in pools)
+    with TemporaryDirectory() as folder:
+        settings = EvaluateSettings("replay", pools, seeds=seeds, rollouts=1, to=str(Path(folder, "out")))
+        return {e["scenario"]: e["success"] for e in evaluate(settings, lambda *_: None).episodes}
+
+
+def _same(value: object) -> object:
+    return value
+
+
+def main() -> int:
+    pools = sys.argv[1:]
+    theirs, ours = lerobot_verdicts(pools), scengen_verdicts(pools)
+    differ = [id_ for id_, success in ours.items() if theirs[id_] != success]
+    print(f"{len(ours)} scenarios: {sum(ours.values())} solved in scengen, {len(differ)} verdicts differ {differ}")
+    return 1 if differ else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,146 @@
+"""Scenarios of scengen as an environment of LeRobot: `lerobot-eval --env.type=scengen --env.task=... --env.pool=...`.
+
+Each split of the pools is a suite, so that one call of lerobot-eval reports success in and out of distribution.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from lerobot.configs.types import FeatureType, PolicyFeature
+from lerobot.envs.configs import EnvConfig
+from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
+
+from scengen.control.loop import Loop
+from scengen.envs.gym import PoolEnv
+from scengen.envs.lerobot import AGENT, ENVIRONMENT, PIXELS, ROLLOUT, LeRobotNames
+from scengen.envs.object_state import NAME
+from scengen.envs.observations import proprioception
+from scengen.envs.pools import rows_of
+from scengen.errors import BadConfig
+
+
+class EachOnce(gymnasium.Wrapper):
+    """An environment that refuses to begin a scenario a second time under another seed.
+
+    A seed stands for a scenario of the pool and wraps around at its end. LeRobot counts seeds up, from 1000 by default.
+    With more episodes than scenarios it would take repetitions for independent trials.
+    """
+
+    def __init__(self, env: gymnasium.Env, slot: int):
+        """
+        Args:
+            slot: number of the environment in its batch; its first seed is that of the run plus this number.
+        """
+        super().__init__(env)
+        self._slot, self._start = slot, None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """See `PoolEnv.reset`.
+
+        Raises:
+            BadConfig: the pool has fewer scenarios than the run has begun episodes.
+        """
+        if seed is not None and (options or {}).get(ROLLOUT):
+            self._start = seed - self._slot if self._start is None else self._start
+            count = len(self.unwrapped.scenarios)
+            if seed - self._start >= count:
+                whole = "give --eval.n_episodes of at most that, and --eval.batch_size that divides it"
+                raise BadConfig(f"seed {seed} would repeat a scenario: this split has {count}; {whole}")
+        return self.env.reset(seed=seed, options=options)
+
+
+@EnvConfig.register_subclass("scengen")
+@dataclass
+class ScengenEnv(EnvConfig):
+    """Settings of the environment, each with `--env.` before its name."""
+
+    task: str | None = "domino_single"
+    """Name of the task."""
+    pool: str = ""
+    """Folder of a pool, or several folders separated by commas."""
+    split: str = ""
+    """Splits to play, separated by commas; default: all splits of the pools."""
+    cameras: str = ""
+    """Cameras of the observation, separated by commas, such as `rgb_exo_right_cam`."""
+    environment_state: bool = False
+    """Whether `object-state`, which is privileged, is part of the observation."""
+    fps: int = 25
+    """Rate of the policy [Hz], which divides 100 Hz: that of its data."""
+    width: int = 256
+    """Width of pictures [pixels]."""
+    height: int = 256
+    """Height of pictures [pixels]."""
+    settle: bool = True
+    """Whether a reached goal must still hold after a second with the robot idle, as in `scengen evaluate`."""
+    rules: str = "strict"
+    """Rules of episodes: `strict`, or `paper`."""
+
+    def __post_init__(self) -> None:
+        """Describe the observations, which depend on the pools."""
+        if self.pool:
+            space = self._environment(self._splits()[0], 0).observation_space
+            self.features = {ACTION: PolicyFeature(FeatureType.ACTION, self._action_shape())}
+            self.features_map = {ACTION: ACTION}
+            vectors = {AGENT: (FeatureType.STATE, OBS_STATE), ENVIRONMENT: (FeatureType.ENV, OBS_ENV_STATE)}
+            for name in vectors.keys() & space.spaces.keys():
+                kind, self.features_map[name] = vectors[name]
+                self.features[name] = PolicyFeature(kind, space[name].shape)
+            for camera in self._listed(self.cameras):
+                self.features[f"{PIXELS}/{camera}"] = PolicyFeature(FeatureType.VISUAL, space[PIXELS][camera].shape)
+                self.features_map[f"{PIXELS}/{camera}"] = f"{OBS_IMAGES}.{camera}"
+
+    @property
+    def gym_kwargs(self) -> dict[str, Any]:
+        """Arguments of `PoolEnv` other than task and split.
+
+        Raises:
+            BadConfig: the rate does not divide 100 Hz.
+        """
+        repeat = 1 / (Loop.PERIOD * self.fps)
+        if abs(repeat - round(repeat)) > 1e-9:
+            raise BadConfig(f"--env.fps={self.fps}; it must divide {1 / Loop.PERIOD:g} Hz")
+        embodiment = rows_of(self._listed(self.pool), str(self.task))[0].embodiment
+        state = [NAME] if self.environment_state else []
+        return {
+            "pool": self._listed(self.pool),
+            "observations": [*proprioception(embodiment), *state, *self._listed(self.cameras)],
+            "action_repeat": round(repeat),
+            "width": self.width,
+            "height": self.height,
+            "settle": self.settle,
+            "rules": self.rules,
+            "render_mode": "rgb_array",
+        }
+
+    def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, VectorEnv]]:
+        """Batches of environments by split, each under the number 0.
+
+        Raises:
+            ScengenError: a setting or a pool is not valid.
+        """
+        if not self.pool:
+            raise BadConfig("no pool was given; give --env.pool=FOLDER, which scengen generate makes")
+        found: dict[str, dict[int, VectorEnv]] = {}
+        for split in self._splits():
+            makers = [lambda split=split, slot=slot: self._environment(split, slot) for slot in range(n_envs)]
+            if use_async_envs and n_envs > 1:
+                envs: VectorEnv = AsyncVectorEnv(makers, context="forkserver", autoreset_mode=AutoresetMode.SAME_STEP)
+            else:
+                envs = SyncVectorEnv(makers, autoreset_mode=AutoresetMode.SAME_STEP)
+            found[split] = {0: envs}
+        return found
+
+    def _environment(self, split: str, slot: int) -> gymnasium.Env:
+        return EachOnce(LeRobotNames(PoolEnv(str(self.task), split=split, **self.gym_kwargs)), slot)
+
+    def _splits(self) -> list[str]:
+        return self._listed(self.split) or sorted(rows_of(self._listed(self.pool), str(self.task)).kinds("split"))
+
+    def _action_shape(self) -> tuple[int, ...]:
+        return PoolEnv(str(self.task), **self.gym_kwargs).action_space.shape or ()
+
+    @staticmethod
+    def _listed(text: str) -> list[str]:
+        return [each for each in text.split(",") if each]
