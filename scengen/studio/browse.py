@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..errors import ScengenError
 from ..geometry import Vec3
 from ..pictures import film
 from ..pictures.report import template
@@ -18,7 +17,7 @@ from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.playable import check_row, stored_world
 from .player import Player
-from .scene import SceneView, filmed
+from .scene import FAULTS, SceneView, filmed, one_line
 
 TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
 """Position of the training twin beside the scenario [m]: the table is 0.8 m wide."""
@@ -124,9 +123,9 @@ class Browser:
         with self._busy:
             try:
                 work()
-            except ScengenError as error:
+            except FAULTS as error:
                 self._player.unload()
-                self._about.content = template("studio_fault.html").render(fault=str(error))
+                self._about.content = template("studio_fault.html").render(fault=one_line(error))
 
     def _show(self) -> None:
         """Show the chosen scenario, with its witness ready to be played."""
@@ -135,16 +134,21 @@ class Browser:
             return
         self._shown = (str(self.pool.folder), place)
         self._player.unload()
-        row = check_row(self.pool.at(place))
+        self._row = self._world = None  # whatever happens below, the page shows nothing of another scenario
+        with self._client.atomic():
+            self._view.clear()
+            self._twin.clear()
+        row = self.pool.at(place)
+        best = longest_shortcut(row)
+        self._about.content = self._description(row, best)  # what is read is shown before what is simulated
+        self._player.outcome.content = template("studio_fault.html").render(note="trying the scene ...")
+        check_row(row)
         self._row, self._world = row, stored_world(row, visual=True)
         with self._client.atomic():
             self._view.show(self._world)
         shortcuts = self.task.scenario(row.params).shortcuts()
-        best = longest_shortcut(row)
-        ordered = sorted(shortcuts, key=lambda name: name != best)
-        self._what.options = (film.WITNESS, *ordered)
+        self._what.options = (film.WITNESS, *sorted(shortcuts, key=lambda name: name != best))
         self._what.value = film.WITNESS
-        self._about.content = self._description(row, best)
         self._show_twin()
         self._play(play=False)
 

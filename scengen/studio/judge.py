@@ -12,7 +12,6 @@ from ..curate.curation import FOLDER, Curated, decided_again
 from ..curate.findings import EpisodeReport
 from ..curate.page import plot
 from ..curate.people import Decision, write_decision, write_score
-from ..errors import ScengenError
 from ..export.dataset import EpisodeData, Recording
 from ..export.recording import CONTROL_ACTIONS
 from ..pictures.report import template
@@ -20,7 +19,7 @@ from ..pool.untrusted import read_json
 from ..sim.world import World
 from ..validate.rebuilt import rebuild
 from .player import Player
-from .scene import SceneView, filmed
+from .scene import FAULTS, SceneView, filmed, one_line
 
 SHRINK = 2
 """Step between the pixels of a recording's pictures that are shown: 320 x 240 of 640 x 480."""
@@ -117,8 +116,8 @@ class Judge:
         with self._busy:
             try:
                 work()
-            except ScengenError as error:
-                self._about.content = template("studio_fault.html").render(fault=str(error))
+            except FAULTS as error:
+                self._about.content = template("studio_fault.html").render(fault=one_line(error))
 
     def _open(self) -> None:
         self._number.max = max(0, len(self.recording.episodes) - 1)
@@ -143,18 +142,16 @@ class Judge:
         self._image.visible = bool(self._pictures)
         self._why.value = ""
         self._describe()
-        self._load(episode)
+        try:
+            self._load(episode)
+        except FAULTS as error:  # its report must be seen all the same
+            told = f"it cannot be replayed: {one_line(error)}"
+            self._player.outcome.content = template("studio_fault.html").render(fault=told)
 
     def _load(self, episode: EpisodeData) -> None:
         """Replay the episode's actions in the scene of its parameters."""
         task = compose.load_task(episode.task, self._desk.search)
-        try:
-            params = read_json(str(episode.about["scengen/params"]))
-            scenario = task.scenario(params)
-        except (ValueError, TypeError, KeyError) as error:
-            why = " ".join(str(error).split())[:200]
-            self._player.outcome.content = template("studio_fault.html").render(fault=f"it cannot be replayed: {why}")
-            return
+        scenario = task.scenario(read_json(str(episode.about["scengen/params"])))
         world = World.load(rebuild(scenario), task.embodiment, visual=True)
         with self._client.atomic():
             self._view.show(world)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..episode import Actions, Episode
-from ..errors import PoolError
+from ..errors import PoolError, ScengenError, cut
 from ..pictures.render import hide_hulls
 from ..scenario import Scenario
 from ..sim.world import World
@@ -24,6 +24,8 @@ STILL = 1e-5
 """Smallest change of a pose that is sent [m, and of a quaternion]."""
 FRAME_PERIODS = 4
 """Number of control periods between two frames: 25 frames a second."""
+FAULTS = (ScengenError, ValueError, KeyError, TypeError, IndexError, ArithmeticError, RecursionError)
+"""Errors that a stranger's data may cause; the page tells them."""
 Poses = NDArray[np.float32]
 """Poses of all bodies, shape (bodies, 7): position [m], orientation wxyz."""
 
@@ -41,6 +43,11 @@ class Film:
     def seconds(self) -> float:
         """Duration [s]."""
         return (len(self.frames) - 1) * FRAME_PERIODS * Loop.PERIOD
+
+
+def one_line(error: Exception) -> str:
+    """An error in one line."""
+    return cut(" ".join(str(error).split()) or type(error).__name__, 500)
 
 
 def poses_of(world: World) -> Poses:
