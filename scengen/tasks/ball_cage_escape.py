@@ -57,7 +57,7 @@ GENTLE = math.radians(9.0)
 SHAKE_TILT = math.radians(6.5)
 """Angle above the rolling tilt up to which a cage counts as level [rad]. A hand that shakes a cage tilted by 5 deg
 tilts it by up to 9.8 deg (48 rollouts, filtered and raw, periods from 0.2 to 1 s), one that jerks it, by up to 11.8.
-At this limit no plan with jerks, rocking by up to 6 deg, spins or stops got a ball out, in 168 rollouts."""
+At this limit no plan with jerks, rocking by up to 6 deg, creep or spins got a ball out, in 168 rollouts."""
 END_MARGIN = 0.001
 """Distance from the wall at which a ball has come to an end of the cage [m]."""
 GRIP_HEIGHT = 0.030
