@@ -14,7 +14,15 @@ from pathlib import Path
 import jinja2
 from markdown_it import MarkdownIt
 
-PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/*/*.md", "example/README.md")
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs/*.md",
+    "docs/*/*.md",
+    "example/README.md",
+    "integrations/*/README.md",
+)
 FILES = ("docs/*.png", "docs/*.webp", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff", "Dockerfile")
 MADE = {"Axis cards": "generated/axes/*/card.html", "Reports": "generated/*.html"}
 """Pages written by commands, by heading."""

@@ -118,6 +118,7 @@ def test_a_prompt_with_faults_is_another_call_and_tells_them(tmp_path):
 
 
 @pytest.mark.skipif(not helpers.pictures_are_possible(), reason="no OpenGL")
+@pytest.mark.slow
 def test_pictures_of_all_cameras_and_moments_are_sent_and_kept(tmp_path):
     played(tmp_path, "facts", seeds=1, stage=1, pictures=True, moments=2, width=64)
     (call,) = calls(tmp_path)

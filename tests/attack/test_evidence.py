@@ -56,6 +56,7 @@ def attacked_pool(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_pool_tells_of_an_attack_and_its_hits_replay(attacked_pool, capsys):
     told = Pool.open(attacked_pool).manifest.attack
     assert (

@@ -168,6 +168,7 @@ def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatc
     assert status == 130 and ("is kept" in text) == continues and ("start over" in text) != continues
 
 
+@pytest.mark.slow
 def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
     """Indices that were drawn again, and one that could not be drawn at all."""
     far = ("task.id.x=[uniform,0.1,0.4]", "+task.id.slab.mass=0.5", "+task.id.slab.thickness=0.04", "limit=3", "n=1")
@@ -213,6 +214,7 @@ def test_tasks_lists_every_task_with_units_bounds_and_proofs(capsys):
 
 
 @pytest.mark.parametrize("pool", [BASE / "single_severity", BASE / "packing_id", BASE / "shelf_id"])
+@pytest.mark.slow
 def test_exported_scenes_open_from_anywhere(pool, tmp_path):
     """Jaw, suction cup, and both; in dm_control too, which refuses names with a slash."""
     assert cli.run(("export", f"pool={pool}", f"to={tmp_path / 'out'}")) == 0

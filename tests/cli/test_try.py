@@ -48,7 +48,7 @@ def test_a_jittered_run_is_that_of_the_check_and_its_film_shows_the_same_episode
 def test_a_plan_that_gives_up_tells_move_place_contact_and_target(capsys):
     status, (first, second) = told(capsys, "task=edge_slide", "what=pinch_where_it_lies")
     assert status == 1 and "pinch_where_it_lies: timeout after " in first and "short of its target" in first
-    assert " s in pinch > go_to; the hand was at (" in second and "touched table" in second
+    assert " s in pinch > _reach_lip > go_to; the hand was at (" in second and "touched table" in second
     assert second.endswith(" m") and "the target was (" in second
 
 

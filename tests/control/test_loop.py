@@ -98,6 +98,7 @@ def test_restoring_a_state_continues_with_the_same_bits(shared: Loop) -> None:
         np.testing.assert_array_equal(run(other, DOWN[90:]), end)
 
 
+@pytest.mark.slow
 def test_replay_is_as_many_steps(shared: Loop) -> None:
     shared.reset()
     end, poses = run(shared, DOWN), shared.data.xpos.copy()

@@ -289,6 +289,7 @@ def frames_of(folder):
         return [(frame.time, frame.to_ndarray(format="rgb24")) for frame in file.decode(video=0)]
 
 
+@pytest.mark.slow
 def test_videos_have_one_frame_a_row_at_the_rows_time(filmed):
     frames, fps = frames_of(filmed), read_json(filmed, "info.json")["fps"]
     assert len(frames) == rows_of(filmed).num_rows

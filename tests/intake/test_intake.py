@@ -177,6 +177,7 @@ def test_an_l_becomes_a_few_pieces_and_its_hull_fills_the_notch(taken):
     assert found.prop.com == pytest.approx([0, 0, com[2] + FOOT_PROTRUSION], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_ring_keeps_its_hole(taken):
     """A ball that fits through it touches nothing; in the convex hull it would."""
     ring = taken(trimesh.creation.torus(0.05, 0.012, 48, 24), error=0.002, pieces=128)
@@ -218,6 +219,7 @@ def test_the_error_of_a_hull_is_the_depth_of_what_it_fills(tmp_path):
     assert error.inward == 0.0 and error.volume == pytest.approx(210 / 186, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_stands_flat_comes_to_rest_and_what_is_round_below_does_not(taken):
     assert taken(BOX).rest.rests
     bowl = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
@@ -228,6 +230,7 @@ def test_what_stands_flat_comes_to_rest_and_what_is_round_below_does_not(taken):
 
 
 @pytest.mark.parametrize("thick", [0.025, 0.03])
+@pytest.mark.slow
 def test_an_l_stands_still_on_its_feet_and_would_creep_without(taken, thick):
     found = taken(ell(thick), error=0.001)
     assert found.rest.rests and found.rest.creep < 1e-6 and len(found.prop.feet) == 4
@@ -250,6 +253,7 @@ def test_the_same_input_gives_the_same_bytes(taken):
     assert json.dumps(first.figures()) == json.dumps(second.figures())
 
 
+@pytest.mark.slow
 def test_an_asset_stands_alone(taken):
     found = taken(ell(), error=0.001)
     scene_text.check(found.xml)
@@ -487,6 +491,7 @@ def test_sizes_beyond_a_limit_are_refused(tmp_path, size):
 
 
 @pytest.mark.parametrize("up", UPRIGHT)
+@pytest.mark.slow
 def test_any_axis_can_point_up(tmp_path, up):
     """A pyramid on a base of 50 x 60 mm, 40 mm high: its centre of mass is at a quarter of its height."""
     rot = UPRIGHT[up]
@@ -568,6 +573,7 @@ class TestCommand:
         assert again.splitlines()[1:] == said.splitlines()[1:]
         assert files == {p.name: p.read_bytes() for p in (tmp_path / "asset").iterdir()}
 
+    @pytest.mark.slow
     def test_other_settings_another_file_and_a_damaged_asset_are_computed_anew(self, run, tmp_path):
         run()
         assert "nothing was computed" not in run("density=500")[1]
@@ -579,11 +585,13 @@ class TestCommand:
         assert "nothing was computed" not in run("density=500")[1]
         assert "nothing was computed" in run("density=500")[1]
 
+    @pytest.mark.slow
     def test_an_error_that_is_missed_is_status_1(self, run, tmp_path):
         ell().export(tmp_path / "mesh.stl")
         status, said = run("pieces=1", "error=0.001")
         assert status == 1 and "1 convex piece: " in said and "MISSED: the error of 1 mm" in said
 
+    @pytest.mark.slow
     def test_it_says_which_side_is_below(self, run, tmp_path):
         said = run()[1]
         assert "its z axis points up (the default; give up=AXIS if it is another one)" in said

@@ -207,6 +207,7 @@ def test_what_is_written_can_stand_in_a_task_file(planted, tmp_path):
     assert set(again.proofs) == {finding.axis.name for finding in search.findings}
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_where_it_ended(planted, tmp_path, monkeypatch):
     whole = discover(TASK, QUICK, DiscoverSettings(budget=100), tmp_path)
     lines = (tmp_path / "trials.jsonl").read_text().splitlines(keepends=True)

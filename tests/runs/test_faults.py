@@ -286,6 +286,7 @@ def test_an_interrupt_during_the_imports_is_no_traceback(tmp_path, after):
     assert process.returncode in (130, -signal.SIGINT) and err.count("Traceback") <= (process.returncode < 0)
 
 
+@pytest.mark.slow
 def test_a_limit_on_files_is_one_line_and_the_run_goes_on_afterwards(finished, tmp_path):
     folder = tmp_path / "pool"
     process = started(folder, limit=36_000)

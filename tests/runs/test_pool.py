@@ -122,10 +122,12 @@ def test_a_scenario_is_found_by_the_beginning_of_its_id(made):
 # --- the same bytes -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_two_workers_write_the_bytes_of_one(made, tmp_path):
     assert make(tmp_path / "two", workers=2).pool.sha256 == Pool.open(made).sha256
 
 
+@pytest.mark.slow
 def test_a_pool_can_be_extended_and_comes_out_as_if_made_at_once(mine, made, tmp_path):
     shutil.copytree(made.with_name("made.run"), mine.with_name("mine.run"))
     assert make(mine, n=4).pool.sha256 == make(tmp_path / "four", n=4).pool.sha256

@@ -246,6 +246,7 @@ TOPPLES = {"stool_x": 0.045, "cage": HoledCage(face=SIDE)}
     ],
     ids=["topples", "ball wider than the hole", "outside", "lifted", "timid", "spared"],
 )
+@pytest.mark.slow
 def test_what_makes_the_task_another_one_is_not_certified(scenario, check):
     not_certified(TASK, scenario, check)
 

@@ -119,7 +119,14 @@ def pixels(scenario):
 
 
 @pytest.mark.parametrize("storey", range(STOREYS))
-@pytest.mark.parametrize("split", ["id", *TASK.axes])
+@pytest.mark.parametrize(
+    "split",
+    [
+        "id",
+        "opposite_side",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in TASK.axes if name != "opposite_side"),
+    ],
+)
 def test_no_camera_that_stands_still_sees_any_pixel_of_the_object(split, storey):
     for index in range(2):
         scenario = replace(TASK.draw(split, 0, index).scenario, storey=storey)
