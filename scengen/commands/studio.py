@@ -3,7 +3,6 @@
 import threading
 import webbrowser
 from dataclasses import dataclass
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -14,6 +13,7 @@ from ..export.dataset import Recording
 from ..pool import Pool
 from ..task_files import search_path
 from ..teleop.collect import TeleopSettings
+from ..work.extras import module_of_extra
 from . import OK, Arguments, one, say, several
 from .settings import read
 from .teleop import source_of_pool
@@ -109,12 +109,5 @@ def _recordings(app: ModuleType, settings: StudioSettings, search: tuple[str, ..
 
 
 def _app() -> ModuleType:
-    """The module that needs viser.
-
-    Raises:
-        BadConfig: it is not installed.
-    """
-    try:
-        return import_module("scengen.studio.app")
-    except ImportError as error:
-        raise BadConfig(f"the studio needs {error.name}; pip install 'scengen[studio]'") from None
+    """The module that needs viser."""
+    return module_of_extra("scengen.studio.app", "the studio needs", "studio")

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import closing
-from importlib import import_module
 from types import ModuleType
 
 from .. import compose
@@ -18,6 +17,7 @@ from ..teleop.drive import Timing, drive
 from ..teleop.session import CONTROLS, Session
 from ..typed import typed
 from ..validate.settings import CertifySettings
+from ..work.extras import module_of_extra
 from . import FAILED, OK, Arguments, one, say, warn
 from .settings import read, task_overrides
 
@@ -111,15 +111,8 @@ def _display() -> bool:
 
 
 def _sdl() -> ModuleType:
-    """The module that needs pygame.
-
-    Raises:
-        BadConfig: it is not installed.
-    """
-    try:
-        return import_module("scengen.teleop.sdl")
-    except ImportError as error:
-        raise BadConfig(f"gamepads and keyboards need {error.name}; pip install 'scengen[teleop]'") from None
+    """The module that needs pygame."""
+    return module_of_extra("scengen.teleop.sdl", "gamepads and keyboards need", "teleop")
 
 
 def _person(name: str) -> Device:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.distance import NEAR_DUPLICATE_DISTANCE, near_duplicates
 from ..analysis.space import Batch
+from ..certificate import Check
 from ..errors import BadConfig, Infeasible, at_least, cut
 from ..pool import Pool, collection
 from ..pool.demonstrations import (
@@ -23,7 +24,7 @@ from ..pool.demonstrations import (
 from ..pool.files import sha256
 from ..pool.manifest import PROCESS
 from ..pool.row import DemonstrationRow
-from ..runs.attempts import Progress, Wanted, extend, first_of, rejection, writing_told
+from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, rejection, writing_told
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
@@ -151,8 +152,7 @@ class Job:
         try:
             draw = self.draw(index)
         except Infeasible as error:
-            why = max(error.reasons, key=error.reasons.__getitem__)
-            return Record(index, FAILED, "feasible", why, error.tries, dict(error.reasons), None, 0.0)
+            return infeasible(index, FAILED, error)
 
         def record(verdict: str, check: str, reason: str, row: DemonstrationRow | None = None) -> Record:
             return Record(index, verdict, check, reason, draw.attempt + 1, dict(draw.rejected), row, 0.0)
@@ -160,10 +160,8 @@ class Job:
         if reason := self.others.too_near(self.task, draw):
             return record(FAILED, APART, reason)
         trial = Trial(draw.scenario, self.task.horizon, self.settings, self.task.embodiment, None)
-        for name in CHEAP_CHECKS:
-            check = trial.check(name)
-            if not check.passed:
-                return record(FAILED, name, check.reason)
+        if check := first_failed(trial):
+            return record(FAILED, check.name, check.reason)
         number = index % self.config.runs
         key = (self.task.name, draw.scenario.id, number)
         style = chosen(self.config.styles, *key)
@@ -173,6 +171,11 @@ class Job:
         if played.solved:
             return record(KEPT, "", "", made)
         return record(FAILED, "solved", f"{played.outcome}: {played.reason}", made if self.config.keep else None)
+
+
+def first_failed(trial: Trial) -> Check | None:
+    """The first of the cheap checks that a scenario does not pass; None if it passes all of them."""
+    return next((check for check in map(trial.check, CHEAP_CHECKS) if not check.passed), None)
 
 
 def row_of(task: Task, draw: Draw, text: str, number: int, style: str, played: Rollout) -> DemonstrationRow:

@@ -11,8 +11,7 @@ the beginning of the episode. The table of episodes says where in the videos the
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -85,14 +84,6 @@ class NativeWriter:
         """Close the files."""
         for table in self._tables.values():
             table.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class _Table:

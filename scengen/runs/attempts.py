@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from ..errors import PoolError
+from ..errors import Infeasible, PoolError
 from ..pool.manifest import PROCESS, without_numbers
 from ..work.parallel import Limits, Workers, each
 from ..work.targets import refused
@@ -92,6 +92,12 @@ def extend(
             why = f"{MAX_LOST} scenarios in a row have no verdict, the last because it {record.reason}"
             raise PoolError(f"{why}; raise limit_seconds= and limit_mb=, or debug one with workers=1")
         progress(verdicts[wanted.verdict], len(records), verdicts, reasons)
+
+
+def infeasible(index: int, verdict: str, error: Infeasible) -> Record:
+    """The record of an attempt that has no feasible scenario, with the most frequent reason."""
+    why = max(error.reasons, key=error.reasons.__getitem__)
+    return Record(index, verdict, "feasible", why, error.tries, dict(error.reasons), None, 0.0)
 
 
 def first_of(records: Mapping[int, Record], verdict: str, n: int) -> list[int]:

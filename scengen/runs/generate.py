@@ -21,7 +21,7 @@ from ..validate.certify import Certified, certify
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
 from ..work.parallel import Limits, Workers
-from .attempts import Progress, Wanted, extend, first_of, rejection, writing_told
+from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, writing_told
 from .filling import Filling, moved_shards
 from .journal import Journal, Record
 
@@ -115,8 +115,7 @@ class Job:
         try:
             return self.task.draw(self.split, self.seed, index, self.task.design(self.sampler))
         except Infeasible as error:
-            why = max(error.reasons, key=error.reasons.__getitem__)
-            return Record(index, "refuted", "feasible", why, error.tries, dict(error.reasons), None, 0.0)
+            return infeasible(index, "refuted", error)
 
 
 def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSettings, progress: Progress) -> Summary:

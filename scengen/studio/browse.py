@@ -76,7 +76,8 @@ class Browser:
         self._steps = gui.add_button_group("", ("previous", "next"))
         self._beside = gui.add_checkbox("training twin", True)
         self._what: viser.GuiDropdownHandle[str] = gui.add_dropdown("play", [str(film.WITNESS)])
-        self._player = Player(client, self._view)
+        self.player = Player(client, self._view)
+        """The controls of the film."""
         self._about = gui.add_html("")
         self._label: viser.LabelHandle | None = None
         self._sight = CAMERA
@@ -88,11 +89,6 @@ class Browser:
         self._beside.on_update(lambda _: self._run(self._show_twin))
         self._what.on_update(lambda event: self._run(self._play) if event.client is not None else None)
         self._run(self._show)
-
-    @property
-    def player(self) -> Player:
-        """The controls of the film."""
-        return self._player
 
     @property
     def pool(self) -> Pool:
@@ -109,7 +105,7 @@ class Browser:
         self._turned_to(min(max(1, int(self._place.value) + by), len(self.pool)))
 
     def close(self) -> None:
-        self._player.close()
+        self.player.close()
 
     def _turned_to(self, place: int) -> None:
         self._place.max = max(1, len(self.pool))
@@ -124,7 +120,7 @@ class Browser:
             try:
                 work()
             except FAULTS as error:
-                self._player.unload()
+                self.player.unload()
                 self._about.content = template("studio_fault.html").render(fault=one_line(error))
 
     def _show(self) -> None:
@@ -133,7 +129,7 @@ class Browser:
         if self._shown == (str(self.pool.folder), place):
             return
         self._shown = (str(self.pool.folder), place)
-        self._player.unload()
+        self.player.unload()
         self._row = self._world = None  # whatever happens below, the page shows nothing of another scenario
         with self._client.atomic():
             self._view.clear()
@@ -141,7 +137,7 @@ class Browser:
         row = self.pool.at(place)
         best = longest_shortcut(row)
         self._about.content = self._description(row, best)  # what is read is shown before what is simulated
-        self._player.outcome.content = template("studio_fault.html").render(note="trying the scene ...")
+        self.player.outcome.content = template("studio_fault.html").render(note="trying the scene ...")
         check_row(row)
         self._row, self._world = row, stored_world(row, visual=True)
         with self._client.atomic():
@@ -180,15 +176,15 @@ class Browser:
         if row is None or world is None:
             return
         scenario, name = self.task.scenario(row.params), str(self._what.value)
-        self._player.outcome.content = template("studio_fault.html").render(note="computing ...")
+        self.player.outcome.content = template("studio_fault.html").render(note="computing ...")
         if name == film.WITNESS:
             actions, horizon = row.witness, row.horizon
         else:
             take, _ = film.shortcut(row, scenario, name)
             actions, horizon = take.actions, 3.0 * row.horizon
         made = filmed(world, scenario, actions, horizon)
-        self._player.load(made, play)
-        self._player.outcome.content = template("studio_fault.html").render(note=f"{name}: {made.outcome}")
+        self.player.load(made, play)
+        self.player.outcome.content = template("studio_fault.html").render(note=f"{name}: {made.outcome}")
 
     def _found(self) -> None:
         text = str(self._find.value).strip()

@@ -53,7 +53,8 @@ class Judge:
         self._why = gui.add_text("reason", "")
         self._verdicts = gui.add_button_group("verdict", ("accept", "reject"))
         self._jump: viser.GuiDropdownHandle[str] = gui.add_dropdown("go to finding", list("-"))
-        self._player = Player(client, self._view, self._at)
+        self.player = Player(client, self._view, self._at)
+        """The controls of the film."""
         self._image = gui.add_image(np.zeros((12, 16, 3), np.uint8), visible=False)
         self._about = gui.add_html("")
         self._data.on_update(lambda _: self._run(self._open))
@@ -65,21 +66,16 @@ class Judge:
         self._run(self._open)
 
     @property
-    def player(self) -> Player:
-        """The controls of the film."""
-        return self._player
-
-    @property
     def recording(self) -> Recording:
         """The chosen recording."""
         return self._desk.recordings[self._data.options.index(self._data.value)]
 
     def close(self) -> None:
-        self._player.close()
+        self.player.close()
 
     def hide(self) -> None:
         """Show no robot."""
-        self._player.unload()
+        self.player.unload()
         self._view.clear()
 
     def step(self, where: str) -> None:
@@ -133,7 +129,7 @@ class Judge:
         recording, number = self.recording, int(self._number.value)
         if self._episode is not None and self._episode.number == number:
             return
-        self._player.unload()
+        self.player.unload()
         episode = next(each for each in recording.read() if each.number == number)
         self._episode, self._pictures = episode, []
         if recording.cameras:
@@ -146,7 +142,7 @@ class Judge:
             self._load(episode)
         except FAULTS as error:  # its report must be seen all the same
             told = f"it cannot be replayed: {one_line(error)}"
-            self._player.outcome.content = template("studio_fault.html").render(fault=told)
+            self.player.outcome.content = template("studio_fault.html").render(fault=told)
 
     def _load(self, episode: EpisodeData) -> None:
         """Replay the episode's actions in the scene of its parameters."""
@@ -157,8 +153,8 @@ class Judge:
             self._view.show(world)
         periods = episode.columns[CONTROL_ACTIONS]
         made = filmed(world, scenario, periods.reshape(-1, periods.shape[-1]), task.horizon)
-        self._player.load(made, play=False)
-        self._player.outcome.content = template("studio_fault.html").render(note=f"replayed: {made.outcome}")
+        self.player.load(made, play=False)
+        self.player.outcome.content = template("studio_fault.html").render(note=f"replayed: {made.outcome}")
 
     @property
     def _report(self) -> EpisodeReport:
@@ -191,7 +187,7 @@ class Judge:
     def _to_finding(self) -> None:
         number = str(self._jump.value).partition(".")[0]
         if number.isdecimal():
-            self._player.seek(self._report.findings[int(number) - 1].frames[0] / self.recording.fps)
+            self.player.seek(self._report.findings[int(number) - 1].frames[0] / self.recording.fps)
 
     def _at(self, seconds: float) -> None:
         """Show the recorded picture of a time."""

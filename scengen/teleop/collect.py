@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..demos.generate import CHEAP_CHECKS, FAILED, GIVEN_UP, KEPT, DemosSummary, finish, row_of
+from ..demos.generate import FAILED, GIVEN_UP, KEPT, DemosSummary, finish, first_failed, row_of
 from ..errors import BadConfig, Infeasible, at_least, cut
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, OPERATOR, TELEOP, DemonstrationConfig
 from ..pool.row import DemonstrationRow
+from ..runs.attempts import infeasible
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
@@ -193,17 +194,14 @@ class Run:
         try:
             draw = source.draw(index)
         except Infeasible as error:
-            why = max(error.reasons, key=error.reasons.__getitem__)
-            self._add(Record(first, FAILED, "feasible", why, error.tries, dict(error.reasons), None, 0.0))
+            self._add(infeasible(first, FAILED, error))
             return None
         task = source.task
         trial = Trial(draw.scenario, task.horizon, source.certify_settings, task.embodiment, None)
-        for name in CHEAP_CHECKS:
-            check = trial.check(name)
-            if not check.passed:
-                tries, rejected = draw.attempt + 1, dict(draw.rejected)
-                self._add(Record(first, FAILED, name, check.reason, tries, rejected, None, 0.0))
-                return None
+        if check := first_failed(trial):
+            tries, rejected = draw.attempt + 1, dict(draw.rejected)
+            self._add(Record(first, FAILED, check.name, check.reason, tries, rejected, None, 0.0))
+            return None
         name, settle = f"{task.name}/{draw.split}@{index}/{draw.scenario.id}", source.certify_settings.settle
         return draw, Stage(name, draw.scenario, trial.text, task.embodiment, task.horizon, settle)
 

@@ -11,11 +11,11 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from contextlib import ExitStack
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from ...errors import BadConfig, ScengenError, cut
+from ...errors import ScengenError, cut
+from ...work.extras import module_of_extra
 from .client import Address, ClientSettings
 from .wire import MAX_MESSAGE, BadMessage, mapping, msgpack_numpy_array, openpi_array, unpacked
 
@@ -260,12 +260,5 @@ def _last_line(text: str) -> str:
 
 
 def _library(name: str) -> ModuleType:
-    """A module of the extra `remote`.
-
-    Raises:
-        BadConfig: it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise BadConfig(f"policies behind a socket need {name.split('.')[0]}; pip install 'scengen[remote]'") from None
+    """A module of the extra `remote`."""
+    return module_of_extra(name, "policies behind a socket need", "remote")
