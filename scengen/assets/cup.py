@@ -63,6 +63,8 @@ class Cup(Turned):
     """Sliding friction of handle and bead, the grips of the cup."""
     ribbed: bool = False
     """Whether no suction cup can hold the wall, because of ribs that are too fine to model. The family sets it."""
+    smooth_outside: bool = False
+    """Whether the bead is a grip on its inside only, and the wall goes on outside of it. The family sets it."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
     @property
@@ -85,12 +87,28 @@ class Cup(Turned):
             self._ring("rim", top, end, edge, self.rim_friction, PRIORITY),
         ]
         if below < top:
-            parts.append(self._ring("bead", below, top, edge, self.handle_friction, PRIORITY))
+            skin = self.wall if self.smooth_outside else 0.0
+            parts.append(self._ring("bead", below, top, edge - skin, self.handle_friction, PRIORITY, skin))
+            if skin:
+                parts.append(self._ring("skin", below, top, skin, self.friction, PRIORITY + 1))
         return parts
 
-    def _ring(self, name: str, low: float, high: float, wall: float | None, friction: float, priority: int) -> Section:
-        """Section between two heights [m]: a ring of thickness `wall` [m], or a disc for None."""
-        a, b = self.outer(low), self.outer(high)
+    def _ring(
+        self,
+        name: str,
+        low: float,
+        high: float,
+        wall: float | None,
+        friction: float,
+        priority: int,
+        inset: float = 0.0,
+    ) -> Section:
+        """Section between two heights [m]: a ring of thickness `wall` [m], or a disc for None.
+
+        Args:
+            inset: distance of the ring's outer face from that of the cup [m].
+        """
+        a, b = self.outer(low) - inset, self.outer(high) - inset
         inner = (0.0, 0.0) if wall is None else (a - wall, b - wall)
         corners = ((inner[0], low), (a, low), (b, high), (inner[1], high))
         return Section(name, corners, friction, priority, leaky=self.ribbed and wall is not None)

@@ -16,8 +16,10 @@ Decisions, where the paper (App. B, T04) is silent:
   cup is at least 0.28 m above the table, and level hands need less height.
 * The wall is smooth and leans. Two hands can press from both sides, and each can roll by half a turn: they slip off
   if the wall's friction is less than its slope. Upright, the cup could be lifted that way; upside down, it cannot. The
-  wall is ribbed, so that suction does not hold on it: else a level hand could take the cup by its wall, with the other
-  hand behind it as a stop, and roll.
+  bead is rough on its inside only: if it is rough outside as well, two hands that press on it lift the cup without
+  suction or a grasp, and roll it upright in the air (12 of 12; as it is 0 of 12). The wall is ribbed, so that suction
+  does not hold on it: else a level hand could take the cup by its wall, with the other hand behind it as a stop, and
+  roll.
 * "Toppling is not a reliable option since the cup just slides out": the rim's friction on the table is less than its
   radius over the cup's height. A cup that touches the table askew, or falls faster than a hand lowers it, is lost: else
   it could be laid down for the jaw, or be dropped from a hand that points up.
@@ -47,8 +49,8 @@ from ..skills import jaw, motion, suction
 from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing, facing_down, go_to, together, turn_to, with_arm
 
-TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True)
-"""Cup of the training distribution: 86 mm wide at its narrowest, and polished except for its bead."""
+TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True, smooth_outside=True)
+"""Cup of the training distribution: 86 mm wide at its narrowest, and polished except for the inside of its bead."""
 UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a cup that counts as upright [rad]
 FALL_ANGLE = math.radians(25.0)  # tilt above which a cup that touches the table is no longer upright [rad]
 INVERTED_ANGLE = math.radians(155.0)  # tilt above which a cup that touches the table counts as upside down [rad]
@@ -306,7 +308,7 @@ class CupInversion(Scenario):
         yield require(cup.friction < most, "two hands can lift the cup by its wall", friction=cup.friction, most=most)
         shear = cup.friction * PULL
         yield require(shear > 2.2 * weight, "a level suction hand does not hold the cup", shear=shear, weight=weight)
-        grip = cup.handle_friction * pinch(cup.bead)
+        grip = (cup.handle_friction + cup.friction) / 2 * pinch(cup.bead)  # one pad is inside, the other one outside
         yield require(grip > 2 * weight, "the jaw does not hold the cup", grip=grip, weight=weight)
         yield require(self.droop < 1.5, "the cup turns in the jaw", droop=self.droop)
         right, left = panda.bases(2)

@@ -27,6 +27,7 @@ ALL = [
     Plate(rise=0.0),
     Plate(hole=0.015),
     Cup(),
+    Cup(smooth_outside=True),
     Cup(base=0.041, rim=0.041, wall=0.004, bead=0.0),
     Bowl(),
     Bowl(radius=0.065),
@@ -136,6 +137,16 @@ def hollow(solid):
             )
             sphere = sphere.translate((0, 0, solid.centre)).trim_by_plane((0, 0, 1), solid.floor)
             return sphere.trim_by_plane((0, 0, -1), -(solid.depth - 1.3 * BEAD_HEIGHT))
+
+
+def test_a_bead_may_be_a_grip_on_its_inside_only():
+    rough, smooth = Cup(friction=0.1), Cup(friction=0.1, smooth_outside=True)
+    for solid, outside in ((rough, 0.8), (smooth, 0.1)):
+        at_bead = [part for part in solid.sections if part.corners[0][1] == solid.height - BEAD_HEIGHT]
+        assert min(at_bead, key=lambda part: part.corners[0][0]).friction == 0.8
+        assert max(at_bead, key=lambda part: part.corners[1][0]).friction == outside
+    assert smooth.inertial()[0] == pytest.approx(rough.inertial()[0])
+    assert smooth.inertial()[1] == pytest.approx(rough.inertial()[1])
 
 
 @given(solid=st.one_of(anywhere(Plate), anywhere(Cup), anywhere(Bowl)))

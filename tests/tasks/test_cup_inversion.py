@@ -159,7 +159,7 @@ def test_every_constraint_refutes_what_violates_it():
             of(friction=0.12),
             of(mass=0.12, friction=0.05),
             of(handle_friction=0.1),
-            of(height=0.14, base=0.041, mass=0.13, bead=0.003, friction=0.074),
+            of(height=0.14, base=0.041, mass=0.13, bead=0.003, friction=0.074, handle_friction=1.5),
             CupInversion(x=0.34, y=0.34),
             CupInversion(goal_x=0.33, goal_y=-0.33),
         ]
