@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample readers axes attacks drift baselines docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample readers axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -108,6 +108,13 @@ AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)
 
+# Plays planners with beliefs of training on TWINS twins of every axis without a record (an hour), and writes docs/axes.md. TASKS=packing
+# selects tasks. An interrupted call is continued.
+TWINS ?= 8
+beliefs: setup
+	$(BIN)/python tools/beliefs.py n=$(TWINS) $(TASKS)
+	$(BIN)/python tools/all_axes.py page
+
 # Attacks every task with BUDGET rollouts and writes docs/attacks.md (40 minutes). TASKS=packing selects tasks.
 BUDGET ?= 500
 attacks: setup
@@ -131,6 +138,7 @@ docs: setup
 	$(BIN)/python tools/paper_page.py
 	$(BIN)/python tools/cluster_page.py
 	$(BIN)/python tools/all_axes.py page
+	$(BIN)/python tools/predictors.py
 	$(BIN)/python tools/baselines.py page
 	$(BIN)/python tools/task_pages.py $(TASKS)
 

@@ -1,18 +1,25 @@
 """The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
 
-Cards are stored in generated/axes. A repeated call continues, and finished cards are read again. Axes without a card
-keep their line. `python tools/all_axes.py page` only writes the page, with the figures of conf/certified.yaml.
+Cards are stored in generated/axes, and what the page shows of them in records/axes. A repeated call continues. `python
+tools/all_axes.py page` only writes the page: from these records, those of tools/beliefs.py and of tools/baselines.py,
+and from conf/certified.yaml.
 """
 
-import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import axis_records
+import predictors
+
 from scengen import cli, list_tasks, load_task, task_files
 from scengen.analysis.distance import Energy
-from scengen.ood.axis_card import NOT_SEARCHED
+from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
+from scengen.ood.behaviour import HELD_OUT
+from scengen.ood.belief import beliefs
+from scengen.samplers.task import Task
+from scengen.statistics import Rate
 from scengen.validate.certify import lower_bound
 
 PAGE = Path(__file__).parent.parent / "docs" / "axes.md"
@@ -32,21 +39,29 @@ Written by `make axes` and `make docs`. The figures of certification are those o
 {training}
 ## Axes
 
-Each line summarizes one axis card (`scengen probe`); each column states its sample size.
+Each line summarizes one axis card (`scengen probe`) and what else was tried on the axis; each column states its sample
+size. {verdicts}
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).
-* **verdict**: the strongest memory that the axis breaks, *solved by memory*, or *inconclusive*. The four columns after
-  it show, for each memory, how many of its control scenarios within training and how many OOD twins it solves, and the
-  excess with its 95 % interval.
-  **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
-  hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control is
-  the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has one
-  value only (marked *held out*), it is a training scenario that no memory comes from. Only twins count that the oracle
-  solves in both arms. `weak`: the memory solves less than 30 % of its control, and is inconclusive.
-  *solved by memory*: some memory solves most of the axis, so that only vision can be tested there, if anything. In a
-  task with a choice (`domino_select`) the memory of the twin contains the answer: an axis that makes the choice harder
-  to see cannot break it. Use `scengen evaluate` to measure whether a policy still chooses correctly.
+* **verdict**: what the axis breaks of what was right in training: *motion memory* (replay, any replay),
+  *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the first kind
+  that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each baseline, how
+  many of its control scenarios within training and how many OOD twins it solves, and the excess with its 95 % interval.
+  Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its control, and
+  is inconclusive. *not measured* says that nobody has tried it yet, *no card* the same of a whole card.
+  * **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
+    hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control
+    is the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has
+    one value only (marked *held out*), it is a training scenario that no memory comes from.
+  * **belief**: the oracle of the training twin plays in the OOD twin, with all its feedback, and believes all
+    parameters that the axis moves to be as in training. **hidden belief**: it believes only the hidden ones, if the
+    axis moves any. The control is that of the replay; a value that is constant in training is believed rightly there.
+  * **learner**: of the policies trained on 200 demonstrations ([baselines](baselines.md)), the one that solves most of
+    its 20 training scenarios. Its excess is paired by twins, or marked *unpaired*. {predicted}
+  *solved by motion memory* or *object-centric memory*: only vision can be tested there, if anything. In a task with a
+  choice (`domino_select`) the memory of the twin contains the answer: an axis that makes the choice harder to see
+  cannot break it. Use `scengen evaluate` to measure whether a policy still chooses correctly.
 * **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
   the edge of training, 1 the far end of the axis. The 95 % interval in brackets assumes no curve; the point before it
   is a guess. `> x`: not before x; if x is the end of the path, with the number of twins solved there. `< 0`: the replay
@@ -63,12 +78,28 @@ Each line summarizes one axis card (`scengen probe`); each column states its sam
 """The page, with places for its tables."""
 CERTIFIED = ("certified", "oracle", "robosuite")
 """Titles of the figures of certification."""
+BASELINES = (*MOTION, *OBJECT_CENTRIC, *BELIEF)
+"""Baselines that have a column of their own."""
+TITLES = [name.replace("object_centric", "object-centric").replace("_", " ") for name in BASELINES]
+"""Titles of their columns."""
 COLUMNS = (
-    *("task", "axis", "outside", "physics", *CERTIFIED, "verdict"),
-    *("replay", "any replay", "object-centric", "any object-centric"),
-    *("replay ends", "oracle ends", "energy"),
+    "task",
+    "axis",
+    "outside",
+    "physics",
+    *CERTIFIED,
+    "verdict",
+    *TITLES,
+    "learner",
+    "replay ends",
+    "oracle ends",
+    "energy",
 )
 """Titles of the table of axes."""
+NO_CARD = "no card"
+"""Cell of an axis without a card."""
+NOT_MEASURED = "not measured"
+"""Cell of a figure that was not measured."""
 
 
 def main(*arguments: str) -> None:
@@ -83,6 +114,8 @@ def main(*arguments: str) -> None:
         for axis in load_task(task).axes:
             if cli.run(("probe", f"task={task}", f"axis={axis}", "workers=2", *settings)):
                 failed.append(f"{task}/{axis}")
+            else:
+                axis_records.store_card(load_task(task), axis)
     PAGE.write_text(page())
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
@@ -90,8 +123,9 @@ def main(*arguments: str) -> None:
 def page() -> str:
     """The whole page."""
     told = task_files.certified()
+    rows = _axes(told)
     training = [
-        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}" if found else "not measured"]
+        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}" if found else NOT_MEASURED]
         for task in list_tasks()
         for found in [told.get(task, {}).get(task_files.ID, {})]
     ]
@@ -103,64 +137,73 @@ def page() -> str:
     ]
     return HEAD.format(
         training=_table(("task", *CERTIFIED, "CPU s"), training),
-        axes=_table(COLUMNS, _axes(told)),
+        predicted=predictors.sentence(),
+        verdicts=_verdicts(rows),
+        axes=_table(COLUMNS, rows),
         lost="\n".join(lost),
     )
 
 
 def _axes(told: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
-    """The cells of each axis, in the order of the task files. An axis without a card keeps those of the page."""
-    written = _written()
+    """The cells of each axis, in the order of the task files."""
     rows = []
-    for task in list_tasks():
-        for axis in load_task(task).axes:
-            path = PAGE.parent.parent / f"generated/axes/{task}-{axis}/card.json"
-            cells = _of_card(json.loads(path.read_text())) if path.is_file() else written.get((task, axis), {})
-            figures = dict(zip(CERTIFIED, _certification(told.get(task, {}).get(axis, {})), strict=True))
-            known = {"task": task, "axis": axis, **cells, **figures}
-            rows.append([known.get(title, "no card") for title in COLUMNS])
+    for task in map(load_task, list_tasks()):
+        cards, found = axis_records.read(axis_records.CARDS, task), axis_records.baselines(task)
+        for axis in task.axes:
+            rows.append(_row(task, axis, cards.get(axis), found[axis], told.get(task.name, {}).get(axis, {})))
     return rows
 
 
-def _written() -> dict[tuple[str, str], dict[str, str]]:
-    """The cells of each axis on the page, by title."""
-    lines = PAGE.read_text().splitlines() if PAGE.is_file() else []
-    rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in lines if line.startswith("| ")]
-    titles: list[str] = []
-    found = {}
-    for row in rows:
-        if row[:2] == list(COLUMNS[:2]):
-            titles = row
-        elif titles and len(row) == len(titles):
-            found[row[0], row[1]] = dict(zip(titles, row, strict=True))
-    return found
+def _verdicts(rows: Sequence[Sequence[str]]) -> str:
+    """How many axes have each kind of verdict, in words."""
+    words = [row[COLUMNS.index("verdict")] for row in rows]
+    broken, solved = (sum(word.startswith(start) for word in words) for start in ("breaks", "solved"))
+    return (
+        f"Of {len(words)} axes, {broken} break what was right in training, {solved} are solved by it, "
+        f"{words.count(INCONCLUSIVE)} are inconclusive, and {words.count(NOT_MEASURED)} were not measured."
+    )
+
+
+def _row(
+    task: Task,
+    axis: str,
+    card: Mapping[str, Any] | None,
+    found: Mapping[str, Baseline],
+    certified: Mapping[str, Any],
+) -> list[str]:
+    """The cells of an axis."""
+    outside, physics, replay_ends, oracle_ends, energy = [NO_CARD] * 5
+    if card:
+        outside = "another value" if card["outside"] is None else f"{card['outside']:.2g}"
+        physics = ", ".join(card["leaving"]) or "stays"
+        replay_ends, oracle_ends, energy = *card["boundaries"].values(), str(Energy(**card["energy"]))
+    missing = {name: NO_CARD for name in (*MOTION, *OBJECT_CENTRIC) if not card}
+    if "hidden_belief" not in beliefs(task, axis):
+        missing["hidden_belief"] = "nothing hidden"
+    cells = [_baseline(found[name]) if name in found else NOT_MEASURED for name in BASELINES]
+    cells = [missing.get(name, cell) for name, cell in zip(BASELINES, cells, strict=True)]
+    judged = verdict(found.values()) if found else NOT_MEASURED
+    learner = _learner(found)
+    return [
+        *(task.name, axis, outside, physics, *_certification(certified), judged, *cells, learner),
+        *(replay_ends, oracle_ends, energy),
+    ]
+
+
+def _learner(found: Mapping[str, Baseline]) -> str:
+    """The cell of the learner that solves most in training; of two, that with the first name in `LEARNERS`."""
+    tried = [found[name] for name in LEARNERS if name in found]
+    best = max(tried, key=lambda one: one.training.value if one.training else 0.0, default=None)
+    return f"{best.name}: {_baseline(best)}" if best else predictors.cell(found)
 
 
 def _certification(found: Mapping[str, Any]) -> list[str]:
     """The figures of certification of a split."""
     if "draws" not in found:
-        return ["not measured"] * len(CERTIFIED)
+        return [NOT_MEASURED] * len(CERTIFIED)
     oracle = f"{found['solved']} of {found['draws']} (> {100 * lower_bound(found['solved'], found['draws']):.0f}%)"
     same = f"{found['same']} of {found['replays']}" if found.get("replays") else "-"
     return [f"{found['certified']} of {found['indices']}", oracle, same]
-
-
-def _of_card(card: dict[str, Any]) -> dict[str, str]:
-    """The cells of a card, by title."""
-    gaps = [p["relative"] for p in card["proofs"] if p["relative"]]
-    leaving = [d["feature"] for d in card["features"] if d["inside"] == 0]
-    cells = [
-        card["task"],
-        card["axis"],
-        f"{min(gaps):.2g}" if gaps else "another value",
-        ", ".join(leaving) or "stays",
-        card["verdict"].replace("_", "-").replace("any-", "any "),
-        *map(_baseline, card["baselines"]),
-        _boundary(card, "replay"),
-        _boundary(card, "oracle"),
-        str(Energy(**card["energy"])),
-    ]
-    return dict(zip([title for title in COLUMNS if title not in CERTIFIED], cells, strict=True))
 
 
 def _table(titles: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
@@ -168,22 +211,23 @@ def _table(titles: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
-def _baseline(baseline: dict[str, Any]) -> str:
-    if not baseline["excess"]:
-        return baseline["finding"]
-    n, lost = baseline["excess"]["twins"], baseline["excess"]
-    solved = [round(baseline[arm]["value"] * n) for arm in ("training", "here")]
-    held_out = ", held out" if baseline["control"].startswith("held") and not baseline["name"].startswith("any") else ""
-    weak = "weak, " if baseline["finding"] == "too weak" else ""
-    how = f"{lost['value']:+.2f} [{lost['low']:.2f}, {lost['high']:.2f}]"
-    return f"{weak}{solved[0]} → {solved[1]} of {n}, {how}{held_out}"
+def _baseline(baseline: Baseline) -> str:
+    if not (baseline.training and baseline.here and baseline.excess):
+        return baseline.finding
+    training, here, lost = baseline.training, baseline.here, baseline.excess
+    marks = [
+        "weak" if baseline.finding == "too weak" else "",
+        f"{_count(training)} → {_count(here)} of {here.scenarios}",
+        f"{lost.value:+.2f} [{lost.low:.2f}, {lost.high:.2f}]",
+        "held out" if baseline.control == HELD_OUT and not baseline.name.startswith("any") else "",
+        "" if lost.twins else "unpaired",
+    ]
+    return ", ".join(filter(None, marks))
 
 
-def _boundary(card: dict[str, Any], who: str) -> str:
-    if card["why_no_path"]:
-        return "not searched" if card["why_no_path"] == NOT_SEARCHED else "separate values"
-    found = card["boundaries"][who]
-    return found["told"] + "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
+def _count(rate: Rate) -> int:
+    """Number of solved scenarios."""
+    return round(rate.value * rate.scenarios)
 
 
 if __name__ == "__main__":  # worker processes import this file again

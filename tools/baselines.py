@@ -10,7 +10,9 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from scengen import cli
+import axis_records
+
+from scengen import cli, load_task
 from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import read_settings
 from scengen.pool import Pool
@@ -108,7 +110,11 @@ def _results(task: str, policy: str, trained: Path, played: Path, splits: dict[s
         own = [episode for episode in episodes if episode["pool"] == pool]
         reasons = Counter(episode["reason"] for episode in own if not episode["success"])
         counts = {"scenarios": len(own), "solved": sum(episode["success"] for episode in own), "reasons": dict(reasons)}
-        records.append({**told, "split": split, "pool_sha256": Pool.open(pool).sha256, **counts})
+        made = Pool.open(pool)
+        number = dict(made.columns("id", "index"))
+        outcomes = [[number[episode["scenario"]], episode["success"]] for episode in own]
+        moved = {"shifts": axis_records.shifts(load_task(task), split), "pool_sha256": made.sha256}
+        records.append({**told, "split": split, **moved, **counts, "outcomes": sorted(outcomes)})
     return records
 
 
@@ -116,8 +122,7 @@ def page() -> str:
     """The whole page, from the records."""
     lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
     for task in AXES:
-        path = RECORDS / f"{task}.jsonl"
-        records = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
+        records = axis_records.lines(RECORDS / f"{task}.jsonl")
         order = {split: k for k, split in enumerate((ID, *AXES[task]))}
         lines += [_line(record) for record in sorted(records, key=lambda record: order[record["split"]])]
     return HEAD + "\n".join(lines) + "\n"

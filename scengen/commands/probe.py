@@ -6,7 +6,7 @@ from rich.table import Table
 
 from ..ood.axis_card import AxisCard, AxisSettings
 from ..ood.axis_evidence import make_axis_card
-from ..ood.behaviour import Baseline
+from ..ood.baseline import BELIEF, Baseline
 from ..runs.progress import ProgressBar
 from ..work.targets import try_folder
 from . import OK, Arguments, err, out, remark, say
@@ -31,13 +31,14 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _memory_result(memory: Baseline) -> str:
-    """Success of one kind of memory, in words."""
-    if not (memory.training and memory.here and memory.excess):
-        return memory.finding
-    rates = f"{memory.training.value:.0%} of {memory.control}, {memory.here.value:.0%} of {memory.excess.twins} twins"
-    lost = f"{memory.excess.value:.0%} lost, 95 % interval {memory.excess.low:.0%} to {memory.excess.high:.0%}"
-    return f"{memory.finding}: {rates} ({lost})"
+def _result(baseline: Baseline) -> str:
+    """Success of one baseline, in words."""
+    if not (baseline.training and baseline.here and baseline.excess):
+        return baseline.finding
+    excess = baseline.excess
+    rates = f"{baseline.training.value:.0%} of {baseline.control}, {baseline.here.value:.0%} of {excess.twins} twins"
+    lost = f"{excess.value:.0%} lost, 95 % interval {excess.low:.0%} to {excess.high:.0%}"
+    return f"{baseline.finding}: {rates} ({lost})"
 
 
 def _table(card: AxisCard) -> Table:
@@ -54,7 +55,8 @@ def _table(card: AxisCard) -> Table:
         table.add_row("solvable", solvable)
     table.add_row("verdict", card.verdict)
     for baseline in card.baselines:
-        table.add_row(f"memory {baseline.name}", _memory_result(baseline))
+        kind = "planner" if baseline.name in BELIEF else "memory"
+        table.add_row(f"{kind} {baseline.name}", _result(baseline))
     if card.oracle:
         table.add_row("oracle", f"solves {card.oracle.value:.0%} of {card.oracle.scenarios} twins")
     for who, edge in card.boundaries.items():

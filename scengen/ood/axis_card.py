@@ -1,17 +1,23 @@
 """The axis card: all evidence about one OOD axis."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from ..analysis.distance import Energy
-from ..errors import BadConfig, UnknownName, at_least
+from ..errors import BadConfig, UnknownName, at_least, cut
 from ..samplers.axis import Proof
 from ..samplers.task import Task
 from ..statistics import Rate
 from ..work.parallel import Workers
 from . import behaviour, boundary, features
+from .baseline import Baseline
 
+FORMAT = 2
+"""Format of `card.json`. A card without a number is of format 1, which lacks the planners with beliefs of training and
+whose verdict names a memory alone."""
 NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
 """Reason why a card has no boundaries if none were asked for."""
 
@@ -23,6 +29,7 @@ class AxisSettings:
     axis: str = ""
     n: int = 50
     any_n: int | None = None
+    belief_n: int | None = None
     certify_n: int | None = None
     seed: int = 0
     rounds: int = 20
@@ -34,19 +41,19 @@ class AxisSettings:
         if self.axis not in task.axes:
             raise UnknownName(f"axis of {task.name}", self.axis, task.axes)
         at_least(self, n=2, seed=0, rounds=0, workers=1)
-        for name in ("any_n", "certify_n"):
+        for name in ("any_n", "belief_n", "certify_n"):
             if not 0 <= (value := self.count(name)) <= self.n:
                 raise BadConfig(f"{name} = {value}; it must be from 0 to n = {self.n}")
 
     def count(self, name: str) -> int:
-        """Value of `any_n` or `certify_n`: all twins if it is not given."""
+        """Value of `any_n`, `belief_n` or `certify_n`: all twins if it is not given."""
         given = getattr(self, name)
         return self.n if given is None else given
 
     @property
-    def memory_trials(self) -> behaviour.MemoryTrials:
-        """Trials of the memories."""
-        return behaviour.MemoryTrials(self.n, self.count("any_n"), self.seed, self.workers)
+    def trials(self) -> behaviour.Trials:
+        """Trials of the baselines."""
+        return behaviour.Trials(self.n, self.count("any_n"), self.count("belief_n"), self.seed, self.workers)
 
 
 @dataclass(frozen=True)
@@ -72,9 +79,9 @@ class AxisCard:
     first_draws: int
     """Number of indices whose first draw was certified."""
     verdict: str
-    """Verdict on the axis, see `behaviour.verdict`."""
-    baselines: list[behaviour.Baseline]
-    """Results of each kind of memory."""
+    """Verdict on the axis, see `baseline.verdict`."""
+    baselines: list[Baseline]
+    """Results of the memories, then those of the planners with beliefs from training."""
     oracle: Rate | None
     """Success rate of the oracle in the OOD twins, certified or not."""
     boundaries: dict[str, boundary.Boundary]
@@ -88,9 +95,26 @@ class AxisCard:
 
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
-        told = asdict(self)
+        told = {"format": FORMAT, **asdict(self)}
         told["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
         told["boundaries"] = {
             k: {**asdict(b), "verdict": b.verdict, "told": str(b)} for k, b in self.boundaries.items()
         }
         return told
+
+
+def read_card(path: Path) -> dict[str, Any]:
+    """The plain data of a stored card.
+
+    Raises:
+        BadConfig: the file cannot be read, or is a card of another format.
+    """
+    try:
+        card = json.loads(path.read_text())
+        made, task, axis = card.get("format", 1), card["task"], card["axis"]
+    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+        raise BadConfig(f"{path} is not the card of an axis: {type(error).__name__} {cut(str(error))}") from None
+    if made != FORMAT:
+        remedy = f"scengen probe task={task} axis={axis} writes it again, and plays only what is missing"
+        raise BadConfig(f"{path} is a card of format {cut(str(made))}; this version reads format {FORMAT}; {remedy}")
+    return card

@@ -18,6 +18,8 @@ from ..work.targets import write
 from . import behaviour, boundary, features
 from .axis_card import NOT_SEARCHED, AxisCard, AxisSettings
 from .axis_card_page import write_page
+from .baseline import verdict
+from .belief import measure_belief
 
 
 def make_axis_card(
@@ -53,7 +55,8 @@ def _card(
 ) -> AxisCard:
     """The card: evidence on features, certified scenarios, and what else is measured for it."""
     controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
-    baselines, oracle = behaviour.measure(task, settings.axis, folder, controls, settings.memory_trials, progress)
+    memories, oracle = behaviour.measure(task, settings.axis, folder, controls, settings.trials, progress)
+    baselines = [*memories, *measure_belief(task, settings.axis, folder, settings.trials, progress)]
     boundaries, why_no_path = _boundaries(task, settings, folder, progress)
     energy, energy_of_parameters = _energies(task, settings)
     axis = task.axes[settings.axis]
@@ -69,7 +72,7 @@ def _card(
         reasons=made.reasons if made else {},
         indices=made.indices if made else 0,
         first_draws=made.first_draws if made else 0,
-        verdict=behaviour.verdict(baselines),
+        verdict=verdict(baselines),
         baselines=baselines,
         oracle=oracle,
         boundaries=boundaries,

@@ -28,78 +28,40 @@ from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
 from ..scenario import Scenario
-from ..statistics import Difference, Rate, paired, rate
+from ..statistics import Rate, rate
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
+from .baseline import MOTION, OBJECT_CENTRIC, Baseline
 
-BASELINES = ("replay", "any_replay", "object_centric", "any_object_centric")
-"""Kinds of memory, from the weakest to the strongest."""
 LIBRARY_SIZE = 16
 """Number of training solutions that `any_...` may choose from: those of the first indices of another seed."""
-MIN_OWN_SUCCESS = 0.9
-"""Minimum share of its own scenarios that a baseline has to solve again. Below it, the baseline is too weak."""
-MIN_CONTROL_SUCCESS = 0.3
-"""Minimum share of its control arm that a baseline has to solve. Below it, the baseline is too weak."""
-SOLVED_SHARE = 0.5
-"""An axis counts as solved by memory if the interval for some memory lies above this share."""
 MOVE_TRIES = 20
 """Maximum number of draws of a move within training until one is feasible."""
 TWIN_LIMITS = Limits(600.0, 4000)
 """Time and memory limits of one twin: some oracle runs and replays take several seconds."""
-SOLVED_BY_MEMORY = "solved by memory"
-"""Verdict: some memory solves most of the axis, and the axis breaks none."""
-INCONCLUSIVE = "inconclusive"
-"""Verdict: no memory is known to break, and none is known to solve most of the axis."""
+MOVED = "moved within training"
+"""Control: the axis' own parameters are redrawn within training."""
+HELD_OUT = "held-out training"
+"""Control: a training scenario that no memory comes from."""
 
 
 @dataclass(frozen=True)
-class Baseline:
-    """Success of one kind of memory on an axis. Only twins count that the oracle solves in both arms."""
-
-    name: str
-    own: float
-    """Share of its own scenarios that the memory solves again."""
-    control: str
-    """Kind of the control: `moved within training` or `held-out training`."""
-    training: Rate | None
-    """Success rate in the control arm; None if there was no twin to try."""
-    here: Rate | None
-    """Success rate in the OOD twins."""
-    excess: Difference | None
-    """Difference `training` minus `here`, paired by twins."""
-
-    @property
-    def finding(self) -> str:
-        """Finding: `breaks`, `holds` (the interval of `excess` includes 0), `too weak`, or `not tried`."""
-        if self.training is None or self.excess is None:
-            return "not tried"
-        if self.own < MIN_OWN_SUCCESS or self.training.value < MIN_CONTROL_SUCCESS:
-            return "too weak"
-        return "breaks" if self.excess.low > 0 else "holds"
-
-
-def verdict(baselines: Iterable[Baseline]) -> str:
-    """The strongest memory that an axis breaks; if there is none, `SOLVED_BY_MEMORY` or `INCONCLUSIVE`."""
-    tried = {baseline.name: baseline for baseline in baselines}
-    if broken := [name for name in BASELINES if name in tried and tried[name].finding == "breaks"]:
-        return f"breaks {broken[-1]}"
-    solved = any(baseline.here is not None and baseline.here.low > SOLVED_SHARE for baseline in tried.values())
-    return SOLVED_BY_MEMORY if solved else INCONCLUSIVE
-
-
-@dataclass(frozen=True)
-class MemoryTrials:
-    """The trials of the memories on one split."""
+class Trials:
+    """The trials of the baselines on one split."""
 
     n: int
     """Number of twins. A twin whose training scenario the oracle does not solve has no memory and is left out."""
-    any_n: int
+    any_n: int = 0
     """Number of twins that are also tried with all memories of the library: `2 * LIBRARY_SIZE` rollouts each."""
+    belief_n: int = 0
+    """Number of twins that are also tried with the planners of `belief`: up to 6 rollouts each."""
     seed: int = 0
+    """Seed of the draws."""
     workers: Workers = 1
+    """Workers that play the twins."""
 
 
 def measure(
@@ -107,7 +69,7 @@ def measure(
     split: str,
     folder: Path,
     controls: Path,
-    trials: MemoryTrials,
+    trials: Trials,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> tuple[list[Baseline], Rate | None]:
     """Play all memories on the first twins of a split, continuing the runs in both folders.
@@ -118,28 +80,57 @@ def measure(
         progress: called with the name of the step, the number of twins done, and their total.
 
     Returns:
-        The baselines in the order of `BASELINES`, and the oracle's success rate on the split.
+        The baselines, from the weakest to the strongest memory, and the oracle's success rate on the split.
     """
     n, any_n, seed = trials.n, trials.any_n, trials.seed
 
     def play(work: Callable[..., dict], where: Path, which: str, count: int, what: str, library: bool) -> list[dict]:
-        shifts = {name: str(dist) for name, dist in task.shifts(which).items()}
-        identity = {"task": task.name, "split": which, "shifts": shifts, "seed": seed, "library": LIBRARY_SIZE}
-        identity["source"] = source_sha256(task.family)
-        with Log(where, identity) as log:
-            todo = sorted(set(range(count)) - {r["index"] for r in log.records})
-            if todo and library:
-                _library(task, seed)  # before the workers: they are copies of this process
-            for record in each(partial(work, task, which, seed), todo, trials.workers, TWIN_LIMITS, _lost):
-                log.add(record)
-                progress(what, len(log.records), count)
-            return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])
+        def prepare() -> None:
+            if library:
+                _library(task, seed)
+
+        told = partial(progress, what)
+        return play_indices(partial(work, task, which, seed), task, which, where, count, trials, told, prepare)
 
     own = play(_play_own, controls / "own.jsonl", ID, n, "memories in training", False)
     any_id = play(_play_library, controls / "any.jsonl", ID, any_n, "any memory in training", True)
-    twins = play(_play_twin, folder / "twins.jsonl", split, n, "memories in twins", not _varies(task, split))
+    twins = play(_play_twin, folder / "twins.jsonl", split, n, "memories in twins", not varies(task, split))
     any_ood = play(_play_library, folder / "any.jsonl", split, any_n, "any memory in twins", True)
     return _baselines(own, any_id, twins, any_ood), _oracle_rate(twins)
+
+
+def play_indices(
+    work: Callable[[int], dict[str, Any]],
+    task: Task,
+    split: str,
+    where: Path,
+    count: int,
+    trials: Trials,
+    progress: Callable[[int, int], None],
+    prepare: Callable[[], None] = lambda: None,
+) -> list[dict[str, Any]]:
+    """Play the first indices of a split that a log does not hold yet.
+
+    Args:
+        work: makes the record of an index; an index that crashes its process or reaches a limit has only a reason.
+        where: file of the log.
+        count: number of indices.
+        prepare: called once if there is work, before the workers start, which are copies of this process.
+
+    Returns:
+        The records of the first `count` indices, in their order.
+    """
+    shifts = {name: str(dist) for name, dist in task.shifts(split).items()}
+    identity = {"task": task.name, "split": split, "shifts": shifts, "seed": trials.seed, "library": LIBRARY_SIZE}
+    identity["source"] = source_sha256(task.family)
+    with Log(where, identity) as log:
+        todo = sorted(set(range(count)) - {r["index"] for r in log.records})
+        if todo:
+            prepare()
+        for record in each(work, todo, trials.workers, TWIN_LIMITS, _lost):
+            log.add(record)
+            progress(len(log.records), count)
+        return sorted((r for r in log.records if r["index"] < count), key=lambda r: r["index"])
 
 
 def _oracle_rate(twins: list[dict[str, Any]]) -> Rate | None:
@@ -163,23 +154,21 @@ def _baselines(
         any_ood: records of the library in OOD twins.
     """
     again = [r["again"] for r in own if r.get("again") is not None]
-    faithful = {name: sum(again) / len(again) if again and "object" in name else 1.0 for name in BASELINES}
+    names = [*MOTION, *OBJECT_CENTRIC]
+    faithful = {name: sum(again) / len(again) if again and name in OBJECT_CENTRIC else 1.0 for name in names}
     moved = any(t.get("moved") for t in twins)
     both = [t for t in twins if t.get("control") and t["control"]["oracle"] and t["here"]["oracle"]]
     solved = {t["index"] for t in twins if t.get("here") and t["here"]["oracle"]}
     inside = {r["index"]: r for r in any_id if r.get("any_replay") is not None}
     pairs = [(inside[r["index"]], r) for r in any_ood if r["index"] in solved & inside.keys()]
     found = []
-    for name in BASELINES:
+    for name in names:
         if name.startswith("any"):
-            a, b = [[p[name]] for p, _ in pairs], [[p[name]] for _, p in pairs]
+            arms = [(inside[name], outside[name]) for inside, outside in pairs]
         else:
-            a, b = [[t["control"][name]] for t in both], [[t["here"][name]] for t in both]
-        control = "moved within training" if moved and not name.startswith("any") else "held-out training"
-        if a:
-            found.append(Baseline(name, faithful[name], control, rate(a), rate(b), paired(a, b)))
-        else:
-            found.append(Baseline(name, faithful[name], control, None, None, None))
+            arms = [(t["control"][name], t["here"][name]) for t in both]
+        control = MOVED if moved and not name.startswith("any") else HELD_OUT
+        found.append(Baseline.of(name, control, arms, faithful[name]))
     return found
 
 
@@ -194,7 +183,7 @@ def _play_own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
 def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     """A twin's own memory, or the nearest one, in both arms. `here` is None if there is no memory or no OOD twin."""
     trained, memory = recall(task, seed, index)
-    moved = _varies(task, split)
+    moved = varies(task, split)
     record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}
     if memory is None:
         return record
@@ -209,7 +198,7 @@ def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     return record
 
 
-def _varies(task: Task, split: str) -> bool:
+def varies(task: Task, split: str) -> bool:
     """Whether a parameter that a split moves varies within training too: then a twin's own memory has a control."""
     return any(not isinstance(task.training[name], Fixed) for name in task.shifts(split))
 

@@ -1,0 +1,111 @@
+"""Planners that believe training: the oracle of the training twin plays in the OOD scene.
+
+Such a planner has its oracle's plan and feedback. It sees what the oracle reads from the world, and believes that some
+parameters are as in training:
+
+* `belief`: all parameters that the axis moves.
+* `hidden_belief`: those of them that are hidden (`param(hidden=True)`). An axis that moves none has no such planner.
+
+Where a memory repeats a motion, this planner makes a new one from wrong numbers. A loss says that the motion depends on
+the value of a moved parameter. It does not say that the value is hard to see: which values an oracle reads and which it
+knows is the choice of its author. The control is the training scenario with the axis' own parameters redrawn within
+training, and the same wrong numbers. A parameter that is constant in training is believed rightly there.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..errors import GaveUp, Infeasible
+from ..params import values, with_values
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..scenario import Plan, Scenario
+from ..sim.world import World
+from ..validate.rebuilt import world_of
+from ..validate.rollout import run
+from .baseline import BELIEF, Baseline
+from .behaviour import MOVED, Trials, moved_within, play_indices, solves, varies
+
+CONSTANT = "training, where it is constant"
+"""Control: the training scenario itself, because the moved parameters have one value in training."""
+STEP = "beliefs in twins"
+"""Name of the step in progress."""
+
+
+def measure_belief(
+    task: Task,
+    split: str,
+    folder: Path,
+    trials: Trials,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> list[Baseline]:
+    """Play the planners on the first twins of a split, continuing the run in `belief.jsonl` of the folder.
+
+    Returns:
+        The baselines `hidden_belief` and `belief`, of which the former is not tried if the axis moves nothing hidden.
+    """
+    where, count = folder / "belief.jsonl", trials.belief_n
+    work = partial(_play_twin, task, split, trials.seed)
+    played = play_indices(work, task, split, where, count, trials, partial(progress, STEP))
+    control = MOVED if varies(task, split) else CONSTANT
+    both = [twin for twin in played if twin.get("here") and twin.get("control")]
+    arms = {
+        name: [(twin["control"][name], twin["here"][name]) for twin in both if name in twin["here"]] for name in BELIEF
+    }
+    return [Baseline.of(name, control, arms[name]) for name in BELIEF]
+
+
+def beliefs(task: Task, split: str) -> dict[str, frozenset[str]]:
+    """Parameters of which each planner believes that they are as in training."""
+    moved = frozenset(task.shifts(split))
+    hidden = frozenset(name for name in moved if task.known[name].hidden)
+    return {"hidden_belief": hidden, "belief": moved} if hidden else {"belief": moved}
+
+
+def believer(scenario: Scenario, trained: Scenario, believed: frozenset[str]) -> Scenario:
+    """The scenario that a planner believes to be in."""
+    known = values(trained)
+    return with_values(scenario, {name: known[name] for name in believed})
+
+
+def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
+    """Outcomes of the planners in both arms. An arm is None if it is infeasible or the oracle does not solve it."""
+    record: dict[str, Any] = {"index": index, "control": None, "here": None, "reasons": {}}
+    try:
+        trained, here = task.draw(ID, seed, index).scenario, task.draw(split, seed, index).scenario
+    except Infeasible:
+        return record
+    control = moved_within(task, task.shifts(split), seed, index, trained)
+    if control is None or not (solves(task, here) and solves(task, control)):
+        return record
+    for arm, scenario in (("control", control), ("here", here)):
+        believed = beliefs(task, split)
+        why = {known: _play(task, scenario, trained, known) for known in set(believed.values())}
+        told = {name: why[known] for name, known in believed.items()}
+        record[arm] = {name: reason is None for name, reason in told.items()}
+        if arm == "here":
+            record["reasons"] = {name: reason for name, reason in told.items() if reason}
+    return record
+
+
+def _play(task: Task, scenario: Scenario, trained: Scenario, believed: frozenset[str]) -> str | None:
+    """Why a planner fails in a scenario; None if it solves it."""
+    planner = believer(scenario, trained, believed)
+    if planner == scenario:
+        return None  # its beliefs are right, so it is the oracle, which has solved the scenario
+    rollout = run(
+        scenario, world_of(scenario, task.embodiment), partial(_plan, planner), task.horizon, until_settled=True
+    )
+    return None if rollout.solved else rollout.gave_up or rollout.reason
+
+
+def _plan(planner: Scenario, world: World) -> Plan:
+    """The oracle's plan. It ends where the scene contradicts its beliefs, such as with a body that does not exist."""
+    try:
+        yield from planner.oracle(world)
+    except GaveUp:
+        raise
+    except Exception as error:
+        raise GaveUp(f"the scene contradicts the plan: {type(error).__name__}: {error}") from error

@@ -1,0 +1,73 @@
+"""Play the planners with beliefs of training on the axes, without making cards, into records/beliefs.
+
+    python tools/beliefs.py n=8 [workers=1] [TASK | TASK/AXIS ...]
+
+Axes that have a record with as many twins are left out, so that a repeated call continues; n=20 extends what n=8 has
+played. `fresh` plays all of them again, which is needed after a change of a family or its oracle. A twin takes 4 to 6
+rollouts, about a second of processor time. `python tools/all_axes.py page` writes docs/axes.md from the records.
+"""
+
+import sys
+from collections.abc import Iterator
+
+from axis_records import BELIEFS, ROOT, read, store
+
+from scengen import list_tasks, load_task
+from scengen.errors import ScengenError, nearest
+from scengen.ood.behaviour import Trials
+from scengen.ood.belief import measure_belief
+from scengen.samplers.task import Task
+from scengen.validate.identity import source_sha256
+
+MADE = ROOT / "generated" / "beliefs"
+"""Folder of the outcomes of single twins, by the hash of the code."""
+TWINS = 8
+"""Default number of twins of an axis."""
+
+
+def main(*arguments: str) -> None:
+    """Play what is missing."""
+    given = dict(argument.split("=", 1) for argument in arguments if "=" in argument)
+    if unknown := given.keys() - {"n", "workers"}:
+        sys.exit(f"no setting named {min(unknown)!r}{nearest(min(unknown), ('n', 'workers'))}; known: n, workers")
+    n, workers = int(given.get("n", TWINS)), int(given.get("workers", 1))
+    names = [argument for argument in arguments if "=" not in argument and argument != "fresh"]
+    failed = []
+    for task, axis in wanted(names, n, fresh="fresh" in arguments):
+        try:
+            told = measure(task, axis, n, workers, "fresh" in arguments)
+        except ScengenError as error:  # one axis without a feasible twin must not end the run
+            failed.append(f"{task.name}/{axis}")
+            told = str(error)
+        print(f"{task.name}/{axis}: {told}", flush=True)
+    sys.exit(f"not measured: {', '.join(failed)}" if failed else 0)
+
+
+def wanted(names: list[str], n: int, fresh: bool) -> Iterator[tuple[Task, str]]:
+    """The axes to play: of the named tasks, the named ones, or all; those without a record of n twins.
+
+    Raises:
+        ScengenError: there is no such task or axis.
+    """
+    for name, _, chosen in (text.partition("/") for text in names or list_tasks()):
+        task = load_task(name)
+        known = read(BELIEFS, task)
+        for axis in [task.axis(chosen).name] if chosen else task.axes:
+            if fresh or axis not in known or known[axis]["n"] < n:
+                yield task, axis
+
+
+def measure(task: Task, axis: str, n: int, workers: int, fresh: bool) -> str:
+    """Play the planners on an axis and store its record. Returns the result in words."""
+    source = source_sha256(task.family)
+    folder = MADE / source[:12] / f"{task.name}-{axis}"
+    if fresh:
+        (folder / "belief.jsonl").unlink(missing_ok=True)
+    found = measure_belief(task, axis, folder, Trials(n, belief_n=n, workers=workers))
+    store(BELIEFS, task, axis, {"n": n, "source": source, "baselines": [one.record for one in found]})
+    counts = [f"{r['name']} {r['training']} -> {r['here']} of {r['twins']}" for r in (one.record for one in found)]
+    return f"{', '.join(counts)}: {', '.join(one.finding for one in found)}"
+
+
+if __name__ == "__main__":  # worker processes import this file again
+    main(*sys.argv[1:])

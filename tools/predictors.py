@@ -1,0 +1,173 @@
+"""Which cheap baseline predicts what an axis does to a learner, as docs/predictors.md: `python tools/predictors.py`
+
+The page is written from records. It compares the loss of each baseline, and the distance of the features, with the
+learner's loss, over all axes on which a learner was tried that works in training.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import axis_records
+import numpy as np
+from scipy.stats import mannwhitneyu, rankdata
+
+from scengen import list_tasks, load_task
+from scengen.ood.baseline import BELIEF, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline
+from scengen.statistics import NORMAL_QUANTILE
+
+PAGE = Path(__file__).parent.parent / "docs" / "predictors.md"
+MIN_AXES = 60
+"""Number of axes from which the best predictor is chosen. At 60, the interval of a rank correlation of 0.5 has a half
+width of 0.2, so that a good predictor can be told from a useless one."""
+DISTANCE = "distance of features"
+"""Predictor: energy distance between the features in and out of distribution [training ranges]."""
+PREDICTORS = (*MOTION, *OBJECT_CENTRIC, *BELIEF, DISTANCE)
+"""What is compared."""
+HEAD = f"""# Predicting a learner
+
+Written by `make docs` from the figures in [every split, measured](axes.md). A learner costs minutes of training and
+hours of certification for each task, the other baselines cost seconds for each axis. This page asks which of them
+predicts the learner.
+
+* **loss**: success within training minus success on the axis. An axis counts if a learner was tried on it that is not
+  too weak in training. A predictor that is too weak or was not tried on an axis does not count there.
+* **rank correlation**: Spearman's, between the losses of the predictor and of the learner, with its 95 % interval
+  (Bonett and Wright 2000). It needs four axes.
+* **AUC**: probability that the predictor's loss is larger on an axis that breaks the learner than on one that does not;
+  0.5 is chance.
+* The best predictor is that with the highest rank correlation over at least {MIN_AXES} axes. [Every split,
+  measured](axes.md) shows what it says of axes that no learner has tried.
+
+"""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Agreement of a predictor with the learner."""
+
+    axes: int
+    """Number of axes on which both are known."""
+    correlation: float | None
+    """Rank correlation; None if it is not defined, as with fewer than four axes."""
+    auc: float | None
+    """Area under the curve; None if the learner breaks on all or none of the axes."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the rank correlation, by Fisher's transformation."""
+        r = min(max(self.correlation or 0.0, -0.999), 0.999)
+        half = NORMAL_QUANTILE * math.sqrt((1 + r**2 / 2) / (self.axes - 3))
+        return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.write_text(page())
+
+
+def page() -> str:
+    """The whole page."""
+    rows = [("predictor", "axes", "rank correlation", "AUC")]
+    for name in PREDICTORS:
+        found = score(name)
+        told = "not defined"
+        if found.correlation is not None:
+            told = "{:+.2f} [{:+.2f}, {:+.2f}]".format(found.correlation, *found.interval)
+        auc = "not defined" if found.auc is None else f"{found.auc:.2f}"
+        rows.append((name.replace("_", " "), str(found.axes), told, auc))
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    tried = [
+        f"| {one.task} | {one.axis} | {one.learner.name} | {one.drop:+.2f} | {one.learner.finding} |"
+        for one in _trials()
+    ]
+    listed = [
+        "Axes on which a learner was tried:",
+        "",
+        "| task | axis | learner | loss | finding |",
+        "|---|---|---|---|---|",
+        *tried,
+    ]
+    return HEAD + "\n".join([*lines[:1], "|---" * 4 + "|", *lines[1:], "", sentence(), "", *listed]) + "\n"
+
+
+def sentence() -> str:
+    """Which predictor is the best, in words."""
+    name, tried = best(), len(_trials())
+    if name:
+        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {name}."
+    return (
+        f"Which baseline predicts the learner is not decided: {tried} axes were tried with a learner, and it takes "
+        f"{MIN_AXES} ([figures](predictors.md))."
+    )
+
+
+def cell(found: Mapping[str, Baseline]) -> str:
+    """What is told of an axis that no learner has tried."""
+    name = best()
+    if name is None:
+        return "not measured"
+    return f"not measured; {name} predicts: {found[name].finding if name in found else 'not measured'}"
+
+
+@cache
+def best() -> str | None:
+    """The best predictor that is a baseline; None as long as too few axes are known."""
+    known = {name: score(name) for name in PREDICTORS if name != DISTANCE}
+    enough = {name: one.correlation for name, one in known.items() if one.axes >= MIN_AXES and one.correlation}
+    return max(enough, key=lambda name: enough[name], default=None)
+
+
+def score(name: str) -> Score:
+    """The agreement of a predictor with the learner."""
+    known = [one for one in _trials() if name in one.losses]
+    mine, learned = [one.losses[name] for one in known], [one.drop for one in known]
+    varied = len(set(mine)) > 1 and len(set(learned)) > 1
+    correlation = float(np.corrcoef(rankdata(mine), rankdata(learned))[0, 1]) if len(known) > 3 and varied else None
+    lost = [one.losses[name] for one in known if one.learner.finding == "breaks"]
+    kept = [one.losses[name] for one in known if one.learner.finding != "breaks"]
+    auc = float(mannwhitneyu(lost, kept)[0]) / (len(lost) * len(kept)) if lost and kept else None
+    return Score(len(known), correlation, auc)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An axis on which a learner was tried that works in training."""
+
+    task: str
+    """Name of the task."""
+    axis: str
+    """Name of the axis."""
+    learner: Baseline
+    """Success of the learner."""
+    losses: Mapping[str, float]
+    """Figures of the predictors that are known."""
+
+    @property
+    def drop(self) -> float:
+        """Loss of the learner."""
+        return self.learner.excess.value if self.learner.excess else 0.0
+
+
+@cache
+def _trials() -> list[Trial]:
+    """All axes on which a learner was tried that works in training."""
+    found = []
+    for task in (load_task(name) for name in list_tasks() if (axis_records.LEARNED / f"{name}.jsonl").is_file()):
+        cards = axis_records.read(axis_records.CARDS, task)
+        for axis, baselines in axis_records.baselines(task).items():
+            learner = next((baselines[name] for name in LEARNERS if name in baselines), None)
+            if learner is None or learner.finding in ("too weak", "not tried"):
+                continue
+            clear = {name: one for name, one in baselines.items() if name in PREDICTORS and one.finding != "too weak"}
+            losses = {name: one.excess.value for name, one in clear.items() if one.excess}
+            if axis in cards:
+                losses[DISTANCE] = cards[axis]["energy"]["distance"]
+            found.append(Trial(task.name, axis, learner, losses))
+    return found
+
+
+if __name__ == "__main__":
+    main()
