@@ -54,6 +54,11 @@ class Question:
     """Answer to `simplest_plan` if the shortcut breaks no rule, but does not get there: then the certificate says no
     more than that everything came to rest, or that a move gave up."""
 
+    @property
+    def rights(self) -> tuple[str, ...]:
+        """`right` as a tuple."""
+        return _listed(self.right)
+
 
 @dataclass(frozen=True)
 class Fact:
@@ -138,7 +143,7 @@ class Sheet:
         for id_, question in self.facts.items():
             if question.kind not in KINDS:
                 raise UnknownName(f"kind of {where}, facts.{id_}", question.kind, KINDS)
-            right = _listed(question.right)
+            right = question.rights
             if strange := [option for option in right if option not in _options(question)]:
                 raise BadConfig(f"{where}: {id_}.right = {cut(strange[0])}; it is none of the options")
         for id_, subgoal in self.order.items():
@@ -170,7 +175,7 @@ class Sheet:
 
     def _fact(self, id_: str, asked: Question, told: Mapping[str, float | str], shortcuts: Mapping[str, Any]) -> Fact:
         options, question = _options(asked), spoken_question(id_, asked)
-        right: Answer | None = _listed(asked.right)
+        right: Answer | None = asked.rights
         if asked.kind == "hidden state":
             right = None
         elif id_ in told:

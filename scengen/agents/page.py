@@ -9,8 +9,9 @@ from ..evaluate.table import cells
 from ..pictures.report import template
 from ..work.targets import write
 from .calls import CALLS
+from .priors import Prior
 from .questioning import ACT, PLAN, UNDERSTAND
-from .tables import GRADES, agreement, by_question, executed_lines, lines, lost_in_twins, plan_errors, sighted_lines
+from .tables import GRADES, agreement, by_question, executed_lines, lines, lost_in_twins, plan_errors, sight_lines
 
 TITLES = {UNDERSTAND: "Stage 1: understanding", PLAN: "Stage 2: plan", ACT: "Stage 3: action"}
 """Titles of the stages."""
@@ -19,7 +20,7 @@ SHOWN = 200
 
 
 def write_page(
-    folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, float]]
+    folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, Prior]]
 ) -> Path:
     """Write `report.html` into the folder of a run; pictures stay beside it. Returns its path."""
     calls = [json.loads(line) for line in (folder / CALLS).read_text().splitlines()[1:]]
@@ -34,7 +35,7 @@ def write_page(
             for stage in stages
         ],
         questions=by_question(results, priors),
-        sighted=[cells(line) for line in sighted_lines(results, priors)],
+        sight=sight_lines(results, priors),
         grades=GRADES,
         errors=plan_errors(results),
         executed=[cells(line) for line in executed_lines(results)],

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
@@ -23,9 +24,9 @@ from . import facts
 from .acting import MODES, SEE, act
 from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
 from .execution import EXECUTIONS, Executions
-from .facts import Fact, Sheet
+from .facts import SIMPLEST_PLAN, Answer, Fact, Sheet
 from .models import Endpoint, Model, Turn, made
-from .priors import prior_shares
+from .priors import Prior, priors
 from .questioning import ACT, EMPTY, PLAN, UNDERSTAND, Exam, Result, make_plan, plan_turns, understand, understand_turns
 from .scene import observe, streams
 from .standins import STAND_INS, Key
@@ -34,8 +35,6 @@ STAGES = (UNDERSTAND, PLAN, ACT)
 """Numbers of the stages."""
 SETTINGS = "settings.json"
 """Name of the file with the settings of the last run in a folder."""
-PRIORS = 50
-"""Largest number of training scenarios from which the stand-in `blind` takes its prior."""
 TRANSCRIPT = "transcript:"
 """Prefix of a model that is the journal of an earlier run."""
 
@@ -151,8 +150,8 @@ class Outcome:
     """Number of new calls."""
     tokens: int
     """Tokens of the new calls."""
-    priors: Mapping[str, Mapping[str, float]]
-    """Share of training in which the best fixed answer is right, by task and question, see `priors.prior_shares`."""
+    priors: Mapping[str, Mapping[str, Prior]]
+    """Best fixed answers in training and how often they are right, by task and question."""
     stopped: str
     """Reason why the run ended before all was asked; empty if it did not."""
 
@@ -195,9 +194,9 @@ def run(
         except OutOfBudget as error:
             stopped = str(error)
         write(folder / f"results-{settings.stage}.jsonl", "".join(json.dumps(r) + "\n" for r in results))
-        tasks = {work.task.name: work.task for work in todo}
-        priors = {name: prior_shares(task, facts.load(task, search)) for name, task in tasks.items()}
-        return Outcome(results, calls.new, calls.tokens, priors, stopped)
+        tasks = {work.task.name: work.task for work in todo} if settings.stage != ACT else {}
+        known = {name: priors(task, facts.load(task, search)) for name, task in tasks.items()}
+        return Outcome(results, calls.new, calls.tokens, known, stopped)
 
 
 def twins(settings: AgentSettings, todo: Sequence[Work], work: Work) -> list[str]:
@@ -253,29 +252,35 @@ def exams(
             settle=True,
             search=search,
         )
+        fixed = {id_: prior.answer for id_, prior in priors(task, sheet).items()} if settings.model == "blind" else {}
         with closing(env):
             for number, work in enumerate(mine):
                 moments = 1 if settings.stage == ACT else settings.moments
                 view = observe(env, work.row.id, moments, settings.spacing)
-                stand_in = _stand_in(settings, mine, told, number, sheet) if ask else None
+                stand_in = _stand_in(settings, mine, told, number, sheet, fixed) if ask else None
                 for temperature in settings.temperatures:
                     yield work, Exam(work.row, sheet, told[number], view, temperature, stand_in), env
 
 
 def _stand_in(
-    settings: AgentSettings, mine: Sequence[Work], told: Sequence[tuple[Fact, ...]], number: int, sheet: Sheet
+    settings: AgentSettings,
+    mine: Sequence[Work],
+    told: Sequence[tuple[Fact, ...]],
+    number: int,
+    sheet: Sheet,
+    fixed: dict[str, Answer],
 ) -> Model | None:
     """The stand-in for one scenario; None if the model is none.
 
-    Raises:
-        BadConfig: `blind` has no training scenario to learn from.
+    Why the simplest plan fails is the most frequent reason of the other training scenarios in the pools.
     """
     if settings.model not in STAND_INS or settings.url:
         return None
-    others = [fact for k, fact in enumerate(told) if k != number and mine[k].row.split == ID][:PRIORS]
-    if settings.model == "blind" and not others:
-        raise BadConfig(f"model blind needs another scenario of {mine[number].row.task} with split id; add such a pool")
-    return STAND_INS[settings.model](Key(told[number], sheet.plan, others))
+    others = [fact for k, fact in enumerate(told) if k != number and mine[k].row.split == ID]
+    reasons = Counter(fact.right for each in others for fact in each if fact.id == SIMPLEST_PLAN and fact.right)
+    if reasons:
+        fixed = fixed | {SIMPLEST_PLAN: reasons.most_common(1)[0][0]}
+    return STAND_INS[settings.model](Key(told[number], sheet.plan, fixed))
 
 
 def _labels(work: Work) -> dict[str, Any]:

@@ -2,12 +2,9 @@
 format errors. They know the answers, so they measure the graders and not themselves."""
 
 import json
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from .facts import Answer, Fact
 from .models import Model, Reply, Tool, Turn
@@ -23,8 +20,8 @@ class Key:
     """Facts of the scenario."""
     order: Order
     """Order of the task's sub-goals."""
-    training: Sequence[tuple[Fact, ...]]
-    """Facts of training scenarios of the task, without the scenario itself: the prior of `blind`."""
+    priors: Mapping[str, Answer]
+    """Best fixed answers in training, by question: what `blind` says."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +61,12 @@ class Wrong(StandIn):
 
 
 class Blind(StandIn):
-    """A stand-in that sees nothing, and knows how often each answer is right in training."""
+    """A stand-in that sees nothing, and knows which answer to each question is most often right in training."""
 
     def understood(self) -> dict[str, Any]:
-        """The most frequent options, and the medians of the numbers, of training."""
-        before = [{fact.id: fact.right for fact in facts} for facts in self.key.training]
-        known = {f.id: _prior([told[f.id] for told in before]) for f in self.key.facts if not f.hidden}
-        options = {fact.id: fact.options for fact in self.key.facts}
+        """The best fixed answers; what has none, or not among the options of this scenario, is unknown."""
+        options = {fact.id: fact.options for fact in self.key.facts if not fact.hidden}
+        known = {id_: answer for id_, answer in self.key.priors.items() if id_ in options}
         fits = {k: a for k, a in known.items() if not isinstance(a, tuple) or set(a) <= set(options[k])}
         return artefact(fits, [fact.id for fact in self.key.facts if fact.id not in fits])
 
@@ -146,11 +142,3 @@ def _wrong(fact: Fact) -> Answer:
     right = fact.right if isinstance(fact.right, tuple) else ()
     others = [option for option in fact.options if option not in right]
     return (others[0],)
-
-
-def _prior(answers: Sequence[Answer | None]) -> Answer:
-    """The most frequent options, or the median of numbers."""
-    if numbers := [answer for answer in answers if isinstance(answer, float)]:
-        return float(np.median(numbers))
-    (likeliest, _), *_ = Counter(answer for answer in answers if isinstance(answer, tuple)).most_common(1)
-    return likeliest

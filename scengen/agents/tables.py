@@ -5,9 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..evaluate.table import TableLine, cells, table
+from ..evaluate.table import TableLine, cells, percent, table
 from ..samplers.split import ID
+from ..statistics import Difference, Rate, mean_difference
 from .grading import Grade
+from .priors import Prior
 from .questioning import UNDERSTAND, Result
 
 GRADES: tuple[Grade, ...] = ("right", "wrong", "forbidden", "missing", "format")
@@ -25,21 +27,72 @@ def lines(results: Sequence[Mapping[str, Any]], stage: int) -> list[TableLine]:
     return table([_episode(plain, success) for plain, outcomes in found for success in outcomes])
 
 
-MOST_PRIOR = 0.6
-"""Largest share of training in which the best fixed answer may be right for a question to test sight."""
+@dataclass(frozen=True)
+class SightLine:
+    """How far the answers of stage 1 are better than the best answers without a look: 0 as good, 1 all right.
+
+    The measure is Cohen's kappa with the best fixed answers of training in place of chance: (share of right answers -
+    prior) / (1 - prior), over the questions whose prior is below 1.
+    """
+
+    what: str
+    """Name of the task or category, or `all`."""
+    split: str
+    """Name of the OOD split, or `all`."""
+    id: Difference | None
+    """The measure in distribution."""
+    ood: Difference | None
+    """The measure out of distribution. Below 0 the answers of training were given where they no longer hold."""
+
+    @property
+    def cells(self) -> list[str]:
+        """The cells of the line, as text."""
+        return [self.what, self.split, percent(self.id, "+"), percent(self.ood, "+")]
 
 
-def sighted_lines(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Mapping[str, float]]) -> list[TableLine]:
-    """The table of stage 1 for the questions that need a look: a fixed answer is right in at most `MOST_PRIOR` of
-    training. Tasks without such questions have no line; the list is empty if there are none."""
+def sight_lines(
+    results: Sequence[Mapping[str, Any]], known: Mapping[str, Mapping[str, Prior]]
+) -> tuple[list[SightLine], list[str]]:
+    """What stage 1 says about sight, in the lines of `lines`; categories are means over their tasks.
+
+    Returns:
+        The lines, and the tasks that have none, as all their answers are the same in training.
+    """
+    varied = {task: {id_: p.share for id_, p in of.items() if p.share < 1.0} for task, of in known.items()}
     episodes = [
         _episode(plain, grade == "right")
         for plain in results
         if plain["stage"] == UNDERSTAND
         for question, grade in plain["grades"].items()
-        if priors.get(plain["task"], {}).get(question, 1.0) <= MOST_PRIOR
+        if question in varied.get(plain["task"], {})
     ]
-    return table(episodes) if episodes else []
+    if not episodes:
+        return [], list(varied)
+    category = {episode["task"]: episode["category"] for episode in episodes}
+    by_task = []
+    for line in (line for line in table(episodes) if line.what in category):
+        prior = sum(varied[line.what].values()) / len(varied[line.what])
+        by_task.append(SightLine(line.what, line.split, _beyond(line.id, prior), _beyond(line.ood, prior)))
+    last = {line.what: line for line in by_task}  # the line over all axes comes last
+    groups = {name: [last[task] for task in category if category[task] == name] for name in category.values()}
+    means = [_mean(name, lines) for name, lines in (*groups.items(), ("all", [*last.values()]))]
+    return [*by_task, *means], [task for task, of in varied.items() if not of]
+
+
+def _beyond(rate: Rate | None, prior: float) -> Difference | None:
+    """A share of right answers, as a share of what is possible beyond a prior."""
+    if rate is None:
+        return None
+    value, low, high = ((share - prior) / (1.0 - prior) for share in (rate.value, rate.low, rate.high))
+    return Difference(value, low, high)
+
+
+def _mean(name: str, lines: Sequence[SightLine]) -> SightLine:
+    """The mean line of some tasks."""
+    inside, outside = ([line.id for line in lines if line.id], [line.ood for line in lines if line.ood])
+    return SightLine(
+        name, "all", mean_difference(inside) if inside else None, mean_difference(outside) if outside else None
+    )
 
 
 def executed_lines(results: Sequence[Mapping[str, Any]]) -> list[TableLine]:
@@ -98,7 +151,7 @@ class QuestionLine:
     """Share of training in which the best fixed answer is right; None for hidden state and the simplest plan."""
 
 
-def by_question(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Mapping[str, float]]) -> list[QuestionLine]:
+def by_question(results: Sequence[Mapping[str, Any]], known: Mapping[str, Mapping[str, Prior]]) -> list[QuestionLine]:
     """Grades of stage 1 by question."""
     counts: dict[tuple[str, str], Counter[str]] = {}
     for plain in results:
@@ -106,7 +159,7 @@ def by_question(results: Sequence[Mapping[str, Any]], priors: Mapping[str, Mappi
             for question, grade in plain["grades"].items():
                 counts.setdefault((plain["task"], question), Counter())[grade] += 1
     return [
-        QuestionLine(task, question, dict(found), priors.get(task, {}).get(question))
+        QuestionLine(task, question, dict(found), prior.share if (prior := known[task].get(question)) else None)
         for (task, question), found in counts.items()
     ]
 

@@ -17,7 +17,7 @@ from ..agents.tables import (
     lost_in_twins,
     markdown,
     plan_errors,
-    sighted_lines,
+    sight_lines,
 )
 from ..errors import BadConfig
 from ..evaluate.table import TableLine, cells, plain
@@ -62,17 +62,19 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     for stage in sorted({result["stage"] for result in found.results}):
         rows, title = lines(found.results, stage), f"{settings.model}: {TITLES[stage]}, right [%]"
         _print(title, rows)
-        if stage == UNDERSTAND and (sighted := sighted_lines(found.results, found.priors)):
-            line = sighted[-1]
-            _, _, inside, outside, _ = cells(line)
-            say(f"questions that need a look: ID {inside}, OOD {outside}")
+        sight, unseen = sight_lines(found.results, found.priors) if stage == UNDERSTAND else ([], [])
+        if sight:
+            _, _, inside, outside = sight[-1].cells
+            say(f"beyond the best answers without a look [%]: ID {inside}, OOD {outside}")
+        if unseen:
+            say(f"no question needs a look: {', '.join(unseen)}")
         lost, known = lost_in_twins(found.results, stage)
         if known:
             say(f"right in training, not in the twin: {lost} of {known}")
         write(folder / f"table-{stage}.md", markdown(title, rows))
         told[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
         if stage == UNDERSTAND:
-            told[stage]["need_a_look"] = plain(sighted_lines(found.results, found.priors))
+            told[stage]["beyond_blind"] = [asdict(line) for line in sight]
         if stage == PLAN and (agreed := agreement(found.results)):
             told[stage] |= {"executed": plain(executed_lines(found.results)), "agreement": asdict(agreed)}
             _show_executed(settings, found)

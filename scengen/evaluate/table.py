@@ -61,7 +61,7 @@ def _belongs(episode: Mapping[str, Any], line: TableLine) -> bool:
 
 def cells(line: TableLine) -> list[str]:
     """The cells of a line, as text."""
-    return [line.what, line.split, _percent(line.id), _percent(line.ood), _percent(line.difference, "+")]
+    return [line.what, line.split, percent(line.id), percent(line.ood), percent(line.difference, "+")]
 
 
 def plain(lines: Sequence[TableLine]) -> list[dict[str, Any]]:
@@ -122,7 +122,8 @@ def _values(episodes: Sequence[Mapping[str, Any]], name: str) -> list[str]:
     return list(dict.fromkeys(e[name] for e in episodes))
 
 
-def _percent(rate: Rate | Difference | None, sign: str = "") -> str:
+def percent(rate: Rate | Difference | None, sign: str = "") -> str:
+    """A rate with its interval in percent, as text."""
     if rate is None:
         return "-"
     return f"{100 * rate.value:{sign}.1f} [{100 * rate.low:{sign}.1f}, {100 * rate.high:{sign}.1f}]"

@@ -281,6 +281,7 @@ class IndirectPush(Scenario):
             "way": self.way,
             "edge": self.edge,
             "distance": self.distance,
+            "nearest": min(math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots),
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -307,6 +307,7 @@ class MassSort(Scenario):
             "light_zone": "on the robot's right" if self.mirrored else "on the robot's left",
             "far_row": "the zones" if self.zones_x > max(spot.x for spot in self.spots) else "the cubes",
             "edge": self.edge,
+            "apart": math.dist(self.zone_at(1)[:2], (self.spots[1].x, self.spots[1].y)),
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -45,7 +45,7 @@ from ..assets.guillotine import Ell, Rect
 from ..assets.l_piece import LPiece
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, between, corners, gap, yaw_of
+from ..geometry import UP, Vec3, about_z, between, corners, gap, way_to, yaw_of
 from ..params import check_bounds, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside
@@ -316,8 +316,14 @@ class Packing(Scenario):
             "pieces": self.count,
             "left": sum(spot.y > 0.0 for spot in self.spots),
             "thickness": self.thickness,
+            "largest": self._largest(),
             "turned": sum(abs(math.remainder(spot.turn, 360.0)) > 5.0 for spot in self.spots),
         }
+
+    def _largest(self) -> str:
+        """Where the piece with the most area lies, seen from the bin, in words. Densities are equal."""
+        spot = max(zip(self.pieces, self.spots, strict=False), key=lambda each: each[0].mass)[1]
+        return way_to(np.array([spot.x, spot.y]), np.array([self.x, self.y]))
 
     # --- geometry -------------------------------------------------------------------------
 

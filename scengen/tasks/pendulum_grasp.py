@@ -42,7 +42,7 @@ from ..assets.pendulum import Pendulum
 from ..assets.prop import TABLE_TOP, place, table
 from ..compat import set_damping
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar
+from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar, spoken
 from ..params import param
 from ..predicates import still
 from ..robots import jaw
@@ -286,6 +286,7 @@ class PendulumGrasp(Scenario):
 
     def facts(self) -> Mapping[str, float | str]:
         return {
+            "start": self._seen_at_start(),
             "amplitude": self.amplitude,
             "length": self.pendulum.length,
             "period": self.period,
@@ -293,6 +294,12 @@ class PendulumGrasp(Scenario):
         }
 
     # --- geometry -------------------------------------------------------------------------
+
+    def _seen_at_start(self) -> str:
+        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not tell the side."""
+        angle, _ = self.pendulum.swing(self.peak_angle, self.phase / 360.0)
+        below = abs(angle) < math.radians(4.0)
+        return "below the axle" if below else spoken(self.plane + (0.0 if angle > 0.0 else 180.0))
 
     @property
     def peak_angle(self) -> float:

@@ -307,6 +307,7 @@ class RampSort(Scenario):
             "blues": self.blues,
             "red_bin": "on the left" if self.red_side > 0 else "on the right",
             "ridge": abs(self.ramp.ridge),
+            "first": "red" if self.colours[0] else "blue",
             "box": way_to(np.array([self.box_x, self.box_y]), np.array([self.x, self.y])),
         }
 

@@ -335,6 +335,7 @@ class RecoverPegInsert(Scenario):
         return {
             "side": "on its left" if self.side > 0 else "on its right",
             "peg": way_to(np.array([self.peg_x, self.peg_y]), self.mouth),
+            "apart": math.dist(self.foot[:2], self.mouth[:2]),
             "length": self.peg.length,
             "slot": self.board.slot,
         }

@@ -32,7 +32,7 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.hook import Hook, JHook, LHook, THook
 from ..assets.prop import TABLE_TOP, place, table
-from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar
+from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar, way_to
 from ..params import param
 from ..predicates import fallen, held
 from ..robots import ik
@@ -244,6 +244,7 @@ class ToolRetrieve(Scenario):
             "kind": ("like an L", "like a J", "like a T")[self.kind],
             "side": "on its left" if self.hook_y > 0.0 else "on its right",
             "distance": self.distance,
+            "cube": way_to(self.spot, np.array([self.hook_x, self.hook_y])),
         }
 
     # --- geometry -------------------------------------------------------------------------

@@ -7,6 +7,8 @@ from sheets import STATED, drawn
 
 from scengen import load_task
 from scengen.agents.calls import Budget, Calls
+from scengen.agents.facts import load
+from scengen.agents.priors import priors
 from scengen.agents.questioning import Exam, make_plan, understand
 from scengen.agents.scene import View
 from scengen.agents.standins import STAND_INS, Key
@@ -17,12 +19,12 @@ SCENARIOS = 5
 
 def exams(name, split, model):
     task = load_task(name)
+    fixed = {id_: prior.answer for id_, prior in priors(task, load(task), draws=20).items()} if model == "blind" else {}
     for index in range(SCENARIOS):
         sheet, scenario, found = drawn(name, split, index)
-        training = [drawn(name, "id", k)[2] for k in range(SCENARIOS) if (split, k) != ("id", index)]
         labels = {"task": name, "split": split, "index": index, "id": scenario.id}
         row = SimpleNamespace(**labels, instruction=task.instruction, embodiment=task.embodiment)
-        stand_in = STAND_INS[model](Key(found, sheet.plan, training))
+        stand_in = STAND_INS[model](Key(found, sheet.plan, fixed))
         yield Exam(row, sheet, found, View({}, ("0.0 s: at rest",)), 0.0, stand_in)
 
 
