@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow readme fuzz kills check types format certify stacks stack-sample readers axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -49,9 +49,17 @@ wheel:
 	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
 	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
 
-# Tests that simulate for minutes, such as coverage of intervals and one certificate per task.
+# Tests that take some seconds each, such as one certificate per task (20 minutes).
 slow: setup
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not long"
+
+# Tests that take 20 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
+long: setup
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m long
+
+# Measures the processor time of every test, and writes tests/durations.txt, by which tests are slow or long (an hour).
+durations: setup
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "" --durations-file
 
 # Runs the commands of the README and of the pages in docs/ as they are written, except long ones; ALL=all runs those too (hours).
 ALL ?=

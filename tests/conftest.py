@@ -2,7 +2,9 @@
 
 import ctypes
 import gc
+import os
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -22,3 +24,61 @@ def memory_is_given_back():
     gc.collect()
     if sys.platform == "linux":
         ctypes.CDLL(None).malloc_trim(0)
+
+
+# --- how long tests take ---------------------------------------------------------------------
+
+DURATIONS = Path(__file__).parent / "durations.txt"
+"""Processor time of tests [s] and their ids, a line each, of those that take at least `SLOW`. Written by `make durations`."""
+SLOW, LONG = 1.5, 20.0
+"""Processor time from which a test is run by `make slow`, and from which it is run by `make long` alone [s]."""
+STARTED = pytest.StashKey[float]()
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--durations-file", action="store_true", help=f"measure processor time and update {DURATIONS.name}"
+    )
+
+
+def known_durations():
+    return {id_: float(seconds) for seconds, id_ in (line.split(" ", 1) for line in DURATIONS.read_text().splitlines())}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    known = known_durations()
+    for item in items:
+        seconds = known.get(item.nodeid, 0.0)
+        if seconds >= SLOW:
+            item.add_marker("slow")
+        if seconds >= LONG:
+            item.add_marker("long")
+
+
+def processor_time():
+    """Processor time of this process and of its children that have ended [s]."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    item.stash[STARTED] = processor_time()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = yield
+    if call.when == "teardown":
+        report.user_properties.append(("processor_time", processor_time() - item.stash[STARTED]))
+    return report
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Write what was measured. Tests that did not run keep their times."""
+    if config.getoption("--durations-file"):
+        reports = (r for of in terminalreporter.stats.values() for r in of if getattr(r, "when", "") == "teardown")
+        measured = {r.nodeid: dict(r.user_properties)["processor_time"] for r in reports}
+        kept = {id_: seconds for id_, seconds in (known_durations() | measured).items() if seconds >= SLOW}
+        DURATIONS.write_text("".join(f"{seconds:.1f} {id_}\n" for id_, seconds in sorted(kept.items())))
