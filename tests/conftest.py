@@ -29,7 +29,7 @@ def memory_is_given_back():
 # --- how long tests take ---------------------------------------------------------------------
 
 DURATIONS = Path(__file__).parent / "durations.txt"
-"""Processor time of tests [s] and their ids, a line each, of those that take at least `SLOW`. Written by `make durations`."""
+"""Processor times [s] and ids of the tests that take at least `SLOW`, a line each. Written by `make durations`."""
 SLOW, LONG = 1.5, 20.0
 """Processor time from which a test is run by `make slow`, and from which it is run by `make long` alone [s]."""
 STARTED = pytest.StashKey[float]()
