@@ -1,7 +1,8 @@
-"""Train and evaluate small policies, and write docs/baselines.md: `python tools/baselines.py [task ...]`
+"""Train and evaluate small policies, and write docs/baselines.md: `python tools/baselines.py [axes=all] [task ...]`
 
-`python tools/baselines.py page` writes the page alone. Pools, demonstrations and policies are made in
-generated/baselines, results are stored in records/baselines. A repeated call continues.
+Without `axes=all`, policies are evaluated on two axes of a task. With `page` alone, the tool only writes the page.
+Pools, demonstrations and policies are made in generated/baselines, results are stored in records/baselines, which
+docs/axes.md and docs/predictors.md read, too. A repeated call continues.
 """
 
 import json
@@ -12,7 +13,7 @@ from typing import Any
 
 import axis_records
 
-from scengen import cli, load_task
+from scengen import cli, list_tasks, load_task
 from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import read_settings
 from scengen.pool import Pool
@@ -27,7 +28,9 @@ AXES = {
     "pick_place_ycb": ("far_jumps", "unseen_item"),
     "pendulum_grasp": ("plane_45", "wide_swing"),
 }
-"""Axes on which the policies of a task are evaluated."""
+"""Axes on which the policies of a task are evaluated without `axes=all`."""
+ALL_AXES = "axes=all"
+"""Argument: evaluate on all axes of the tasks."""
 POLICIES = (BC, MIP, KNN)
 """Trained policies."""
 REPLAY = "replay"
@@ -58,17 +61,20 @@ that none can: the oracle solves every scenario, and doing nothing solves none; 
 COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
 
 
-def main(*tasks: str) -> None:
-    """Train and evaluate on all tasks, or some, and write the page."""
-    if tasks != ("page",):
+def main(*arguments: str) -> None:
+    """Train and evaluate on the tasks of `AXES`, or on some tasks, and write the page."""
+    if arguments != ("page",):
+        tasks = [argument for argument in arguments if argument != ALL_AXES]
+        if unknown := set(tasks) - set(list_tasks() if ALL_AXES in arguments else AXES):
+            sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(AXES)}, and every task with {ALL_AXES}")
         for task in tasks or AXES:
-            measure(task)
+            measure(task, tuple(load_task(task).axes) if ALL_AXES in arguments else AXES[task])
     PAGE.write_text(page())
 
 
-def measure(task: str) -> None:
+def measure(task: str, axes: tuple[str, ...]) -> None:
     """Make what is missing for a task, and store its results after each policy."""
-    folder, splits = MADE / task, (ID, *AXES[task])
+    folder, splits = MADE / task, (ID, *axes)
     pools = [folder / split for split in splits]
     for split, pool in zip(splits, pools, strict=True):
         if not (pool / "manifest.json").is_file():
@@ -83,7 +89,7 @@ def measure(task: str) -> None:
         trained = folder / policy
         if policy in POLICIES:
             run("train", f"policy={policy}", f"data={data}", f"to={trained}")
-        played = folder / f"{policy}-evaluation"
+        played = folder / f"{policy}-evaluation-{len(axes)}"  # an evaluation is bound to its pools
         name, pooled = str(trained) if policy in POLICIES else policy, ",".join(map(str, pools))
         run("evaluate", f"policy={name}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={played}")
         found += _results(task, policy, trained, played, dict(zip(map(str, pools), splits, strict=True)))
@@ -121,10 +127,11 @@ def _results(task: str, policy: str, trained: Path, played: Path, splits: dict[s
 def page() -> str:
     """The whole page, from the records."""
     lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
-    for task in AXES:
+    for task in list_tasks():
         records = axis_records.lines(RECORDS / f"{task}.jsonl")
-        order = {split: k for k, split in enumerate((ID, *AXES[task]))}
-        lines += [_line(record) for record in sorted(records, key=lambda record: order[record["split"]])]
+        order = {split: k for k, split in enumerate((ID, *load_task(task).axes))} if records else {}
+        known = [record for record in records if record["split"] in order]
+        lines += [_line(record) for record in sorted(known, key=lambda record: order[record["split"]])]
     return HEAD + "\n".join(lines) + "\n"
 
 
