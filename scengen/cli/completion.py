@@ -48,7 +48,7 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
             return _completed(word, "+,", task_files.splits(_task(others), task_files.search_path(others)))
         if equals and key == "axis":
             return _completed(word, "", task_files.splits(_task(others), task_files.search_path(others))[1:])
-        if equals and key == "task":
+        if equals and key in ("task", "tasks"):
             return _completed(word, ",", task_files.tasks(task_files.search_path(others))) if verb != "new" else []
         if equals and key == "id":
             pools = [Pool.open(folder) for folder in _pools(others)]

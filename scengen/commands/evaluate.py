@@ -1,6 +1,7 @@
 """measure the success rate of policies, in and out of distribution, with intervals"""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from rich.table import Table
 
@@ -11,6 +12,7 @@ from ..evaluate.policies import find_policy
 from ..evaluate.rollouts import Evaluation, evaluate
 from ..evaluate.settings import EvaluateSettings
 from ..pool import Pool
+from ..runs.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write, write_json
@@ -19,10 +21,15 @@ from .settings import read
 
 def command(arguments: Arguments) -> int:
     settings = read("evaluate", arguments, EvaluateSettings)
+    settings.check_pools()
     every = settings.several()
     for one in every:  # before any of them plays for hours
         one.check()
         find_policy(one.name, client=one.remote)
+    if settings.edition:
+        folders = _edition_pools(settings, settings.edition)
+        settings = replace(settings, pool=folders)
+        every = settings.several()
     results = []
     for one in every:
         with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
@@ -37,6 +44,20 @@ def command(arguments: Arguments) -> int:
             say(f"wrote {result.settings.folder}: episodes.jsonl")
     say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
     return FAILED if any(incomplete) else OK
+
+
+def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
+    """The pools of an edition: the given ones, which must be its sets, or those of the chosen tasks."""
+    found = Edition.read(edition)
+    if settings.pool is not None:
+        for folder in settings.folders:
+            check_pool(found, Pool.open(folder).check())
+        return settings.folders
+    keys = chosen_sets(settings.tasks) if settings.tasks else list(found.sets)
+    with ProgressBar(err, f"edition {found.name}", found.n, settings.workers) as progress_bar:
+        return evaluation_pools(
+            found, keys, settings.workers, lambda key, done, total: progress_bar.of(done, total, f"certify {key}")
+        )
 
 
 def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:

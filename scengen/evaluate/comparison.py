@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
+from ..runs.edition import Edition
 from .rollouts import Evaluation
 from .settings import EvaluateSettings
 from .table import TableLine, cells, plain, table
@@ -77,6 +78,7 @@ class PolicyResult:
             "version": settings.version,
             "rules": settings.rules,
             "splits": settings.splits,
+            "edition": settings.edition and edition_told(settings.edition),
             "settle": settings.settle,
             "headline": self.headline,
             "table": plain(self.lines),
@@ -142,6 +144,9 @@ class Comparison:
             f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
             f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
         )
+        if settings.edition:
+            edition = edition_told(settings.edition)
+            head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"
         parts = [head, _table(self.head, self.rows())]
         if self.headlines:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
@@ -156,6 +161,12 @@ class Comparison:
     @property
     def _crashed(self) -> bool:
         return any(result.lines[-1].crashed for result in self.results)
+
+
+def edition_told(name: str) -> dict[str, str]:
+    """What results say of the edition that they are about."""
+    edition = Edition.read(name)
+    return {"name": edition.name, "sha256": edition.sha256}
 
 
 def _table(head: Sequence[str], rows: Any) -> str:

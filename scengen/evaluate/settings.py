@@ -31,7 +31,9 @@ class EvaluateSettings:
     """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them."""
 
     policy: str | list[str] = ""
-    pool: str | list[str] = ""
+    pool: str | list[str] | None = None
+    edition: str | None = None
+    tasks: str | list[str] | None = None
     seeds: int = 20
     rollouts: int = 5
     observations: list[str] | None = None
@@ -52,6 +54,8 @@ class EvaluateSettings:
     @cached_property
     def folders(self) -> list[str]:
         """Folders of the pools."""
+        if self.pool is None:
+            raise BadConfig("no pool was given; say pool=FOLDER, or edition=NAME, whose pools scengen evaluate makes")
         return collection.folders(self.pool)
 
     @property
@@ -98,6 +102,15 @@ class EvaluateSettings:
     def remote(self) -> ClientSettings | None:
         """Names of observations and actions of a policy behind a socket; None for other policies."""
         return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
+
+    def check_pools(self) -> None:
+        """Raise `BadConfig` unless the settings name pools, or sets of an edition."""
+        if self.pool is None and self.edition is None:
+            raise BadConfig("evaluate needs pool=..., or edition=...; see scengen evaluate --help")
+        if self.tasks is not None and (self.edition is None or self.pool is not None):
+            raise BadConfig(
+                f"tasks = {cut(str(self.tasks))}; it chooses sets of an edition: say edition=v1 without pool="
+            )
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""

@@ -1,5 +1,6 @@
 """Scenes built again from their parameters: a scene in a pool must be the one that the installed family builds."""
 
+import hashlib
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -35,6 +36,25 @@ def rebuild(scenario: Scenario) -> str:
 def world_of(scenario: Scenario, embodiment: str = JAW) -> World:
     """A scenario's scene with its robot, at its start."""
     return World.load(rebuild(scenario), embodiment)
+
+
+def portable_sha256(text: str) -> str:
+    """Hash of a scene that is the same on machines with different rounding: numbers count to 9 digits, and to 1e-9.
+
+    A number within rounding of the middle between two such values can differ all the same. Scenes have thousands of
+    numbers, and rounding changes one in some thousand millions of them so.
+    """
+    words = []
+    for element in ET.fromstring(text).iter():
+        words.append(f"<{element.tag} {len(element)}")
+        for name, value in sorted(element.attrib.items()):
+            words.append(f"{name}={' '.join(map(_rounded, value.split()))}")
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+def _rounded(word: str) -> str:
+    """A number of a scene, rounded; any other word as it is."""
+    return f"{round(float(f'{float(word):.9g}'), 9) + 0.0:.9g}" if _NUMBER.fullmatch(word) else word
 
 
 def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> str:

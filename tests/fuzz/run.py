@@ -120,6 +120,7 @@ WORK = (
     "scengen.commands.shrink.certify",
     "scengen.commands.try._played",
     "scengen.commands.probe.make_axis_card",
+    "scengen.commands.edition.differences",
     "scengen.commands.discover.discover",
     "scengen.export.recording._writer",
     "scengen.export.hub.publish",

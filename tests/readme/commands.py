@@ -42,6 +42,8 @@ APART = {
     "scengen curate data=recordings/domino": "the recording is not made",
     "scengen train policy=bc data=generated/domino-demos": "200 demonstrations are recorded: minutes",
     "scengen evaluate policy=policies/domino": "the policy is not trained",
+    "scengen evaluate policy=replay edition=v1": "certifies 40 scenarios: minutes",
+    "scengen edition edition=mine.yaml": "certifies 40 scenarios: minutes",
     "scengen stats": "the recording is not made",
     "scengen evaluate policy=ws://": "needs a server of policies",
     "scengen evaluate policy=zmq://": "needs a server of policies",
