@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -53,7 +53,7 @@ wheel:
 slow: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not long"
 
-# Tests that take 20 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
+# Tests that take 10 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
 long: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m long
 
@@ -110,6 +110,12 @@ stack-sample: setup
 # from the package index (Python 3.12, gigabytes), and writes docs/readers.md.
 readers: setup
 	$(BIN)/python tools/check_readers.py
+
+# Plays the packages of integrations/ in LeRobot, vla-eval and inspect-robots, in environments of their own, and compares verdicts.
+# INTEGRATIONS=vla_eval_scengen selects packages. LeRobot needs Python 3.12 and gigabytes.
+INTEGRATIONS ?=
+integrations: setup
+	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
 
 # Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
 AXES ?= n=50

@@ -1,0 +1,66 @@
+"""Compares verdicts: the policy `replay` in `inspect_robots.eval`, and in `scengen evaluate`. Tests conformance.
+
+    python check.py POOL [POOL ...]
+
+Every scenario of the pools is played in both. Exit status 1 if a verdict differs.
+"""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import inspect_robots
+import numpy as np
+from inspect_robots.conformance import assert_embodiment_conformant
+from inspect_robots.policy import PolicyBase, PolicyInfo
+from inspect_robots.scene import Scene
+from inspect_robots.types import Action, ActionChunk, Observation
+from inspect_robots_scengen import ScengenEmbodiment, scengen_task
+
+from scengen.evaluate.policies import NearestReplay
+from scengen.evaluate.rollouts import evaluate
+from scengen.evaluate.settings import EvaluateSettings
+from scengen.pool import Pool
+from scengen.pool.library import Library
+
+
+class Replay(PolicyBase):
+    """scengen's policy `replay`."""
+
+    def __init__(self, body: ScengenEmbodiment):
+        self.info = PolicyInfo("replay", body.info.action_space, body.info.observation_space, body.info.control_hz)
+        memory = Library([Pool.open(folder) for folder in body.pools]).of_split("id")
+        self.body, self.policy, self.begun = body, NearestReplay(body.env, memory), False
+
+    def reset(self, scene: Scene) -> None:
+        self.begun = False
+
+    def act(self, observation: Observation) -> ActionChunk:
+        if not self.begun:
+            self.policy.reset({}, {}, 0)
+            self.begun = True
+        return ActionChunk([Action(np.asarray(self.policy.act({}), float) * self.body.units)])
+
+
+def main() -> int:
+    pools = sys.argv[1:]
+    splits = {row.split for pool in pools for row in Pool.open(pool).rows(witness=False)}
+    count = min(len(Pool.open(folder)) for folder in pools)
+    there: dict[str, bool] = {}
+    with TemporaryDirectory() as folder:
+        body = ScengenEmbodiment(",".join(pools), hz=100, cameras=False)
+        assert_embodiment_conformant(body.info)
+        for split in sorted(splits):
+            task = scengen_task(",".join(pools), split=split, n=count)
+            (log,) = inspect_robots.eval(task, Replay(body), body, log_dir=folder, store_actions=False)
+            there |= {sample.scene_id: bool(sample.reduced["success_at_end"]) for sample in log.samples}
+        body.close()
+        settings = EvaluateSettings("replay", pools, seeds=count, rollouts=1, to=str(Path(folder, "out")))
+        here = {e["scenario"]: e["success"] for e in evaluate(settings, lambda *_: None).episodes}
+    differ = [id_ for id_, success in here.items() if there.get(id_) != success]
+    print(f"{len(here)} scenarios: {sum(here.values())} solved in scengen, {len(differ)} verdicts differ {differ}")
+    return 1 if differ else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
