@@ -67,7 +67,7 @@ class PlateShelf(PlateAndSlot[Plate]):
     shelf_y: float = param(0.03, "m", -0.3, 0.3)
     shelf_yaw: float = param(0.0, "deg", -90.0, 90.0, period=180.0)
     plate: Plate = Plate(foot=0.045, rise=0.006, friction=0.4)
-    gap: float = param(0.032, "m", 0.02, 0.09)  # width of the slot
+    gap: float = param(0.034, "m", 0.02, 0.09)  # width of the slot
     proud: float = param(0.0, "m", -0.01, 0.1)  # height by which the plate stands out of the slot
 
     @property
