@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Generate and check": ("tasks", "try", "generate", "verify", "crosscheck", "drift", "attack"),
-    "Demonstrate and train": ("demos", "teleop", "curate", "stats", "train"),
+    "Demonstrate and train": ("demos", "teleop", "curate", "stats", "train", "recipe"),
     "View and export": ("studio", "show", "film", "view", "report", "export", "record", "publish"),
     "Evaluate and analyse": ("evaluate", "edition", "agent", "power", "audit", "compare", "subset", "shrink", "bench"),
     "Extend": ("new", "asset", "probe", "discover"),
