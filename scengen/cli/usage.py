@@ -53,7 +53,7 @@ def _more(verb: str, groups: Sequence[str], takes_pool: bool, overrides: Sequenc
         yield "# certify.*        any setting of certificates; those of certify=quick:"
         numbers = yaml.safe_load((task_files.conf_dir() / "certify" / "quick.yaml").read_text())
         yield from _wrapped("#  ", [f"certify.{key}={value}" for key, value in _flat(numbers)])
-    if groups or takes_pool:
+    if "task" in groups or takes_pool:
         yield "# hydra.searchpath=[file:///path/to/conf]   folder with the tasks of a package that is not installed"
     yield f"# --cfg job prints the composed configuration, --info {'|'.join(task_files.ORIGINS)} its origin"
 
