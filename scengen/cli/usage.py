@@ -24,7 +24,7 @@ def usage(verb: str, overrides: Sequence[str]) -> str:
     """
     text = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text()
     own = "".join(line for line in text.splitlines(keepends=True) if not _for_hydra(line))
-    takes_pool = bool(re.search("^(pool|hits):", text, re.M))
+    takes_pool = bool(re.search("^(pool|hits|replay):", text, re.M))
     return own + "".join(f"{line}\n" for line in _more(verb, task_files.groups(verb), takes_pool, overrides))
 
 
@@ -37,7 +37,7 @@ def _more(verb: str, groups: Sequence[str], takes_pool: bool, overrides: Sequenc
     """Lines about settings that the file of a command does not list.
 
     Args:
-        takes_pool: whether the command takes pools or hits.
+        takes_pool: whether the command takes pools, hits, or demonstrations to replay.
     """
     search = task_files.search_path(overrides)
     if "task" in groups:
