@@ -98,8 +98,8 @@ class ScengenEmbodiment(EmbodimentBase):
                 f"{robot(embodiment)} The robot stands at the near edge of the table and faces the middle of it. x "
                 "points away from the robot, y to its left, z up; the table's top is at z = "
                 f"{TABLE_TOP:.2f} m. An action displaces the target of the hand, from where the hand is, by dx, dy, dz "
-                "[m] and turns it by the rotation vector rx, ry, rz [rad], both in the axes of the robot, at 100 Hz for "
-                "one step; a gripper above 0 closes the jaw or switches suction on. Forces: at the wrist."
+                "[m] and turns it by the rotation vector rx, ry, rz [rad], in the axes of the robot, at 100 Hz for one "
+                "step; a gripper above 0 closes the jaw or switches suction on. Forces are felt at the wrist."
             ),
         )
 
