@@ -123,7 +123,8 @@ def test_ablations_fail_at_what_they_take_away():
 
 def test_a_cup_on_the_lip_does_alone_between_low_dividers_what_it_cannot_between_high_ones():
     scenario = TASK.draw("id", 0, 1).scenario
-    rough = {**values(scenario), "plate.friction": 0.6}  # the cup on the lip slips off the glaze as it turns
+    # The cup on the lip slips off the glaze as it turns. Between low dividers 34 mm apart the plate leans too far.
+    rough = {**values(scenario), "plate.friction": 0.6, "gap": 0.032}
     low, high = (with_values(unchecked(PlateShelf)(), {**rough, "proud": proud}) for proud in (0.065, 0.0))
     assert play_shortcut(TASK, low, "cup_on_the_lip").solved
     end = play_shortcut(TASK, high, "cup_on_the_lip")
