@@ -21,7 +21,7 @@ demo: setup
 	$(BIN)/scengen generate task=domino_single split=diagonal n=6 workers=2 pool=$(DEMO)/diagonal
 	$(BIN)/scengen verify pool=$(DEMO)/id workers=2
 	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
-	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html
+	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html films=true
 
 # What continuous integration runs. The slow tests certify a training scenario of every task; the certified sample is the
 # paper's eight OOD conditions, which lie in eight categories. What runs on one core runs two at a time.

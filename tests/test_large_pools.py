@@ -197,9 +197,9 @@ def test_a_library_holds_every_scenario_once(large):
 
 def test_a_page_has_a_limit_and_says_what_it_shows(large, tmp_path, monkeypatch):
     monkeypatch.setattr(sheet, "LARGEST_PAGE", 30_000)
-    monkeypatch.setattr(sheet, "thumbnail", lambda *_: ("data:," + "x" * 3000, None))
+    monkeypatch.setattr(sheet, "thumbnail", lambda *_: "data:," + "x" * 3000)
     of = Pool.open(large)
-    sheet.contact_sheet([(of, redraw.task_of(of)), (of, redraw.task_of(of))], tmp_path / "page.html", 500, 0)
+    sheet.contact_sheet([(of, redraw.task_of(of)), (of, redraw.task_of(of))], tmp_path / "page.html", 500, False)
     text = (tmp_path / "page.html").read_text()
     shown = [int(count) for count in re.findall(r"a sample is shown, the first (\d+)", text)]
     assert len(shown) == 2 and all(2 < count < 10 for count in shown) and text.count("<figure") == sum(shown)

@@ -34,6 +34,7 @@ LAYERS = (
     ("demos", "curate"),
     ("ood", "drift", "teleop"),
     ("studio",),
+    ("site",),
     ("conformance",),
     ("commands",),
     ("cli",),

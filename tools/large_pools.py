@@ -23,7 +23,7 @@ from scengen.pool import Pool
 COMMANDS = {
     "show": "show pool={pool}",
     "show id=": "show pool={pool} id={id}",
-    "show to=, 10 images": "show pool={pool} to={to}.html images=10 films=0",
+    "show to=, 10 images": "show pool={pool} to={to}.html images=10",
     "report": "report pool={pool} to={to}.html",
     "compare": "compare pool={pool}",
     "audit": "audit pool={pool}",

@@ -109,7 +109,7 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
         shown: list[str] = []
         try:
             scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), 0 if remark else SHOWN_SCENES)
-            shown = [thumbnail(*scene)[0] for scene in scenes]
+            shown = [thumbnail(*scene) for scene in scenes]
         except render.NoPictures as error:
             remark = str(error)
         plot = svg(figure(overview.histograms)) if overview.histograms else ""

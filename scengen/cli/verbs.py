@@ -5,7 +5,7 @@ from collections.abc import Mapping
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Generate and check": ("tasks", "try", "generate", "verify", "crosscheck", "drift", "attack"),
     "Demonstrate and train": ("demos", "teleop", "curate", "stats", "train", "recipe"),
-    "View and export": ("studio", "show", "film", "view", "report", "export", "record", "publish"),
+    "View and export": ("studio", "show", "film", "view", "report", "export", "record", "publish", "site"),
     "Evaluate and analyse": ("evaluate", "edition", "agent", "power", "audit", "compare", "subset", "shrink", "bench"),
     "Extend": ("new", "asset", "probe", "discover"),
 }

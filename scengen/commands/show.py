@@ -27,14 +27,14 @@ class ShowSettings:
     id: str | None
     to: str | None
     images: int
-    films: int
+    films: bool
 
 
 def command(arguments: Arguments) -> int:
     settings = read("show", arguments, ShowSettings)
     target = Path(settings.to) if settings.to else None
     if settings.id is None:
-        at_least(settings, images=0, films=0)
+        at_least(settings, images=0)
         if target and target.suffix != ".html":
             raise BadConfig(
                 f"to = {target}; give an .html file for a contact sheet, or id= for a film strip of one scenario"

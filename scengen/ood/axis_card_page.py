@@ -1,6 +1,7 @@
 """The page of an axis card: tables, plots of supports and boundaries, pictures of twins."""
 
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ from matplotlib.figure import Figure
 from ..certificate import STAGES
 from ..pictures import film, render
 from ..pictures.plots import svg
-from ..pictures.report import template, thumbnail
+from ..pictures.report import template
+from ..pictures.twins import DIRECTIONS, pair
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.split import ID
@@ -41,7 +43,7 @@ def write_page(task: Task, card: AxisCard, pool: Pool | None, seed: int, path: P
     remark, pairs, strips = "", [], []
     try:
         rows = [row for row, _ in zip(pool.rows(), range(SHOWN_TWINS), strict=False)] if pool else []
-        pairs = [(row.index, *_pair(task, seed, row)) for row in rows]
+        pairs = [*_pairs(task, seed, rows)]
         strips = [*_strips(task, rows[0])] if rows else []
     except render.NoPictures as error:
         remark = str(error)
@@ -61,11 +63,13 @@ def write_page(task: Task, card: AxisCard, pool: Pool | None, seed: int, path: P
     return remark
 
 
-def _pair(task: Task, seed: int, row: PoolRow) -> tuple[str, str]:
-    """Pictures of the training twin and the scenario from the same viewpoint, as data URLs."""
-    here, where = thumbnail(row.scene_xml, row.embodiment)
-    twin = rebuild(task.draw(ID, seed, row.index).scenario)
-    return thumbnail(twin, task.embodiment, where)[0], here
+def _pairs(task: Task, seed: int, rows: Sequence[PoolRow]) -> Iterator[tuple[int, str, str]]:
+    """Indices of scenarios, and pictures of their training twins and of them from one direction, as data URLs."""
+    directions = DIRECTIONS
+    for row in rows:
+        twin = rebuild(task.draw(ID, seed, row.index).scenario)
+        training, here, directions = pair(row, twin, directions)
+        yield row.index, training, here
 
 
 def _strips(task: Task, row: PoolRow) -> list[tuple[str, str]]:

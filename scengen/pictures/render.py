@@ -28,8 +28,6 @@ from . import opengl
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
-Where = tuple[float, float]
-"""Azimuth and elevation of a view [deg]."""
 State = NDArray[np.float64]
 """State of a world, see `World.state`."""
 
@@ -51,12 +49,13 @@ class Camera:
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make Camera(world) anew")
 
-    def __init__(self, world: World, width: int = 320, height: int = 240, where: Where | None = None):
-        """Start with the fitted view of the scene, from `where` or from the direction that hides least of it.
+    def __init__(self, world: World, width: int = 320, height: int = 240, view: MjvCamera | None = None):
+        """Start with a view, by default the fitted one of the scene from the direction that hides least of it.
 
         Args:
             width: width of the pictures [pixels], at most `opengl.LARGEST_EDGE`.
             height: height of the pictures [pixels], likewise.
+            view: such as that of `fitted` or of `twins.telling`.
 
         Raises:
             BadConfig: pictures cannot have this size.
@@ -74,7 +73,7 @@ class Camera:
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
         self._aspect = width / height
-        self._view = fitted(world, self._aspect, *where) if where else clearest(world, self._aspect)
+        self._view = clearest(world, self._aspect) if view is None else view
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
         self._options.sitegroup[:] = 0
@@ -99,10 +98,9 @@ class Camera:
             self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
             return self._renderer.render()
 
-    @property
-    def where(self) -> Where:
-        """Direction of the fitted view."""
-        return self._view.azimuth, self._view.elevation
+    def look_by(self, view: MjvCamera) -> None:
+        """Choose a view."""
+        self._view = view
 
     def close(self) -> None:
         with self._lock:
@@ -151,9 +149,9 @@ def fitted(
     """
     view = MjvCamera()
     view.azimuth, view.elevation = azimuth, elevation
-    ahead, right, up = _axes(view)
+    ahead, right, up = view_axes(view)
     axes = np.array([right, up, ahead])
-    seen = (_scene_corners(world) if points is None else points) @ axes.T
+    seen = (scene_corners(world) if points is None else points) @ axes.T
     centre = (seen.min(axis=0) + seen.max(axis=0)) / 2
     away = seen - centre
     half = np.tan(np.radians(world.model.vis.global_.fovy) / 2)
@@ -174,13 +172,12 @@ def clearest(world: World, aspect: float, states: Sequence[State] = ()) -> MjvCa
         states: states of the world. Default: the present one. The world ends in the last one.
     """
     corners = [
-        _scene_corners(world) if number == 0 else _thing_corners(world)
-        for number, _ in enumerate(_visit(world, states))
+        scene_corners(world) if number == 0 else _thing_corners(world) for number, _ in enumerate(_visit(world, states))
     ]
     points = np.vstack(corners)
     points = points[points[:, 2] > min(TABLE_TOP - FALL_DEPTH, _lowest_fixed(world))]
     views = [fitted(world, aspect, *where, points) for where in VIEWS]
-    shares = np.array([[_visible_share(world, view) for view in views] for _ in _visit(world, states)]).mean(axis=0)
+    shares = np.array([[visible_share(world, view) for view in views] for _ in _visit(world, states)]).mean(axis=0)
     best = int(shares.argmax())
     return views[best if shares[best] > shares[0] + MIN_GAIN else 0]
 
@@ -194,7 +191,7 @@ def _visit(world: World, states: Sequence[State]) -> Iterator[None]:
         yield
 
 
-def _axes(view: MjvCamera) -> tuple[Vec3, Vec3, Vec3]:
+def view_axes(view: MjvCamera) -> tuple[Vec3, Vec3, Vec3]:
     """Unit vectors ahead, right and up of a view."""
     turn, dip = np.radians(view.azimuth), np.radians(view.elevation)
     ahead = np.array([np.cos(dip) * np.cos(turn), np.cos(dip) * np.sin(turn), np.sin(dip)])
@@ -202,16 +199,16 @@ def _axes(view: MjvCamera) -> tuple[Vec3, Vec3, Vec3]:
     return ahead, right, np.cross(right, ahead)
 
 
-def _visible_share(world: World, view: MjvCamera) -> float:
+def visible_share(world: World, view: MjvCamera) -> float:
     """Visible share of the corners of the boxes around the geoms of a body, averaged over bodies.
 
     Transparent things hide nothing.
     """
-    eye = view.lookat - view.distance * _axes(view)[0]
+    eye = view.lookat - view.distance * view_axes(view)[0]
     visible = defaultdict(list)
-    for geom in _geoms(world):
+    for geom in things(world):
         body = world.model.geom_bodyid[geom]
-        visible[body] += [_is_visible(world, eye, corner, body) for corner in _box(world, geom, CORNER_SHRINKAGE)]
+        visible[body] += [_is_visible(world, eye, corner, body) for corner in box_of(world, geom, CORNER_SHRINKAGE)]
     return float(np.mean([np.mean(each) for each in visible.values()]))
 
 
@@ -229,30 +226,30 @@ def _is_visible(world: World, eye: Vec3, point: Vec3, body: int) -> bool:
         eye = eye + (share + RAY_STEP) * ahead
 
 
-def _scene_corners(world: World) -> NDArray[np.float64]:
+def scene_corners(world: World) -> NDArray[np.float64]:
     """Corners of the boxes around the geoms of all things, and the hands, shape (n, 3) [m]."""
     return np.vstack([_thing_corners(world), *(arm.hand for arm in world.arms)])
 
 
 def _thing_corners(world: World) -> NDArray[np.float64]:
     """Corners of the boxes around the geoms of all things, shape (n, 3) [m]."""
-    return np.vstack([_box(world, geom) for geom in _geoms(world)])
+    return np.vstack([box_of(world, geom) for geom in things(world)])
 
 
 def _lowest_fixed(world: World) -> float:
     """Height of a millimetre below all fixed things of the scene [m]; inf if there are none."""
-    fixed = [geom for geom in _geoms(world) if world.model.body_weldid[world.model.geom_bodyid[geom]] == 0]
-    return min((float(_box(world, geom)[:, 2].min()) for geom in fixed), default=math.inf) - 0.001
+    fixed = [geom for geom in things(world) if world.model.body_weldid[world.model.geom_bodyid[geom]] == 0]
+    return min((float(box_of(world, geom)[:, 2].min()) for geom in fixed), default=math.inf) - 0.001
 
 
-def _geoms(world: World) -> list[int]:
+def things(world: World) -> list[int]:
     """All geoms of the scene without table and floor."""
     model = world.model
     apart = {model.body(name).id for name in ("world", "table", *(names.base for names in arms(model)))}
     return [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
 
 
-def _box(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
+def box_of(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
     """Corners of the box around a geom, scaled about its middle, shape (8, 3) [m]."""
     centre, half = world.model.geom_aabb[geom].reshape(2, 3)
     frame = world.data.geom_xmat[geom].reshape(3, 3)
@@ -274,16 +271,14 @@ def check_pictures() -> None:
 
 
 @contextmanager
-def camera(
-    scene_xml: str, embodiment: str, width: int = 320, height: int = 240, where: Where | None = None
-) -> Iterator[Camera]:
+def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
     """A camera at the start of a scene, with the robot's visual meshes; see `Camera`.
 
     Raises:
         NoPictures: OpenGL is missing.
     """
     check_pictures()  # before the meshes of the robot, which take a part of the address space
-    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height, where)
+    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height)
     try:
         yield view
     finally:

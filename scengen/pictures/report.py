@@ -181,17 +181,11 @@ def template(name: str) -> jinja2.Template:
     return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
 
 
-def thumbnail(
-    scene_xml: str, embodiment: str, where: render.Where | None = None, width: int = 320, height: int = 240
-) -> tuple[str, render.Where]:
-    """A picture of the start of a scenario, as a data address for HTML, and the direction of its view.
-
-    Args:
-        where: direction of the view. Default: that which hides least.
-    """
+def thumbnail(scene_xml: str, embodiment: str) -> str:
+    """A picture of the start of a scenario, as a data address for HTML."""
     check_scene(scene_xml, embodiment)
-    with render.camera(scene_xml, embodiment, width, height, where) as view:
-        return render.address(render.encode(view.take()), "webp"), view.where
+    with render.camera(scene_xml, embodiment) as view:
+        return render.address(render.encode(view.take()), "webp")
 
 
 def _numbers(numbers: Mapping[str, Any]) -> str:

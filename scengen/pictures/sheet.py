@@ -18,6 +18,7 @@ from ..validate.rebuilt import rebuild
 from ..work.targets import write
 from . import film, render
 from .report import LARGEST_PAGE, template, thumbnail
+from .twins import DIRECTIONS, pair
 
 STRIP = (8, 240, 180)
 """Number of pictures of a film strip, and width and height of each [pixels]."""
@@ -37,51 +38,71 @@ class SheetEntry:
     strip: str = ""
     """Film strip of its witness."""
 
+    @property
+    def checks(self) -> list[tuple[str, str]]:
+        """Names and results of the checks of its certificate: passed, waived or failed."""
+        checks = self.row.certificate.checks
+        return [(each.name, "passed" if each.passed else "waived" if each.waived else "failed") for each in checks]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A pool on the sheet."""
+
+    pool: Pool
+    task: Task
+    figures: list[Markup]
+    """Figures of its scenarios."""
+    checks: list[tuple[str, str]]
+    """Names and results of the checks of its first scenario. Figures show those that differ."""
+
 
 def contact_sheet(
     pools: list[tuple[Pool, Task]],
     path: Path,
     images: int,
-    films: int,
+    films: bool,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> str:
     """Write one HTML file that shows the scenes of some pools. Returns a remark, or an empty text.
 
     Without OpenGL the page has no pictures and a remark about it. For every pool it gives the number of its scenarios
-    that are shown.
+    that are shown. All pairs of a pool are seen from one direction.
 
     Args:
         pools: pools, each with its task as it was when the pool was made.
         images: largest number of scenarios to show of each pool; fewer if the page would become too large.
-        films: number of these scenarios to show with a film strip of the witness.
+        films: whether to show each of them with a film strip of the witness.
         progress: function that gets the number of drawn scenarios and the number of all.
 
     Raises:
         ScengenError: a scene or a witness cannot be played.
     """
-    remark, sections, figure = "", [], template("contact_sheet_figure.html")
+    remark, sections, figure = "", list[Section](), template("contact_sheet_figure.html")
     total, size = sum(min(images, len(pool)) for pool, _ in pools), 0
     for number_of_pool, (pool, task) in enumerate(pools):
-        figures: list[Markup] = []
+        section, directions = Section(pool, task, [], []), DIRECTIONS
         share = (LARGEST_PAGE - size) // (len(pools) - number_of_pool)
-        for number, row in enumerate(islice(pool.rows(), images)):
+        for row in islice(pool.rows(), images):
             entry = SheetEntry(row, [moved(task, name, value) for name, value in row.shifted.items()])
             if not remark:
                 try:
-                    entry.picture, where = thumbnail(row.scene_xml, row.embodiment)
-                    entry.twin = (
-                        thumbnail(twin_scene(pool, task, row), task.embodiment, where)[0] if row.shifted else ""
-                    )
-                    entry.strip = _strip(task, row) if number < films else ""
+                    if row.shifted:
+                        entry.twin, entry.picture, directions = pair(row, twin_scene(pool, task, row), directions)
+                    else:
+                        entry.picture = thumbnail(row.scene_xml, row.embodiment)
+                    entry.strip = _strip(task, row) if films else ""
                 except render.NoPictures as error:
                     remark = str(error)
-            text = Markup(figure.render(entry=entry, task=task, unit=_unit))
+            section.checks.extend([] if section.checks else entry.checks)
+            own = [] if entry.checks == section.checks else entry.checks
+            text = Markup(figure.render(entry=entry, checks=own, task=task, unit=_unit))
             if len(text) > share:
                 break
             share, size = share - len(text), size + len(text)
-            figures.append(text)
-            progress(sum(len(others) for *_, others in sections) + len(figures), total)
-        sections.append((pool, task, figures))
+            section.figures.append(text)
+            progress(sum(len(each.figures) for each in [*sections, section]), total)
+        sections.append(section)
     steps = ("proposed", *STAGES)
     page = template("contact_sheet.html").render(sections=sections, steps=steps, remark=remark)
     write(path, page)

@@ -8,7 +8,8 @@ import viser
 from .browse import CAMERA, LOOK_AT, Browser, Shelf
 from .driving import SCRIPT, DrivePage, Driver, script, with_script
 from .judge import Desk, Judge
-from .server import Guard, new_token, open_server
+from .scene import light
+from .server import Guard, close_server, new_token, open_server
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Studio:
             guard = Guard(self.token, {"/pad": driver.pad.serve}, {f"/{SCRIPT}": script()}, with_script)
         self.server = open_server(host, port, guard)
         self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-        self.server.scene.configure_default_lights(cast_shadow=False)
+        light(self.server.scene)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._left)
         if driver is not None:
@@ -62,7 +63,7 @@ class Studio:
             page.close()
         if self.content.driver is not None:
             self.content.driver.close()
-        self.server.stop()
+        close_server(self.server)
 
     def _connected(self, client: viser.ClientHandle) -> None:
         page = Page(client, self.content)

@@ -119,3 +119,9 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     for name in SHARING:
         server._websock_server.unregister_handler(getattr(viser._messages, name))
     return server
+
+
+def close_server(server: viser.ViserServer) -> None:
+    """Close the server."""
+    with patch("rich.print"):  # viser would tell of it
+        server.stop()

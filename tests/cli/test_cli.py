@@ -255,7 +255,7 @@ def test_a_contact_sheet_shows_every_scene_or_says_why_not(made, tmp_path):
 
 def test_a_contact_sheet_shows_the_training_twin_and_what_has_moved(tmp_path):
     pool, page = BASE / "single_severity", tmp_path / "sheet.html"
-    assert cli.run(("show", f"pool={pool}", f"to={page}", "films=0")) == 0
+    assert cli.run(("show", f"pool={pool}", f"to={page}", "films=false")) == 0
     text = page.read_text()
     assert (
         "gap ratio 1.476 tile widths (training 0.6 to 1.2)" in text and "later, lower and with a smaller margin" in text

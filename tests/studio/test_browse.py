@@ -1,11 +1,11 @@
 """Browsing in a real browser: scenarios, twins, films; a hostile pool shows its texts and runs nothing."""
 
-import ast
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from helpers import REFERENCE
+from hostile import PAYLOADS, corpus_texts
 from pools import make, rewritten
 from studios import running
 
@@ -13,29 +13,6 @@ from scengen.analysis.redraw import task_of
 from scengen.pool import Pool
 
 pytestmark = pytest.mark.slow  # a browser that draws in software takes minutes on two cores
-
-PAYLOADS = [
-    "<script>window.hacked=1</script>",
-    "<img src=x onerror='window.hacked=1'>",
-    "<svg/onload=window.hacked=1>",
-    "<iframe srcdoc='<script>parent.hacked=1</script>'></iframe>",
-    "</div></p><style>*{display:none}</style>",
-    "{{ 7*7 }}{% raw %}${window.hacked=1}",
-    "[x](javascript:window.hacked=1) ![x](x onerror=hacked=1)",
-    '"><a href="javascript:window.hacked=1" autofocus onfocus="window.hacked=1">x</a>',
-]
-"""Texts that would run a script in a careless page."""
-
-
-def corpus_texts():
-    """All texts with markup in the sources of the checker's corpus."""
-    found = set()
-    for path in (Path(__file__).parents[1] / "checker").glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 500:
-                if set("<>&\x1b\u202e{}") & set(node.value):
-                    found.add(node.value)
-    return sorted(found)
 
 
 def content_of(*folders):

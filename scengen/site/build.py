@@ -1,0 +1,238 @@
+"""Writing of the site: pages of tasks, the list of tasks, the documentation."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from ..agents import facts
+from ..errors import BadConfig, ScengenError
+from ..pool import Pool, PoolRow
+from ..samplers.axis import spell
+from ..samplers.dists import Fixed
+from ..samplers.task import Task
+from ..work.targets import write
+from . import exhibit, films
+from .exhibit import Exhibit, key_of
+from .figures import Figures
+from .markdown import Documentation, html_of, story
+
+CATEGORIES = {
+    "P1": "Geometry and constrained grasping",
+    "P2": "Dynamics and trajectory prediction",
+    "P3": "Causal and indirect action",
+    "P4": "Tool use and augmented reach",
+    "P5": "Hidden state and active discovery",
+    "P6": "Reactive replanning",
+    "P7": "Stability and equilibrium",
+    "M": "Miscellaneous",
+    "X": "Beyond the paper",
+}
+"""Titles of the categories, from the paper's section on tasks; X holds tasks that are not the paper's."""
+REPORTS = "generated/*.html"
+"""Reports that `scengen report` and `stats` have written, in the folder of the documentation."""
+CARDS = "generated/axes"
+"""Folder of the cards that `scengen probe` has written, likewise."""
+Progress = Callable[[int, int, str], None]
+"""Function that gets the number of finished tasks, the number of all, and what is being made."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A task to show."""
+
+    task: Task
+    pools: Sequence[Pool] = ()
+    """Pools whose first scenarios are shown; none to certify a training scenario."""
+
+    @property
+    def key(self) -> str:
+        """Hash of everything that its exhibit is made from."""
+        return key_of(self.task, [pool.sha256 for pool in self.pools])
+
+    def rows(self) -> list[PoolRow]:
+        """The scenarios of pools that are shown."""
+        return [pool.at(0) for pool in self.pools]
+
+
+@dataclass
+class Built:
+    """What a run has done."""
+
+    made: list[str] = field(default_factory=list)
+    """Tasks whose films and pictures were made."""
+    kept: list[str] = field(default_factory=list)
+    """Tasks whose films and pictures were up to date."""
+    failed: dict[str, str] = field(default_factory=dict)
+    """Tasks that could not be shown, and why."""
+    documents: int = 0
+    """Number of pages of documentation."""
+
+
+def build(
+    shown: Sequence[Shown],
+    to: Path,
+    docs: Path | None = None,
+    search: Sequence[str] = (),
+    progress: Progress = lambda done, total, what: None,
+) -> Built:
+    """Write the site, or a part of it.
+
+    Films and pictures that are up to date are kept, so that an interrupted run is continued by a repeated call. Tasks
+    of earlier runs stay on the list.
+
+    Args:
+        shown: tasks whose pages are written.
+        to: folder of the site.
+        docs: folder with README.md, docs/ and what `make axes` has written, whose pages, figures and cards are added.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+
+    Raises:
+        BadConfig: a file cannot be written.
+    """
+    built = Built()
+    for number, each in enumerate(shown):
+        name, folder = each.task.name, to / "tasks" / each.task.name
+        progress(number, len(shown), name)
+        known = Exhibit.read(folder)
+        if known is not None and known.key == each.key:
+            built.kept.append(name)
+            continue
+        try:
+            rows = each.rows()
+            tell = lambda what, number=number, name=name: progress(number, len(shown), f"{name}: {what}")  # noqa: E731
+            exhibit.make(each.task, rows, folder, each.key, tell)
+            built.made.append(name)
+        except BadConfig:  # such as a full disk: the other tasks would fail, too
+            raise
+        except ScengenError as error:
+            built.failed[name] = str(error)
+    progress(len(shown), len(shown), "pages")
+    _Pages(to, docs, search).write(shown, built)
+    return built
+
+
+class _Pages:
+    """All pages, from what was made."""
+
+    def __init__(self, to: Path, docs: Path | None, search: Sequence[str]):
+        self.to, self.root, self.search = to, docs, search
+        found = (Exhibit.read(path.parent) for path in sorted(to.glob(f"tasks/*/{exhibit.DESCRIPTION}")))
+        self.exhibits = {made.name: made for made in sorted(filter(None, found), key=_order)}
+        self.figures = Figures.read(docs)
+        self.documentation = Documentation(docs, {e.name: e.axes for e in self.exhibits.values()}) if docs else None
+        self.reports = sorted(docs.glob(REPORTS)) if docs else []
+        loader = jinja2.PackageLoader("scengen", "site/templates")
+        self._templates = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+        self._groups = self.documentation.groups() if self.documentation else []
+
+    def write(self, shown: Sequence[Shown], built: Built) -> None:
+        """Write everything but films and pictures."""
+        for name in ("site.css", "site.js"):
+            write(self.to / name, (files("scengen") / "site" / "static" / name).read_text())
+        write(self.to / films.PLAYER, films.player())
+        for each in shown:
+            if each.task.name in self.exhibits:
+                self._task(each.task, self.exhibits[each.task.name])
+        self._write(
+            Path("index.html"), "tasks.html", title="Tasks", exhibits=self.exhibits.values(), categories=CATEGORIES
+        )
+        if self.documentation is not None and self.root is not None:
+            for path in [*self.documentation.files, *(report.relative_to(self.root) for report in self.reports)]:
+                copied(self.root / path, self.to / path)
+            for page in self.documentation.pages:
+                self._write(html_of(page), "document.html", here=page, **vars(self.documentation.page(page)))
+            built.documents = len(self.documentation.pages)
+
+    def _task(self, task: Task, made: Exhibit) -> None:
+        """The page of a task."""
+        names = [*self.exhibits]
+        place, folder = names.index(task.name), Path("tasks", task.name)
+        cards = {}
+        for axis in task.axes:
+            card = self.root / CARDS / f"{task.name}-{axis}" / "card.html" if self.root else None
+            if card is not None and card.is_file():
+                cards[axis] = f"card-{axis}.html"
+                copied(card, self.to / folder / cards[axis])
+        self._write(
+            folder / "index.html",
+            "task.html",
+            title=f"{task.code} {task.name}",
+            task=task,
+            made=made,
+            category=CATEGORIES.get(task.category, task.category),
+            story=story(inspect.getdoc(inspect.getmodule(task.family)) or ""),
+            pairs={pair.axis: pair for pair in made.pairs},
+            certified=self.figures.certified.get(task.name, {}),
+            figures=self.figures,
+            cards=cards,
+            parameters=[*_parameters(task)],
+            subgoals=_subgoals(task, self.search),
+            spell=spell,
+            before=names[place - 1] if place else None,
+            after=names[place + 1] if place + 1 < len(names) else None,
+        )
+
+    def _write(self, path: Path, template: str, **values: Any) -> None:
+        """Write a page with the frame that all pages have."""
+        up = "../" * (len(path.parts) - 1)
+        documents = (
+            {str(page): f"{up}{html_of(page)}" for page in self.documentation.pages} if self.documentation else {}
+        )
+        frame = {"up": up, "groups": self._groups, "documents": documents, "html_of": html_of, "here": None}
+        frame["reports"] = [(report.stem, f"{up}generated/{report.name}") for report in self.reports]
+        write(self.to / path, self._templates.get_template(template).render({**frame, **values}))
+
+
+def copied(source: Path, target: Path) -> None:
+    """Copy a file; its folder is made if necessary.
+
+    Raises:
+        BadConfig: it cannot be written.
+    """
+    write(target, source.read_bytes())
+
+
+def _order(made: Exhibit) -> tuple[int, str]:
+    """The paper's categories first, each with its tasks in the order of their codes."""
+    known = [*CATEGORIES]
+    return known.index(made.category) if made.category in known else len(known), made.code
+
+
+def _parameters(task: Task) -> list[dict[str, str]]:
+    """Lines of the table of parameters."""
+    lines = []
+    for p in task.known.values():
+        dist = task.training[p.name]
+        spread = "" if dist == Fixed(p.nominal) else spell(dist)
+        hidden = " (hidden)" if p.hidden else ""
+        unit = "" if p.unit == "1" else p.unit
+        lines.append(
+            {
+                "parameter": f"{p.name}{hidden}",
+                "unit": unit,
+                "training": spread or f"{p.nominal:g}",
+                "bounds": f"{p.low:g} to {p.high:g}",
+            }
+        )
+    return lines
+
+
+def _subgoals(task: Task, search: Sequence[str]) -> list[dict[str, str]]:
+    """Lines of the table of sub-goals; none for a task without a sheet of facts."""
+    try:
+        sheet = facts.load(task, search)
+    except BadConfig:
+        return []
+    lines = []
+    for name, subgoal in sheet.order.items():
+        before = [one for one, giver in sheet.order.items() if set(giver.gives) & set(subgoal.needs)]
+        notes = [note for note in ("senses", "optional", "repeats") if getattr(subgoal, note)]
+        lines.append(
+            {"sub-goal": name, "outcome": subgoal.outcome, "after": ", ".join(before), "notes": ", ".join(notes)}
+        )
+    return lines

@@ -1,0 +1,128 @@
+"""Pages of tasks: what was made is kept, what has changed is made again, what fails is told; texts stay texts."""
+
+import json
+from dataclasses import asdict, replace
+from html import escape
+
+import pytest
+
+pytest.importorskip("viser", reason="no viser; it is in the extras studio and dev")
+
+from hostile import PAYLOADS
+
+from scengen import cli, load_task
+from scengen.errors import BadConfig, PoolError
+from scengen.site import build as building
+from scengen.site import exhibit
+from scengen.site.build import Shown, build
+from scengen.site.exhibit import Clip, Ending, Exhibit, Pair, Step
+from scengen.site.figures import lines_of
+
+
+def made(task, key, text="text"):
+    """What could have been made for a task, with a text wherever one of a pool is shown."""
+    return Exhibit(
+        key=key,
+        name=task.name,
+        code=task.code,
+        category=task.category,
+        instruction=text,
+        hands="jaw",
+        axes=[*task.axes],
+        words=text,
+        scenario=text,
+        clips=[
+            Clip("witness", text, text, text, 1.0, 10**6, f"{task.name}/film-1"),
+            Clip(text, text, text, text, 1, 1, ""),
+        ],
+        pairs=[Pair(axis, "a.webp", [Step(text, [text], "b.webp")] * 2, True) for axis in task.axes],
+        shortcuts=[Ending(text, text, text, text, 1.0)],
+        ablations=[Ending(text, "", text, text, 1.0)],
+    )
+
+
+@pytest.fixture
+def makes(monkeypatch):
+    """The tasks whose films and pictures would have been made."""
+    asked = []
+
+    def make(task, rows, folder, key, progress):
+        asked.append(task.name)
+        if task.name == "packing":
+            raise PoolError("it cannot be played")
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / exhibit.DESCRIPTION).write_text(json.dumps(asdict(made(task, key))))
+
+    monkeypatch.setattr(building.exhibit, "make", make)
+    return asked
+
+
+def test_only_what_has_changed_is_made_again_and_earlier_tasks_stay(tmp_path, makes):
+    domino, rod = Shown(load_task("domino_single")), Shown(load_task("rod_across"))
+    assert build([domino], tmp_path).made == ["domino_single"]
+    assert build([domino, rod], tmp_path).kept == ["domino_single"] and makes == ["domino_single", "rod_across"]
+    changed = Shown(load_task("domino_single", ["task.horizon=20"]))
+    assert build([changed], tmp_path).made == ["domino_single"]
+    index = (tmp_path / "index.html").read_text()
+    assert "tasks/domino_single/index.html" in index and "tasks/rod_across/index.html" in index
+    (tmp_path / "tasks/rod_across" / exhibit.DESCRIPTION).write_text('{"key": 1')  # a run that was ended
+    assert build([rod], tmp_path).made == ["rod_across"]
+
+
+def test_a_task_that_cannot_be_shown_is_told_and_the_others_are_written(tmp_path, makes):
+    built = build([Shown(load_task("packing")), Shown(load_task("domino_single"))], tmp_path)
+    assert built.failed == {"packing": "it cannot be played"} and built.made == ["domino_single"]
+    assert "tasks/packing" not in (tmp_path / "index.html").read_text()
+
+
+def test_a_task_without_a_certified_scenario_is_refused_with_the_reason(tmp_path):
+    never = load_task("domino_single", ["task.horizon=0.02"])
+    with pytest.raises(exhibit.ScengenError, match="none of 20 training scenarios is certified"):
+        exhibit._certified(never)
+
+
+@pytest.mark.parametrize("payload", PAYLOADS)
+def test_texts_of_pools_and_tasks_stay_texts(tmp_path, monkeypatch, payload):
+    task = replace(load_task("domino_single"), instruction=payload)
+    task = replace(task, axes={name: replace(axis, why=payload, source=payload) for name, axis in task.axes.items()})
+    folder = tmp_path / "tasks/domino_single"
+    folder.mkdir(parents=True)
+    shown = Shown(task)
+    (folder / exhibit.DESCRIPTION).write_text(json.dumps(asdict(made(task, shown.key, payload))))
+    assert build([shown], tmp_path).kept == ["domino_single"]
+    for page in (tmp_path / "index.html", folder / "index.html"):
+        text = page.read_text()
+        assert payload not in text or payload == escape(payload)
+        assert str(escape(payload, quote=False)).split("&")[0] in text.replace("&#39;", "'").replace("&#34;", '"')
+
+
+def test_figures_are_those_of_the_tables():
+    tasks = "| task | a |\n|---|---|\n| [push](tasks/push.md) | 1 of 2 |\n| pull | - |\n"
+    found = lines_of(f"# x\n\n{tasks}\n| other | a |\n|---|---|\n| x | y |\n")
+    assert found == [{"task": "push", "a": "1 of 2"}, {"task": "pull", "a": "-"}]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["task=domino_single", "pool=generated/reference"], "give either task=NAME"),
+        (["task=domino_singl"], "did you mean 'domino_single'"),
+        (["docs=nowhere"], "give a folder that holds README.md"),
+        (["pool=nowhere"], "nowhere"),
+        (["task=domino_single", "to=README.md"], "is a file; name a folder"),
+    ],
+)
+def test_bad_settings_end_in_one_line(arguments, says, capsys, tmp_path):
+    to = [] if any(word.startswith("to=") for word in arguments) else [f"to={tmp_path}"]
+    assert cli.run(["site", *arguments, *to]) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1
+
+
+def test_a_full_disk_ends_the_run(tmp_path, monkeypatch):
+    def make(*_):
+        raise BadConfig("no space")
+
+    monkeypatch.setattr(building.exhibit, "make", make)
+    with pytest.raises(BadConfig, match="no space"):
+        build([Shown(load_task("domino_single"))], tmp_path)
