@@ -156,10 +156,13 @@ docs: setup
 	$(BIN)/python tools/baselines.py page
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
-# Writes README, docs, axis cards and reports as HTML into SITE.
+# Writes a web site into SITE: a page for each task with films in three dimensions, and README, docs, axis cards and reports. The first
+# time takes about half an hour of processor time. TASKS=packing makes some tasks. An interrupted call is continued.
 SITE ?= generated/site
+empty :=
+comma := ,
 site: setup
-	$(BIN)/python tools/site.py $(SITE)
+	$(BIN)/scengen site docs=. to=$(SITE) $(if $(TASKS),task=$(subst $(empty) $(empty),$(comma),$(strip $(TASKS))))
 
 # Runs verification, and control checkers that must fail, on about 450 sound, false and hostile pools (15 minutes).
 # CHECKER=robosuite replays the sound ones in robosuite.

@@ -48,6 +48,7 @@ APART = {
     "scengen evaluate policy=ws://": "needs a server of policies",
     "scengen evaluate policy=zmq://": "needs a server of policies",
     "scengen studio": "runs until it is interrupted",
+    "scengen site": "films and pictures of all axes: 2 minutes",
     "scengen probe": "an hour",
     "scengen discover": "an hour",
     "scengen shrink": "certifies some hundred scenarios: 10 minutes",
