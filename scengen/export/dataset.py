@@ -1,9 +1,13 @@
-"""Reader of the LeRobot recordings of `scengen record`. What cannot be read is one line with the remedy."""
+"""Reader of the LeRobot recordings of `scengen record`. What cannot be read is one line with the remedy.
+
+A recording may be a stranger's: only plain files in its folder are opened, and what they unpack to is bounded.
+"""
 
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +17,20 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..errors import PoolError
+from ..pool.files import MAX_JSON, open_plain
+from ..pool.shards import check_groups
+from ..pool.untrusted import READING_MEMORY
+from ..work.machine import memory_bounded
+from .lerobot import VIDEO_PATH
 
 MAX_FRAMES = 200_000
 """Largest number of rows of an episode that is read."""
+MAX_ROWS = 50_000_000
+"""Largest number of rows of a table that is read."""
+MAX_FPS = 1000
+"""Largest rate of rows [1/s]."""
+MAX_PIXELS = 4096 * 4096
+"""Largest size of a picture that is decoded [pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +69,7 @@ class Recording:
         if not (found.folder / "meta" / "info.json").is_file():
             raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
         lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
-        if lacking or not found.episodes or "scengen/task" not in found.episodes[0]:
+        if lacking or not found.well_formed or not found.episodes or "scengen/task" not in found.episodes[0]:
             raise PoolError(f"{folder} is not a recording of scengen; name a folder that scengen record has written")
         return found
 
@@ -62,6 +77,13 @@ class Recording:
     def info(self) -> dict[str, Any]:
         """Content of `meta/info.json`."""
         return self._read_json("info.json")
+
+    @property
+    def well_formed(self) -> bool:
+        """Whether rate and features have their types."""
+        fps, features = self.info["fps"], self.info["features"]
+        rated = isinstance(fps, (int, float)) and 0 < fps <= MAX_FPS
+        return rated and isinstance(features, dict) and all(isinstance(each, dict) for each in features.values())
 
     @property
     def fps(self) -> float:
@@ -103,22 +125,40 @@ class Recording:
         from av.error import FFmpegError
 
         about, key = episode.about, f"videos/{camera}"
-        path = self.folder / self.info["video_path"].format(
-            video_key=camera, chunk_index=about[f"{key}/chunk_index"], file_index=about[f"{key}/file_index"]
-        )
-        first = round(about[f"{key}/from_timestamp"] * self.fps)
-        last = round(about[f"{key}/to_timestamp"] * self.fps)
+        chunk, file = (int(about[f"{key}/{name}"]) for name in ("chunk_index", "file_index"))
+        path = self.folder / VIDEO_PATH.format(video_key=camera, chunk_index=chunk, file_index=file)
+        first, last = (round(about[f"{key}/{name}"] * self.fps) for name in ("from_timestamp", "to_timestamp"))
         try:
-            with av.open(str(path)) as container:
+            # Of a playlist, which also is a video, ffmpeg would open other files.
+            with self._opened(path) as content, av.open(content, format="mp4") as container:
+                shape = container.streams.video[0].codec_context
+                if not 0 < shape.width * shape.height <= MAX_PIXELS:
+                    raise PoolError(
+                        f"{path} has pictures of {shape.width} x {shape.height}; at most {MAX_PIXELS} pixels"
+                    )
                 for number, frame in enumerate(container.decode(video=0)):
-                    if number >= last:
+                    if number >= min(last, first + MAX_FRAMES):
                         return
                     if number >= first:
                         yield np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
-        except (OSError, FFmpegError) as error:
+        except (OSError, IndexError, FFmpegError) as error:
             raise PoolError(
                 f"{path} cannot be decoded ({' '.join(str(error).split())[:120]}); record it again"
             ) from None
+
+    def _opened(self, path: Path) -> BufferedReader:
+        """A plain file of the recording, open for reading.
+
+        Raises:
+            PoolError: it is a link, a pipe or a device, or lies outside the folder.
+        """
+        try:
+            if not path.resolve().is_relative_to(self.folder.resolve()):
+                raise ValueError("it lies outside the folder")
+            return open_plain(path)
+        except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links in a circle
+            why = " ".join(str(error).split())[:120]
+            raise PoolError(f"{path} cannot be read: {why}; restore it, with cp -rL if it consists of links") from None
 
     def _values(self, column: pa.ChunkedArray, name: str) -> NDArray[Any]:
         shape = tuple(self.info["features"].get(name, {}).get("shape", ()))
@@ -131,14 +171,23 @@ class Recording:
             raise PoolError(f"{self.folder}: column {name} has not the shape of meta/info.json; record it again")
         return values.reshape(size)
 
-    def _table(self, file: Path) -> pa.Table:
+    def _table(self, path: Path) -> pa.Table:
         try:
-            return pq.read_table(file)
-        except (OSError, pa.ArrowException) as error:
-            raise PoolError(f"{file} cannot be read ({' '.join(str(error).split())[:120]}); restore it") from None
+            with self._opened(path) as content, pq.ParquetFile(content) as file:
+                if file.metadata.num_rows > MAX_ROWS:
+                    raise ValueError(f"it has {file.metadata.num_rows} rows; at most {MAX_ROWS} are read")
+                check_groups(file.metadata, range(file.num_row_groups))
+                with memory_bounded(READING_MEMORY):
+                    return file.read(use_threads=False)
+        except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+            raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); restore it") from None
 
     def _read_json(self, name: str) -> dict[str, Any]:
         try:
-            return json.loads((self.folder / "meta" / name).read_text())
-        except (OSError, ValueError) as error:
+            with self._opened(self.folder / "meta" / name) as content:
+                found = json.loads(content.read(MAX_JSON).decode())
+            if not isinstance(found, dict):
+                raise ValueError("it holds no group of settings")
+            return found
+        except (OSError, ValueError, RecursionError) as error:
             raise PoolError(f"{self.folder}/meta/{name} is damaged ({str(error)[:120]}); record it again") from None

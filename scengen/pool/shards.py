@@ -59,7 +59,7 @@ def read_rows(shard: Shard, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """
     count = 0
     with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
-        _check_groups(file.metadata, range(file.num_row_groups))
+        check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, BATCH_ROWS):
             for values in _values(batch, shard.layout):
                 count += 1
@@ -82,7 +82,7 @@ def read_rows_at(
         PoolError: as `read_rows`.
     """
     with _faults_told(shard, lambda: f"in group {group} of its rows"), opened(shard, metadata) as file:
-        _check_groups(metadata, [group])
+        check_groups(metadata, [group])
         wanted, start = iter(places), 0
         place = next(wanted, None)
         for batch in _batches(file, names, BATCH_ROWS, [group]):
@@ -163,7 +163,7 @@ def _small_columns(shard: Shard, names: Sequence[str]) -> Iterator[pa.RecordBatc
     """
     count = 0
     with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
-        _check_groups(file.metadata, range(file.num_row_groups))
+        check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, KEY_ROWS):
             _check_no_nulls(batch)
             count += len(batch)
@@ -239,7 +239,7 @@ def _faults_told(shard: Shard, where: Callable[[], str]) -> Iterator[None]:
         raise PoolError(f"{shard.path} cannot be read {where()} ({why}); restore it") from None
 
 
-def _check_groups(metadata: pq.FileMetaData, groups: Iterable[int]) -> None:
+def check_groups(metadata: pq.FileMetaData, groups: Iterable[int]) -> None:
     """Refuse groups of rows that lie in other files or would not fit into memory, before any is unpacked."""
     for group in map(metadata.row_group, groups):
         columns = [group.column(i) for i in range(group.num_columns)]

@@ -3,11 +3,13 @@
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import viser
 
 from .. import compose
+from ..control.loop import Loop
 from ..curate.curation import FOLDER, Curated, decided_again
 from ..curate.findings import EpisodeReport
 from ..curate.page import plot
@@ -21,6 +23,10 @@ from ..validate.rebuilt import rebuild
 from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 
+MAX_PICTURES = 5000
+"""Largest number of recorded pictures of an episode that are shown: more than four minutes, and 1.2 GB of memory."""
+MAX_LENGTH = 3.0
+"""Largest length of an episode that is replayed, in time limits of its task: a person may take longer than that."""
 SHRINK = 2
 """Step between the pixels of a recording's pictures that are shown: 320 x 240 of 640 x 480."""
 
@@ -133,8 +139,8 @@ class Judge:
         episode = next(each for each in recording.read() if each.number == number)
         self._episode, self._pictures = episode, []
         if recording.cameras:
-            frames = recording.frames(episode, recording.cameras[0])
-            self._pictures = [picture[::SHRINK, ::SHRINK] for picture in frames]
+            frames = islice(recording.frames(episode, recording.cameras[0]), min(len(episode), MAX_PICTURES))
+            self._pictures = [picture[::SHRINK, ::SHRINK].copy() for picture in frames]
         self._image.visible = bool(self._pictures)
         self._why.value = ""
         self._describe()
@@ -152,7 +158,8 @@ class Judge:
         with self._client.atomic():
             self._view.show(world)
         periods = episode.columns[CONTROL_ACTIONS]
-        made = filmed(world, scenario, periods.reshape(-1, periods.shape[-1]), task.horizon)
+        actions = periods.reshape(-1, periods.shape[-1])[: round(MAX_LENGTH * task.horizon / Loop.PERIOD)]
+        made = filmed(world, scenario, actions, task.horizon)
         self.player.load(made, play=False)
         self.player.outcome.content = template("studio_fault.html").render(note=f"replayed: {made.outcome}")
 

@@ -1,6 +1,6 @@
 """Scenes in three dimensions: bodies of MuJoCo as meshes in the browser, moved by their poses."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import mujoco
@@ -18,6 +18,14 @@ from ..sim.world import World
 
 MAX_FACES = 2_000_000
 """Largest number of triangles of a scene that is sent; a robot has 130 000."""
+FACES = {
+    int(mujoco.mjtGeom.mjGEOM_BOX): 12,
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): 1280,
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): 128,
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): 480,
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 1280,
+}
+"""Numbers of triangles of geoms that are no meshes, by type."""
 SHOWN_GROUPS = 3
 """Number of MuJoCo's geom groups that are shown, from 0: those of pictures."""
 GRID = 2.0**-12
@@ -109,9 +117,12 @@ class SceneView:
             PoolError: it has too many triangles.
         """
         hide_hulls(world.model)
-        meshes = {i: _meshes(world.model, i) for i in range(world.model.nbody) if robot or i not in world.own}
-        if (faces := sum(len(mesh.faces) for parts in meshes.values() for mesh, _ in parts)) > MAX_FACES:
+        bodies = [body for body in range(world.model.nbody) if robot or body not in world.own]
+        if (
+            faces := sum(_faces(world.model, geom) for body in bodies for geom in _shown(world.model, body))
+        ) > MAX_FACES:
             raise PoolError(f"the scene has {faces} triangles; at most {MAX_FACES} are shown")
+        meshes = {body: _meshes(world.model, body) for body in bodies}
         self.clear()
         self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
         poses = poses_of(world)
@@ -153,17 +164,13 @@ class SceneView:
 def _meshes(model: mujoco.MjModel, body: int) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
     """The visible geoms of a body in its axes, joined by colour."""
     found: dict[bytes, list[trimesh.Trimesh]] = {}
-    for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
-        material = int(model.geom_matid[geom])
-        colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-        if model.geom_group[geom] >= SHOWN_GROUPS or colour[3] == 0.0 or model.geom_rgba[geom][3] == 0.0:
-            continue
+    for geom in _shown(model, body):
         if (mesh := _mesh(model, geom)) is not None:
             transform, turn = np.eye(4), np.zeros(9)
             mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
             transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
             mesh.apply_transform(transform)
-            found.setdefault(np.round(colour, 3).astype(np.float32).tobytes(), []).append(mesh)
+            found.setdefault(np.round(_colour(model, geom), 3).astype(np.float32).tobytes(), []).append(mesh)
     joined = ((trimesh.util.concatenate(parts), np.frombuffer(key, np.float32)) for key, parts in found.items())
     return [(_simplified(mesh), colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
 
@@ -178,6 +185,27 @@ def _simplified(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     mesh.merge_vertices()
     mesh.update_faces(mesh.nondegenerate_faces())
     return mesh
+
+
+def _shown(model: mujoco.MjModel, body: int) -> Iterator[int]:
+    """The visible geoms of a body."""
+    for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
+        transparent = _colour(model, geom)[3] == 0.0 or model.geom_rgba[geom][3] == 0.0
+        if model.geom_group[geom] < SHOWN_GROUPS and not transparent:
+            yield geom
+
+
+def _colour(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
+    """Colour of a geom, RGBA."""
+    material = int(model.geom_matid[geom])
+    return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+
+
+def _faces(model: mujoco.MjModel, geom: int) -> int:
+    """Number of triangles of a geom, known before they are made."""
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        return int(model.mesh_facenum[model.geom_dataid[geom]])
+    return FACES.get(int(model.geom_type[geom]), 0)
 
 
 def _mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:

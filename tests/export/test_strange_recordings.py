@@ -1,0 +1,144 @@
+"""Recordings of strangers: what leads elsewhere, never ends or unpacks without end is one line; nothing is opened."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from scengen.errors import PoolError
+from scengen.export import dataset
+from scengen.export.dataset import EpisodeData, Recording
+
+CAMERA = "observation.images.agentview"
+INFO = {
+    "fps": 10,
+    "features": {"action": {"dtype": "float32", "shape": [2]}, CAMERA: {"dtype": "video", "shape": [4, 4, 3]}},
+    "total_episodes": 1,
+    "robot_type": "panda",
+}
+ABOUT = {
+    "scengen/task": "domino_single",
+    "dataset_from_index": 0,
+    "dataset_to_index": 3,
+    f"videos/{CAMERA}/chunk_index": 0,
+    f"videos/{CAMERA}/file_index": 0,
+    f"videos/{CAMERA}/from_timestamp": 0.0,
+    f"videos/{CAMERA}/to_timestamp": 0.3,
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A small recording, without its videos."""
+    here = tmp_path / "recording"
+    for path in ("meta/episodes/chunk-000", "data/chunk-000", f"videos/{CAMERA}/chunk-000"):
+        (here / path).mkdir(parents=True)
+    (here / "meta/info.json").write_text(json.dumps(INFO))
+    pq.write_table(pa.Table.from_pylist([ABOUT]), here / "meta/episodes/chunk-000/file-000.parquet")
+    rows = {"frame_index": pa.array(range(3)), "action": pa.array([[0.0, np.nan]] * 3, pa.list_(pa.float32(), 2))}
+    pq.write_table(pa.table(rows), here / "data/chunk-000/file-000.parquet")
+    return here
+
+
+def described(folder, **changed):
+    (folder / "meta/info.json").write_text(json.dumps({**INFO, **changed}))
+    return folder
+
+
+def refused(work, says):
+    with pytest.raises(PoolError, match=says) as raised:
+        work()
+    assert "\n" not in str(raised.value)
+
+
+def test_the_small_recording_is_read(folder):
+    """The negative control."""
+    (episode,) = Recording.open(folder).read()
+    assert len(episode) == 3 and episode.columns["action"].shape == (3, 2)
+
+
+@pytest.mark.parametrize(
+    "table", ["meta/info.json", "meta/episodes/chunk-000/file-000.parquet", "data/chunk-000/file-000.parquet"]
+)
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_links_and_pipes_are_not_opened(folder, tmp_path, table, kind):
+    target = folder / table
+    moved = shutil.move(target, tmp_path / "elsewhere")
+    os.symlink(moved, target) if kind == "link" else os.mkfifo(target)
+    refused(lambda: [*Recording.open(folder).read()], "outside the folder|plain file|meta/info.json is missing")
+
+
+def test_a_folder_that_leads_elsewhere_is_not_read(folder, tmp_path):
+    shutil.move(folder / "data", tmp_path / "data")
+    os.symlink(tmp_path / "data", folder / "data")
+    refused(lambda: [*Recording.open(folder).read()], "lies outside the folder; restore it, with cp -rL")
+
+
+@pytest.mark.parametrize("camera", ["../../../../etc", "/etc", CAMERA])
+@pytest.mark.parametrize(
+    "pattern", ["/etc/passwd", "../../{video_key}", "{chunk_index:>9999999999}", "{video_key.__class__}"]
+)
+def test_paths_of_videos_stay_in_the_folder_whatever_the_recording_says(folder, camera, pattern):
+    features = {**INFO["features"], camera: {"dtype": "video", "shape": [4, 4, 3]}}
+    recording = Recording.open(described(folder, video_path=pattern, features=features))
+    about = {f"videos/{camera}/{name}": value for name, value in (("chunk_index", 0), ("file_index", 0))}
+    about |= {f"videos/{camera}/from_timestamp": 0.0, f"videos/{camera}/to_timestamp": 0.3}
+    episode = EpisodeData(0, about, {})
+    refused(lambda: [*recording.frames(episode, camera)], "outside the folder|is missing")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no video",
+        b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfile:///etc/passwd\n",
+        b"ffconcat version 1.0\nfile /etc/passwd\n",
+        b"\x00\x00\x00\x18ftypisom" + b"\xff" * 4000,
+    ],
+)
+def test_a_video_that_is_none_is_one_line_and_a_playlist_opens_nothing(folder, content):
+    pytest.importorskip("av")
+    (folder / f"videos/{CAMERA}/chunk-000/file-000.mp4").write_bytes(content)
+    recording = Recording.open(folder)
+    (episode,) = recording.read()
+    refused(lambda: [*recording.frames(episode, CAMERA)], "cannot be decoded")
+
+
+def test_pictures_have_a_largest_size(folder, monkeypatch):
+    pytest.importorskip("av")
+    from scengen.pictures.video import Movie
+
+    with Movie(folder / f"videos/{CAMERA}/chunk-000/file-000.mp4", 10, 64, 48) as film:
+        for _ in range(3):
+            film.add(np.zeros((48, 64, 3), np.uint8))
+    recording = Recording.open(folder)
+    (episode,) = recording.read()
+    assert [picture.shape for picture in recording.frames(episode, CAMERA)] == [(48, 64, 3)] * 3
+    monkeypatch.setattr(dataset, "MAX_PIXELS", 1000)
+    refused(lambda: [*recording.frames(episode, CAMERA)], "has pictures of 64 x 48; at most 1000 pixels")
+
+
+def test_a_table_that_unpacks_to_too_much_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(dataset, "MAX_ROWS", 2)
+    refused(lambda: [*Recording.open(folder).read()], "it has 3 rows; at most 2 are read")
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"fps": "10"}, {"fps": 0}, {"fps": 1e9}, {"features": []}, {"features": {"action": "float32"}}, {"fps": None}],
+    ids=str,
+)
+def test_a_description_of_other_types_is_no_recording(folder, changed):
+    refused(lambda: Recording.open(described(folder, **changed)), "is not a recording of scengen")
+
+
+@pytest.mark.parametrize("shape", [[-1], [10**9, 10**9], ["x"], "2"], ids=str)
+def test_shapes_that_do_not_fit_are_told(folder, shape):
+    features = {**INFO["features"], "action": {"dtype": "float32", "shape": shape}}
+    with pytest.raises((PoolError, ValueError, TypeError)):
+        [*Recording.open(described(folder, features=features)).read()]
