@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("viser", reason="no viser; it is in the extras studio and dev")
 
+from exhibits import made
 from hostile import PAYLOADS
 
 from scengen import cli, load_task
@@ -15,30 +16,7 @@ from scengen.errors import BadConfig, PoolError
 from scengen.site import build as building
 from scengen.site import exhibit
 from scengen.site.build import Shown, build
-from scengen.site.exhibit import Clip, Ending, Exhibit, Pair, Step
 from scengen.site.figures import lines_of
-
-
-def made(task, key, text="text"):
-    """What could have been made for a task, with a text wherever one of a pool is shown."""
-    return Exhibit(
-        key=key,
-        name=task.name,
-        code=task.code,
-        category=task.category,
-        instruction=text,
-        hands="jaw",
-        axes=[*task.axes],
-        words=text,
-        scenario=text,
-        clips=[
-            Clip("witness", text, text, text, 1.0, 10**6, f"{task.name}/film-1"),
-            Clip(text, text, text, text, 1, 1, ""),
-        ],
-        pairs=[Pair(axis, "a.webp", [Step(text, [text], "b.webp")] * 2, True) for axis in task.axes],
-        shortcuts=[Ending(text, text, text, text, 1.0)],
-        ablations=[Ending(text, "", text, text, 1.0)],
-    )
 
 
 @pytest.fixture
