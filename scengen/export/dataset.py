@@ -130,7 +130,7 @@ class Recording:
         first, last = (round(about[f"{key}/{name}"] * self.fps) for name in ("from_timestamp", "to_timestamp"))
         try:
             # Of a playlist, which also is a video, ffmpeg would open other files.
-            with self._opened(path) as content, av.open(content, format="mp4") as container:
+            with self._opened(path) as content, av.open(content, "r", format="mp4") as container:
                 shape = container.streams.video[0].codec_context
                 if not 0 < shape.width * shape.height <= MAX_PIXELS:
                     raise PoolError(
