@@ -47,8 +47,8 @@ TWIN = (400, 300)
 """Width and height of a picture of a pair [pixels]."""
 FRAMES = 8
 """Number of pictures of the film strip of a witness."""
-ALIKE = 0.2
-"""Largest mean difference between the pictures of a pair that look alike, in steps of 255."""
+VISIBLE = 20
+"""Difference of a pixel that a person sees [1/255], and number of such pixels from which pictures differ."""
 Progress = Callable[[str], None]
 """Function that is told what is made next."""
 
@@ -249,8 +249,12 @@ def _pair(task: Task, axis: Axis, folder: Path, stem: str) -> Pair:
         Step(str(draw.split), [moved(task, name, value) for name, value in draw.shifted.items()], name_of_file)
         for draw, name_of_file in zip(draws, files[1:], strict=True)
     ]
-    alike = float(np.abs(pictures[0].astype(int) - pictures[-1]).mean()) < ALIKE
-    return Pair(axis.name, files[0], steps, alike)
+    return Pair(axis.name, files[0], steps, alike(pictures[0], pictures[-1]))
+
+
+def alike(one: Picture, other: Picture) -> bool:
+    """Whether two pictures look the same to a person. A hole of a few pixels is a difference."""
+    return int((np.abs(one.astype(int) - other).max(axis=2) > VISIBLE).sum()) < VISIBLE
 
 
 def _drawn(task: Task, splits: Sequence[str]) -> tuple[int, list[Draw]]:

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, replace
 from html import escape
 
+import numpy as np
 import pytest
 
 pytest.importorskip("viser", reason="no viser; it is in the extras studio and dev")
@@ -95,6 +96,14 @@ def test_bad_settings_end_in_one_line(arguments, says, capsys, tmp_path):
     assert cli.run(["site", *arguments, *to]) == 2
     told = capsys.readouterr().err
     assert says in told and told.count("\n") == 1
+
+
+def test_pictures_that_differ_in_a_small_place_do_not_look_alike():
+    one = np.full((300, 400, 3), 100, np.uint8)
+    hole, noise = one.copy(), one.copy()
+    hole[10:16, 10:16, 2] = 200
+    noise += np.random.default_rng(0).integers(0, 5, noise.shape, np.uint8)
+    assert exhibit.alike(one, noise) and not exhibit.alike(one, hole)
 
 
 def test_a_full_disk_ends_the_run(tmp_path, monkeypatch):
