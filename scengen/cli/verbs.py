@@ -14,5 +14,17 @@ VERBS = tuple(verb for verbs in GROUPS.values() for verb in verbs)
 """Names of all commands."""
 RENAMED: Mapping[str, str] = {"axis": "probe", "bias": "audit", "card": "publish", "robosuite": "crosscheck"}
 """New names of commands by the old ones, which version 0.3 removes. Help and completion do not list the old ones."""
-CONTINUING = ("generate", "demos", "teleop", "train", "evaluate", "edition", "agent", "attack", "probe", "discover")
+CONTINUING = (
+    "generate",
+    "demos",
+    "teleop",
+    "train",
+    "evaluate",
+    "edition",
+    "agent",
+    "attack",
+    "probe",
+    "discover",
+    "site",
+)
 """Commands that keep finished work when they are interrupted, and continue from there."""
