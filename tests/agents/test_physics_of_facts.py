@@ -9,6 +9,7 @@ import pytest
 from scengen.assets.prop import TABLE_HALF, TABLE_TOP
 from scengen.sim import scene_text
 from scengen.sim.world import World
+from scengen.tasks.ball_cage_escape import BallCageEscape
 from scengen.tasks.domino_single import DominoSingle
 from scengen.tasks.edge_slide import EdgeSlide
 from scengen.tasks.pendulum_grasp import PendulumGrasp
@@ -68,3 +69,17 @@ def test_the_pendulum_returns_after_the_stated_period(amplitude):
     assert 2 * np.diff(lows).mean() * 0.01 == pytest.approx(facts["period"], abs=0.03)
     rise = facts["length"] * (1.0 - math.cos(math.radians(amplitude)))
     assert max(heights) - min(heights) == pytest.approx(rise, rel=0.05)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 120.0])
+@pytest.mark.parametrize("off", [-2.0, 2.0])
+def test_the_ball_rolls_in_its_cage_from_the_stated_tilt_on(yaw, off):
+    """Instead of the cage on its stool, gravity is tilted."""
+    scenario = replace(BallCageEscape(), yaw=yaw)
+    world, tilt = world_of(scenario), math.radians(scenario.facts()["tilt"] + off)
+    settled(world, 0.5)
+    start = world.com("ball").copy()
+    along = scenario.axes[:, 0]
+    world.model.opt.gravity[:] = 9.81 * (math.sin(tilt) * along - np.array([0.0, 0.0, math.cos(tilt)]))
+    settled(world, 2.0)
+    assert (np.linalg.norm(world.com("ball") - start) > 0.01) == (off > 0)
