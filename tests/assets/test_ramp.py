@@ -82,8 +82,8 @@ def test_a_ball_rolls_where_friction_exceeds_two_sevenths_of_the_slope(angle, fa
 @given(angle=angles, radius=radii, share=shares, friction=st.sampled_from([SLIPPERY, ROUGH]))
 @settings(max_examples=25, deadline=None)
 def test_a_ball_that_only_slides_or_only_rolls_climbs_as_high_as_it_came_from(angle, radius, share, friction):
-    """Galileo's law, less the 2 % (sliding) and 5 % (rolling) that the facets may take: at worst 5.2 %, of a ball of 14 mm
-    radius at 39 deg."""
+    """Galileo's law, less the 2 % (sliding) and 5 % (rolling) that the facets may take; at worst 5.2 % were seen, of a
+    ball of 14 mm radius at 39 deg."""
     run = Run(Ramp(angle=angle, friction=friction), share, Ball(radius=radius))
     start = run.ramp.height(run.start)
     assert 1 - (0.055 if friction else 0.024) < run.climbed() / start < 1.0
