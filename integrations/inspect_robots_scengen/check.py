@@ -6,7 +6,6 @@ Every scenario of the pools is played in both. Exit status 1 if a verdict differ
 """
 
 import sys
-from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import inspect_robots
@@ -18,8 +17,7 @@ from inspect_robots.types import Action, ActionChunk, Observation
 from inspect_robots_scengen import ScengenEmbodiment, scengen_task
 
 from scengen.evaluate.policies import NearestReplay
-from scengen.evaluate.rollouts import evaluate
-from scengen.evaluate.settings import EvaluateSettings
+from scengen.evaluate.verdicts import compared, replay_verdicts
 from scengen.pool import Pool
 from scengen.pool.library import Library
 
@@ -55,11 +53,9 @@ def main() -> int:
             (log,) = inspect_robots.eval(task, Replay(body), body, log_dir=folder, store_actions=False)
             there |= {sample.scene_id: bool(sample.reduced["success_at_end"]) for sample in log.samples}
         body.close()
-        settings = EvaluateSettings("replay", pools, seeds=count, rollouts=1, to=str(Path(folder, "out")))
-        here = {e["scenario"]: e["success"] for e in evaluate(settings, lambda *_: None).episodes}
-    differ = [id_ for id_, success in here.items() if there.get(id_) != success]
-    print(f"{len(here)} scenarios: {sum(here.values())} solved in scengen, {len(differ)} verdicts differ {differ}")
-    return 1 if differ else 0
+    line, same = compared(there, replay_verdicts(pools))
+    print(line)
+    return 0 if same else 1
 
 
 if __name__ == "__main__":

@@ -6,8 +6,6 @@ Every scenario of the pools is played in both. Exit status 1 if a verdict differ
 """
 
 import sys
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
@@ -16,8 +14,7 @@ from lerobot_env_scengen import ScengenEnv
 
 from scengen.envs.gym import PoolEnv
 from scengen.evaluate.policies import NearestReplay
-from scengen.evaluate.rollouts import evaluate
-from scengen.evaluate.settings import EvaluateSettings
+from scengen.evaluate.verdicts import compared, replay_verdicts
 from scengen.pool import Pool
 from scengen.pool.library import Library
 
@@ -57,24 +54,15 @@ def lerobot_verdicts(pools: list[str]) -> dict[str, bool]:
     return found
 
 
-def scengen_verdicts(pools: list[str]) -> dict[str, bool]:
-    """Whether each scenario is solved in `scengen evaluate`, by id."""
-    seeds = min(len(Pool.open(folder)) for folder in pools)
-    with TemporaryDirectory() as folder:
-        settings = EvaluateSettings("replay", pools, seeds=seeds, rollouts=1, to=str(Path(folder, "out")))
-        return {e["scenario"]: e["success"] for e in evaluate(settings, lambda *_: None).episodes}
-
-
 def _same(value: object) -> object:
     return value
 
 
 def main() -> int:
     pools = sys.argv[1:]
-    theirs, ours = lerobot_verdicts(pools), scengen_verdicts(pools)
-    differ = [id_ for id_, success in ours.items() if theirs[id_] != success]
-    print(f"{len(ours)} scenarios: {sum(ours.values())} solved in scengen, {len(differ)} verdicts differ {differ}")
-    return 1 if differ else 0
+    line, same = compared(lerobot_verdicts(pools), replay_verdicts(pools))
+    print(line)
+    return 0 if same else 1
 
 
 if __name__ == "__main__":

@@ -22,8 +22,7 @@ from vla_eval.types import Action, Observation
 
 from scengen.envs.gym import PoolEnv
 from scengen.evaluate.policies import NearestReplay
-from scengen.evaluate.rollouts import evaluate
-from scengen.evaluate.settings import EvaluateSettings
+from scengen.evaluate.verdicts import compared, replay_verdicts
 from scengen.pool import Pool
 from scengen.pool.library import Library
 
@@ -96,24 +95,15 @@ def _wait_for(address: str) -> None:
     sys.exit(f"no answer from {address}")
 
 
-def ours(pools: list[str]) -> dict[str, bool]:
-    """Whether each scenario is solved in `scengen evaluate`, by id."""
-    seeds = min(len(Pool.open(folder)) for folder in pools)
-    with TemporaryDirectory() as folder:
-        settings = EvaluateSettings("replay", pools, seeds=seeds, rollouts=1, to=str(Path(folder, "out")))
-        return {e["scenario"]: e["success"] for e in evaluate(settings, lambda *_: None).episodes}
-
-
 def main() -> int:
     if sys.argv[1] == "--serve":
         serve(ReplayServer(sys.argv[2:]), host="127.0.0.1", port=PORT)
         return 0
     pools = [str(Path(pool).absolute()) for pool in sys.argv[1:]]
     with TemporaryDirectory() as folder:
-        there, here = theirs(pools, Path(folder)), ours(pools)
-    differ = [id_ for id_, success in here.items() if there.get(id_) != success]
-    print(f"{len(here)} scenarios: {sum(here.values())} solved in scengen, {len(differ)} verdicts differ {differ}")
-    return 1 if differ else 0
+        line, same = compared(theirs(pools, Path(folder)), replay_verdicts(pools))
+    print(line)
+    return 0 if same else 1
 
 
 if __name__ == "__main__":
