@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from scengen import list_tasks, load_task
-from scengen.agents.facts import Fact, load
-from scengen.agents.priors import priors
+from scengen.agents.facts import load
+from scengen.agents.priors import answers, priors, share
 
 DRAWS = 300
 """Number of draws from which the answers are taken, and of those to which they are given."""
@@ -23,16 +23,12 @@ def measured(name: str) -> dict[str, list[float]]:
     """Prior and share on other draws, by question."""
     task = load_task(name)
     sheet = load(task)
-    told = [task.draw("id", 0, index).scenario.facts() for index in range(DRAWS)]
-    found = {}
-    for id_, prior in priors(task, sheet, DRAWS).items():
-        if prior.share < 1.0:
-            question = sheet.facts[id_]
-            claim = list(prior.answer) if isinstance(prior.answer, tuple) else prior.answer
-            right = [each[id_] if isinstance(each[id_], float | int) else (each[id_],) for each in told]
-            facts = [Fact(id_, "", "", (), answer, within=question.within) for answer in right]
-            found[id_] = [round(prior.share, 3), round(sum(fact.holds(claim) for fact in facts) / DRAWS, 3)]
-    return found
+    others = answers(task, sheet, DRAWS, seed=0)
+    return {
+        id_: [round(prior.share, 3), round(share(prior.answer, others[id_], sheet.facts[id_].within), 3)]
+        for id_, prior in priors(task, sheet, DRAWS).items()
+        if prior.share < 1.0
+    }
 
 
 def main(*names: str) -> None:

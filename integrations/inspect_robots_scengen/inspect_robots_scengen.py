@@ -12,11 +12,9 @@ from inspect_robots.types import Action, Observation, StepResult
 
 from scengen.agents.scene import robot, streams
 from scengen.assets.prop import TABLE_TOP
-from scengen.control.loop import Loop
 from scengen.control.osc import STEP, TURN
-from scengen.envs.gym import PoolEnv
+from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.pools import rows_of
-from scengen.errors import BadConfig, UnknownName
 from scengen.pool import Pool
 from scengen.sim.world import hands
 
@@ -53,9 +51,6 @@ class ScengenEmbodiment(EmbodimentBase):
         """
         self.pools = folders(pool)
         task = first_task(self.pools)
-        repeat = 1 / (Loop.PERIOD * hz)
-        if abs(repeat - round(repeat)) > 1e-9:
-            raise BadConfig(f"hz = {hz}; it must divide {1 / Loop.PERIOD:g} Hz")
         embodiment = rows_of(self.pools, task)[0].embodiment
         self.env = PoolEnv(
             task,
@@ -63,7 +58,7 @@ class ScengenEmbodiment(EmbodimentBase):
             streams(embodiment, cameras),
             width=width,
             height=width,
-            action_repeat=round(repeat),
+            action_repeat=action_repeat_at(hz, "hz"),
             settle=settle,
             rules=rules,
         )
@@ -147,10 +142,7 @@ def scengen_task(pool: str, *, split: str = "id", n: int = 20) -> Task:
         UnknownName: the pools have no such split.
     """
     pools = folders(pool)
-    rows = rows_of(pools, first_task(pools))
-    if split not in (known := sorted(rows.kinds("split"))):
-        raise UnknownName("split of the pools", split, known)
-    own = rows.of_split(split)
+    own = rows_of(pools, first_task(pools)).of_split(split)
     chosen = [own[i] for i in range(min(n, len(own)))]
     longest = max(row.horizon for row in chosen)
     return Task(

@@ -1,6 +1,5 @@
 """What can be answered without a look: the answer to each question that is most often right in training."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,28 +28,38 @@ def priors(task: Task, sheet: Sheet, draws: int = DRAWS, seed: int = SEED) -> di
 
     Hidden state and the simplest plan are left out: the first has no right claim, the second needs certificates.
     """
-    answers: dict[str, list[Answer]] = {}
-    for index in range(draws):
-        told = task.draw(ID, seed, index).scenario.facts()
-        for id_, value in told.items():
-            if id_ in sheet.facts and not sheet.facts[id_].shortcut:
-                answers.setdefault(id_, []).append((value,) if isinstance(value, str) else float(value))
     fixed = {id_: Prior(question.rights, 1.0) for id_, question in sheet.facts.items() if question.right}
-    return {**fixed, **{id_: _best(every, sheet.facts[id_].within) for id_, every in answers.items()}}
+    given = answers(task, sheet, draws, seed)
+    return {**fixed, **{id_: _best(every, sheet.facts[id_].within) for id_, every in given.items()}}
 
 
-def _best(answers: Sequence[Answer], within: float) -> Prior:
+def answers(task: Task, sheet: Sheet, draws: int, seed: int) -> dict[str, list[Answer]]:
+    """The family's answers in training draws, by question."""
+    found: dict[str, list[Answer]] = {}
+    for index in range(draws):
+        for id_, value in task.draw(ID, seed, index).scenario.facts().items():
+            if id_ in sheet.facts and not sheet.facts[id_].shortcut:
+                found.setdefault(id_, []).append((value,) if isinstance(value, str) else float(value))
+    return found
+
+
+def share(guess: Answer, given: Sequence[Answer], within: float) -> float:
+    """Share of answers for which a fixed one counts as right."""
+    return sum(_alike(guess, answer, within) for answer in given) / len(given)
+
+
+def _alike(guess: Answer, answer: Answer, within: float) -> bool:
+    if isinstance(guess, float) and isinstance(answer, float):
+        return abs(answer - guess) <= within * (1 + 1e-9)
+    return guess == answer
+
+
+def _best(given: Sequence[Answer], within: float) -> Prior:
     """The fixed answer that counts as right most often."""
-    if isinstance(answers[0], tuple):
-        (likeliest, count), *_ = Counter(answers).most_common(1)
-        return Prior(likeliest, count / len(answers))
-    numbers = [answer for answer in answers if isinstance(answer, float)]
-    best = max(
-        (n + shift for n in numbers for shift in (-within, 0.0, within)), key=lambda g: _right(numbers, g, within)
+    tried = dict.fromkeys(
+        guess
+        for answer in given
+        for guess in ((answer,) if isinstance(answer, tuple) else (answer - within, answer, answer + within))
     )
-    return Prior(best, _right(numbers, best, within) / len(numbers))
-
-
-def _right(numbers: Sequence[float], guess: float, within: float) -> int:
-    """Number of numbers for which a guess counts as right."""
-    return sum(abs(number - guess) <= within * (1 + 1e-9) for number in numbers)
+    best = max(tried, key=lambda guess: share(guess, given, within))
+    return Prior(best, share(best, given, within))

@@ -409,6 +409,22 @@ def _revived(kind: type[PoolEnv], arguments: Mapping[str, Any], progress: Mappin
     return env
 
 
+def action_repeat_at(rate: float, name: str) -> int:
+    """Control periods for which a policy holds an action.
+
+    Args:
+        rate: rate of the policy [Hz].
+        name: name of the setting, for the error.
+
+    Raises:
+        BadConfig: the rate is below 1 Hz, or does not divide that of the controller.
+    """
+    full = 1 / Loop.PERIOD
+    if not 1 <= rate <= full or abs(full / rate - round(full / rate)) > 1e-9:
+        raise BadConfig(f"{name} = {rate:g}; it must be at least 1 Hz and divide {full:g} Hz")
+    return round(full / rate)
+
+
 def _check_render_mode(render_mode: str | None) -> None:
     if render_mode not in (None, *RENDER_MODES):
         raise UnknownName("render_mode", str(render_mode), RENDER_MODES)

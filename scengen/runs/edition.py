@@ -19,6 +19,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..samplers.task import Task
+from ..sim import scene_text
 from ..task_files import about, conf_dir, tasks
 from ..typed import typed
 from ..validate.rebuilt import portable_sha256, rebuild
@@ -210,8 +211,13 @@ def split_of(key: str) -> tuple[str, str]:
 
 
 def frozen(pool: Pool) -> Iterator[Frozen]:
-    """The scenarios of a pool as an edition names them."""
+    """The scenarios of a pool as an edition names them.
+
+    Raises:
+        BadConfig: the text of a scene is not MJCF.
+    """
     for index, id_, scene in pool.columns("index", "id", "scene_xml"):
+        scene_text.check(scene)
         yield Frozen(index, id_, portable_sha256(scene))
 
 

@@ -1,6 +1,7 @@
 """Frozen evaluation scenarios: the file, its check against what is drawn, and pools that must equal it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from helpers import REFERENCE
@@ -24,6 +25,13 @@ def edition(tmp_path):
     made = replace(Edition.new(tmp_path / "mine.yaml"), seed=0, n=len(POOL)).with_set(KEY, POOL)
     made.save()
     return made
+
+
+@pytest.mark.parametrize("scene", ["<mujoco", "<!DOCTYPE a><mujoco/>", "<robot/>"])
+def test_a_scene_of_a_stranger_that_is_no_scene_is_one_line(scene):
+    pool = SimpleNamespace(columns=lambda *names: [(0, "0" * 12, scene)])
+    with pytest.raises(BadConfig, match="scene"):
+        list(frozen(pool))
 
 
 def test_a_complete_edition_has_every_task_and_the_eight_conditions_of_the_paper():

@@ -12,8 +12,7 @@ from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 
-from scengen.control.loop import Loop
-from scengen.envs.gym import PoolEnv
+from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.lerobot import AGENT, ENVIRONMENT, PIXELS, ROLLOUT, LeRobotNames
 from scengen.envs.object_state import NAME
 from scengen.envs.observations import proprioception
@@ -98,15 +97,12 @@ class ScengenEnv(EnvConfig):
         Raises:
             BadConfig: the rate does not divide 100 Hz.
         """
-        repeat = 1 / (Loop.PERIOD * self.fps)
-        if abs(repeat - round(repeat)) > 1e-9:
-            raise BadConfig(f"--env.fps={self.fps}; it must divide {1 / Loop.PERIOD:g} Hz")
         embodiment = rows_of(self._listed(self.pool), str(self.task))[0].embodiment
         state = [NAME] if self.environment_state else []
         return {
             "pool": self._listed(self.pool),
             "observations": [*proprioception(embodiment), *state, *self._listed(self.cameras)],
-            "action_repeat": round(repeat),
+            "action_repeat": action_repeat_at(self.fps, "--env.fps"),
             "width": self.width,
             "height": self.height,
             "settle": self.settle,

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import yaml
 
-from ...control.loop import Loop
+from ...envs.gym import action_repeat_at
 from ...envs.observations import proprioception
 from ...errors import BadConfig, UnknownName, cut
 from ...task_files import conf_dir
@@ -89,7 +89,7 @@ class ClientSettings:
     @property
     def repeat(self) -> int:
         """Control periods for which an action is held."""
-        return round(1 / (Loop.PERIOD * self.rate))
+        return action_repeat_at(self.rate, f"{self.file}: rate")
 
     def streams(self, embodiment: str) -> tuple[str, ...]:
         """Names of the streams and cameras of all entries for a robot."""
@@ -110,9 +110,7 @@ class ClientSettings:
     def check(self) -> None:
         """Raise `BadConfig` if a setting is not valid."""
         where = self.file
-        periods = 1 / Loop.PERIOD
-        if not 1 <= self.rate <= periods or abs(periods / self.rate - round(periods / self.rate)) > 1e-9:
-            raise BadConfig(f"{where}: rate = {self.rate:g}; it must be at least 1 Hz and divide {periods:g} Hz")
+        action_repeat_at(self.rate, f"{where}: rate")
         for name, low, high in (("execute", 1, 1000), ("reconnects", 0, 1000)):
             if not low <= getattr(self, name) <= high:
                 raise BadConfig(f"{where}: {name} = {getattr(self, name)}; it must lie in [{low}, {high}]")
