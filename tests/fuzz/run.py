@@ -127,6 +127,7 @@ WORK = (
     "scengen.envs.agreement.compare_all",
     "scengen.pictures.film.Take.moments",
     "scengen.pictures.view.view",
+    "scengen.studio.app.Studio",
     "scengen.commands.asset.encode",
     "scengen.intake.asset.make_asset",
 )
