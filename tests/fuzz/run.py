@@ -31,7 +31,7 @@ WALL_LIMIT = 600
 REMEDY = re.compile(
     r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |"
     r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is not an option|install|"
-    r"accepts one pool|correct |delete |wait for|needs \w+=|widen|wants a display"
+    r"accepts one pool|correct |delete |wait for|needs (either )?\w+=|widen|wants a display"
 )
 """Words with which an error says what would be right."""
 
