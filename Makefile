@@ -49,11 +49,11 @@ wheel:
 	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
 	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
 
-# Tests that take some seconds each, such as one certificate per task (20 minutes).
+# Tests that take some seconds each, such as one certificate per task (15 minutes). Many of them wait, hence three at a time.
 slow: setup
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not long"
+	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "slow and not long"
 
-# Tests that take 20 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
+# Tests that take 10 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
 long: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m long
 

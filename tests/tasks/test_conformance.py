@@ -7,8 +7,9 @@ import pytest
 
 from scengen import conformance, list_tasks
 
+EACH_CHANGE = [pytest.mark.slow(each_change=True)]
 CHECKS = [
-    pytest.param(check, id=f"{task}-{check}", marks=[pytest.mark.slow] if "certified" in str(check) else [])
+    pytest.param(check, id=f"{task}-{check}", marks=EACH_CHANGE if "certified" in str(check) else [])
     for task in list_tasks()
     for check in conformance.checks(task, scenarios=1, certified=("id",))
 ]
