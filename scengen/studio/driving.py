@@ -3,18 +3,23 @@
 import contextlib
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 
+import numpy as np
 import viser
 from websockets.asyncio.server import ServerConnection
 
+from ..envs.observations import turns_pictures
 from ..errors import ScengenError
+from ..pictures.render import Picture
 from ..pictures.report import template
 from ..pool.untrusted import Malformed, read_json
 from ..sim.world import World
 from ..teleop.collect import Run, Source, TeleopSettings
 from ..teleop.devices import EndedByOperator
 from ..teleop.drive import Timing, drive
+from ..teleop.eye import POLICY_CAMERA, Eye
 from ..teleop.pad import CONNECTED, CONTROLS, PadEvent
 from ..teleop.session import Session, StateLine
 from .scene import Poses, SceneView, poses_of
@@ -23,6 +28,10 @@ MAX_MESSAGE = 100
 """Length of the longest message of a pad [characters]."""
 SCRIPT = "pad.js"
 """File that reads pads and keys in the browser."""
+PICTURE = (320, 240)
+"""Size of the picture that shows what a policy sees [pixels]."""
+PICTURES_PER_SECOND = 10.0
+"""Rate of these pictures: drawn in software they must leave time for the control loop."""
 
 
 class BrowserPad:
@@ -118,6 +127,9 @@ class Driver:
         """The latest take; None before the first one."""
         self.told: list[str] = []
         """Results of the takes, in words."""
+        self.turned = turns_pictures(source.task.family)
+        """Whether a policy may see the scenarios turned or mirrored; then pages show a picture of what it sees."""
+        self._eye: Eye | None = None
         self._pages: dict[int, DrivePage] = {}
         self._lock = threading.Lock()
         with contextlib.closing(Run(source, settings)):
@@ -151,6 +163,9 @@ class Driver:
                 run.write()
         except ScengenError as error:
             self.told.append(str(error))
+        eye, self._eye = self._eye, None
+        if eye is not None:
+            eye.close()
         if self.session is not None:
             self._show(self.session)
 
@@ -158,6 +173,8 @@ class Driver:
         try:
             for place in run.places():
                 self.session = Session(place.stage)
+                if self.turned and self._eye is None:
+                    self._eye = Eye(self.session, *PICTURE, POLICY_CAMERA, PICTURES_PER_SECOND)
                 drive(self.session, self.pad, self.timing, self._show)
                 run.add(place, self.session)
             self.told.append("all takes are driven; end the studio with Ctrl-C")
@@ -165,10 +182,27 @@ class Driver:
             self.told.append("ended")
 
     def _show(self, session: Session) -> None:
-        line, poses = session.line, poses_of(session.world)
+        picture = None
+        if self._eye is not None:
+            self._eye.look(session)
+            picture = self._eye.picture
+        state = Shown(session, session.line, poses_of(session.world), self.told[-1] if self.told else "", picture)
         with self._lock:
             for page in self._pages.values():
-                page.show(session, line, poses, self.told[-1] if self.told else "")
+                page.show(state)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A state of a take as pages show it."""
+
+    session: Session
+    line: StateLine
+    poses: Poses
+    told: str
+    """Result of the latest take, in words."""
+    picture: Picture | None
+    """What a policy sees, if its pictures may be turned."""
 
 
 class DrivePage:
@@ -178,16 +212,20 @@ class DrivePage:
         self._client, self._view = client, SceneView(client.scene, "/drive")
         self._line = client.gui.add_html("")
         client.gui.add_html(template("studio_keys.html").render(instruction=driver.source.task.instruction))
+        self._picture: viser.GuiImageHandle | None = None
+        if driver.turned:
+            blank = np.zeros((PICTURE[1], PICTURE[0], 3), np.uint8)
+            self._picture = client.gui.add_image(blank, label="what a policy sees", format="jpeg")
         self._shown: Session | None = None
-        self._latest: tuple[Session, StateLine, Poses, str] | None = None
+        self._latest: Shown | None = None
         self._fresh, self._closed = threading.Condition(), False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def show(self, session: Session, line: StateLine, poses: Poses, told: str) -> None:
+    def show(self, state: Shown) -> None:
         """Show a state; one that was not sent yet is replaced."""
         with self._fresh:
-            self._latest = (session, line, poses, told)
+            self._latest = state
             self._fresh.notify()
 
     def close(self) -> None:
@@ -196,15 +234,18 @@ class DrivePage:
             self._fresh.notify()
 
     def _run(self) -> None:
+        seen: Picture | None = None
         while True:
             with self._fresh:
                 self._fresh.wait_for(lambda: self._latest is not None or self._closed)
                 if self._closed or self._latest is None:
                     return
-                (session, line, poses, told), self._latest = self._latest, None
+                state, self._latest = self._latest, None
             with self._client.atomic():
-                if session is not self._shown:
-                    stage, self._shown = session.stage, session
+                if state.session is not self._shown:
+                    stage, self._shown = state.session.stage, state.session
                     self._view.show(World.load(stage.scene_xml, stage.embodiment, visual=True))
-                self._view.move(poses)
-                self._line.content = template("studio_line.html").render(line=line, told=told)
+                self._view.move(state.poses)
+                self._line.content = template("studio_line.html").render(line=state.line, told=state.told)
+                if self._picture is not None and state.picture is not None and state.picture is not seen:
+                    self._picture.image = seen = state.picture

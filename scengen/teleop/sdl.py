@@ -1,11 +1,8 @@
 """Gamepad, keyboard and window by SDL, through pygame: the extra `teleop`."""
 
 import os
-import threading
 from collections.abc import Sequence
-from contextlib import closing
 
-import mujoco
 import numpy as np
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
@@ -14,11 +11,8 @@ os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # a pad is h
 import pygame
 from pygame._sdl2 import controller
 
-from ..envs.observations import cameras_of
-from ..errors import UnknownName
-from ..orientation import UPRIGHT
-from ..pictures.render import Camera, Picture
 from .devices import EndedByOperator
+from .eye import Eye
 from .pad import BUTTONS, CONNECTED, STICKS, TRIGGERS, Pad, PadEvent
 from .session import Session, StateLine
 
@@ -26,8 +20,6 @@ FULL_AXIS = 32767
 """Value of SDL for a fully deflected axis."""
 AXES = (*STICKS, *TRIGGERS)
 """Axes in SDL's order."""
-POLICY_CAMERA = "rgb_exo_right_cam"
-"""Camera of the window for scenarios whose pictures are turned: people see what a policy sees."""
 KEYS: dict[str, tuple[str, float]] = {
     "w": ("lefty", -1.0),
     "s": ("lefty", 1.0),
@@ -175,40 +167,28 @@ class Keyboard(_Sdl):
 
 
 class Window:
-    """Shows the scene as it is driven, and the state line. A thread draws, so that the control loop need not wait."""
+    """Shows the scene as it is driven, and the state line."""
 
     def __init__(self, session: Session, width: int, height: int, camera: str | None):
-        """Open the window.
+        """Open the window with its first picture.
 
         Args:
-            camera: a camera of the robot by the paper's name; by default a view that is fitted to the scene, or the
-                policy's camera if the scenario's pictures are turned.
+            camera: see `Eye`.
 
         Raises:
             UnknownName: there is no such camera.
             NoPictures: OpenGL is missing.
         """
-        known = cameras_of(session.stage.embodiment)
-        if camera is not None and camera not in known:
-            raise UnknownName("camera", camera, known)
-        held = session.stage.scenario.orientation
-        if camera is None and held != UPRIGHT:
-            camera = POLICY_CAMERA
-        self._camera, self._held = known[camera] if camera else None, held if camera else UPRIGHT
+        self._eye = Eye(session, width, height, camera)  # a person could not see what moves before the first picture
         pygame.font.init()
-        self._font = pygame.font.Font(None, 18)
+        self._font, self._height = pygame.font.Font(None, 18), height
         self._surface = pygame.display.set_mode((width, height + LINE_HEIGHT))
         pygame.display.set_caption("scengen teleop")
-        self._size, self._picture = (width, height), np.zeros((height, width, 3), np.uint8)
-        self._stage, self._state, self._fresh = session.stage, _pose(session), threading.Condition()
-        self._fault: BaseException | None = None
-        self._ready = threading.Event()
-        self._open = True
-        self.drawn = 0
+
+    @property
+    def drawn(self) -> int:
         """Number of pictures so far."""
-        self._thread = threading.Thread(target=self._draw, daemon=True)
-        self._thread.start()
-        self._ready.wait()  # the first picture takes seconds, in which a person could not see what moves
+        return self._eye.drawn
 
     def show(self, session: Session) -> None:
         """Show the state of a take, with the latest picture that is ready.
@@ -216,55 +196,15 @@ class Window:
         Raises:
             ScengenError: pictures cannot be drawn.
         """
-        if self._fault is not None:
-            raise self._fault
-        with self._fresh:
-            self._stage, self._state = session.stage, _pose(session)
-            self._fresh.notify()
-        line = session.line
+        self._eye.look(session)
+        line, picture = session.line, self._eye.picture
         self._surface.fill((16, 16, 16))
-        self._surface.blit(pygame.image.frombuffer(self._picture.tobytes(), self._picture.shape[1::-1], "RGB"), (0, 0))
+        self._surface.blit(pygame.image.frombuffer(picture.tobytes(), picture.shape[1::-1], "RGB"), (0, 0))
         colour = {"success": (120, 230, 120), None: (230, 230, 230)}.get(line.outcome, (250, 120, 110))
         for row, text in enumerate((line.text, line.message)):
-            self._surface.blit(self._font.render(text, True, colour), (6, self._size[1] + 4 + 18 * row))
+            self._surface.blit(self._font.render(text, True, colour), (6, self._height + 4 + 18 * row))
         pygame.display.flip()
 
     def close(self) -> None:
-        """End the thread."""
-        with self._fresh:
-            self._open = False
-            self._fresh.notify()
-        self._thread.join()
-
-    def _draw(self) -> None:
-        try:
-            while self._open:
-                stage = self._stage
-                with closing(Camera(stage.world(visual=True), *self._size)) as eye:
-                    while self._open and stage is self._stage:
-                        with self._fresh:
-                            self._fresh.wait(timeout=0.5)
-                            state = self._state
-                        _place(eye, state)
-                        self._picture: Picture = self._held.apply(eye.take(self._camera))
-                        self.drawn += 1
-                        self._ready.set()
-        except BaseException as error:  # the control loop tells it
-            self._fault = error
-            self._ready.set()
-
-
-_Pose = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-def _pose(session: Session) -> _Pose:
-    """Coordinates of everything that a picture shows: those of joints, and places of marks."""
-    data = session.world.data
-    return data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()
-
-
-def _place(eye: Camera, pose: _Pose) -> None:
-    model, data = eye.world.model, eye.world.data
-    data.qpos[:], data.mocap_pos[:], data.mocap_quat[:] = pose
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+        """End the thread that draws."""
+        self._eye.close()

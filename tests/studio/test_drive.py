@@ -1,10 +1,15 @@
 """Driving in a real browser: a scripted gamepad solves a scenario, a lost browser pauses, strangers cannot drive."""
 
 import asyncio
+import base64
+import contextlib
+import io
 import json
 import time
 
+import numpy as np
 import pytest
+from PIL import Image
 
 pytest.importorskip("viser", reason="no viser; it is in the extra studio")
 
@@ -14,14 +19,17 @@ from helpers import REFERENCE
 from pads import Domino
 from studios import running
 
-from scengen import cli
+from scengen import cli, compose, load_task
 from scengen.commands.teleop import source_of_pool
+from scengen.envs.observations import cameras_of
+from scengen.pictures.render import Camera
 from scengen.pool import Pool
 from scengen.pool.demonstrations import Demonstrations
 from scengen.pool.untrusted import Malformed
 from scengen.studio.app import Content
-from scengen.studio.driving import BrowserPad, Driver, _event
-from scengen.teleop.collect import TeleopSettings
+from scengen.studio.driving import PICTURE, BrowserPad, Driver, _event
+from scengen.teleop.collect import Source, TeleopSettings
+from scengen.teleop.eye import POLICY_CAMERA
 from scengen.teleop.pad import PadEvent
 from scengen.teleop.session import ENDED, PAUSED, READY
 
@@ -133,6 +141,39 @@ def test_a_scripted_gamepad_in_the_browser_solves_a_scenario(chromium, opened, t
     assert cli.run(["verify", f"pool={folder}"]) == 0
     (row,) = Demonstrations.open(folder).rows()
     assert row.outcome == "success" and Demonstrations.open(folder).manifest.operator == "op3"
+
+
+def test_a_page_shows_the_picture_that_a_policy_sees_where_it_is_turned(chromium, opened, tmp_path):
+    settings = TeleopSettings(device="browser", n=1, to=str(tmp_path / "driven"))
+    task = load_task("mirror_pick_place")
+    source = Source.of_task(task, compose.certify_levels(task)["quick"], settings)
+    with running(Content(shelf=None, driver=Driver(source, settings))) as studio:
+        tab = opened(studio.address, FAKE_PAD, (800, 600))
+        tab.page.wait_for_selector(".studio-line")
+        tab.wait(lambda: shown_picture(tab.page) is not None and shown_picture(tab.page).std() > 10, "a picture")
+        shown = shown_picture(tab.page)
+        stage = studio.content.driver.session.stage
+    with contextlib.closing(Camera(stage.world(visual=True), *PICTURE)) as camera:
+        plain = camera.take(cameras_of(stage.embodiment)[POLICY_CAMERA]).astype(float)
+    seen = stage.scenario.orientation.apply(plain)
+    assert np.abs(shown - seen).mean() < 5 < np.abs(shown - plain).mean()
+
+
+PIXELS = """image => {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
+    canvas.getContext("2d").drawImage(image, 0, 0);
+    return canvas.toDataURL("image/png").split(",")[1];
+}"""
+
+
+def shown_picture(page):
+    """The picture in the panel; None before the first one."""
+    image = page.locator("img[src^='blob:']").first
+    if not image.count():
+        return None
+    with Image.open(io.BytesIO(base64.b64decode(image.evaluate(PIXELS)))) as picture:
+        return np.asarray(picture.convert("RGB"), float)
 
 
 def solved(driver):
