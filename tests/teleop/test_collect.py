@@ -56,6 +56,18 @@ def test_driven_verified_recorded_curated(made, tmp_path, capsys):
     assert cli.run(["stats", f"data={data}"]) == OK
 
 
+@pytest.mark.slow
+def test_a_policy_that_is_trained_on_driven_episodes_solves_scenarios_that_were_driven(tmp_path):
+    driven, data, policy, results = (tmp_path / name for name in ("driven", "data", "policy", "results"))
+    assert teleop(driven, task=None, pool=REFERENCE, n=6) == OK
+    assert cli.run(["record", f"pool={driven}", f"to={data}", "cameras=none"]) == OK
+    assert cli.run(["curate", f"data={data}"]) == OK
+    assert cli.run(["train", "policy=knn", f"data={data}", f"to={policy}"]) == OK
+    assert cli.run(["evaluate", f"policy={policy}", f"pool={REFERENCE}", "seeds=6", "rollouts=1", f"to={results}"]) == OK
+    _, *episodes = (json.loads(line) for line in (results / "episodes.jsonl").read_text().splitlines())
+    assert len(episodes) == 6 and sum(episode["success"] for episode in episodes) >= 3
+
+
 def test_the_log_of_a_take_drives_the_same_episode_again(made, tmp_path):
     logs = sorted((made / "raw").iterdir())
     assert [path.name for path in logs] == ["00000-00.jsonl", "00001-00.jsonl", "00002-00.jsonl"]
