@@ -20,6 +20,9 @@ Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slo
 * If something stops the plate, or a palm has space beside the table, one arm could lift the rim. So a plate that comes
   within 6 cm of the table's edge is lost, and so is one that knocks against the shelf: only a plate on edge, over the
   slot, may touch it. Nor can the plate be laid down on the shelf, to be taken there by its rim.
+* The paper lets one arm press, so that the plate tilts. A stop beyond its far side and a finger under its rim lift it
+  as well, and so do two jaws that grip opposite sides and squeeze, though each alone slips off. So until the plate has
+  turned by half its incline, a hand may touch no side of it but the one that goes down, nor lift it off the table.
 * The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get
   between the dividers with it. The dividers are lower than the plate, so that the fingers on its upper rim are free.
 * The arm that is farther from the shelf presses. In training that is the right one.
@@ -34,6 +37,7 @@ import mujoco
 import numpy as np
 
 from ..assets.dish import Dish
+from ..assets.prop import TABLE_TOP
 from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, shortest, way_to
@@ -42,7 +46,7 @@ from ..physics import GRAVITY
 from ..robots import panda
 from ..robots.jaw import FINGER_ACROSS, PAD, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import Arm, World
+from ..sim.world import ROBOT, Arm, World
 from ..skills import jaw
 from ..skills.handover import OVERLAP, STAND_OFF, steepness, take_rim
 from ..skills.motion import CLOSED, OPEN, STEADY, Pace, alone, facing_down, go_to, steer, together, until
@@ -59,6 +63,9 @@ from .plate_and_slot import (
 PRESS_OFFSET = 0.008  # distance from the rim's edge at which the rim is pressed [m]
 SHIFT_MARGIN = 0.015
 """Distance that a pressed plate may move to either side [m]: it moves by 4 mm, as it turns about its foot."""
+PRESSED_SHARE = 0.5  # share of its incline by which a pressed plate has turned before any other side is touched
+ROCKING = math.radians(2.0)  # tilt below which a plate lies: a hand that touches it makes it rock [rad]
+OFF_TABLE = 0.004, 0.020  # height of the middle of the foot in which a plate that does not lean is being lifted [m]
 PALM_CLEARANCE = 0.005  # gap between palm and table [m]
 
 
@@ -77,7 +84,23 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
 
     def failure(self, world: World) -> str | None:
         knocked = world.touching("plate", "shelf") and not self.over_slot(world)
-        return super().failure(world) or (Strict("the plate knocked against the shelf") if knocked else None)
+        if lost := super().failure(world):
+            return lost
+        if knocked:
+            return Strict("the plate knocked against the shelf")
+        return Strict("the plate was raised without being pressed") if self.raised_unpressed(world) else None
+
+    def raised_unpressed(self, world: World) -> bool:
+        """Whether a hand raises the plate that has not been turned yet by a hand on the side that goes down."""
+        middle, normal, tilt = world.pos("plate"), world.rot("plate")[:, 2], world.tilt("plate")
+        if tilt > PRESSED_SHARE * self.plate.slope:
+            return False
+        if not world.touching("plate", "table"):
+            low, high = OFF_TABLE
+            return world.touching(ROBOT, "plate") and bool(low < middle[2] - TABLE_TOP < high)
+        down = normal * [1.0, 1.0, 0.0] / max(math.hypot(normal[0], normal[1]), 1e-9)
+        touching = (arm for arm in world.arms if world.touching(arm.label, "plate"))
+        return tilt > ROCKING and any((arm.hand - middle) @ down < self.plate.radius / 2 for arm in touching)
 
     def over_slot(self, world: World) -> bool:
         """Whether the plate is on edge within 30 deg, its middle over the slot or in it."""

@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -19,8 +21,10 @@ from controls import (
 from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.errors import GaveUp
+from scengen.geometry import rotation
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
+from scengen.sim.world import World
 from scengen.tasks.plate_shelf_hobi import OVERLAP, PALM_CLEARANCE, PlateShelfHobi
 
 TASK = load_task("plate_shelf_hobi")
@@ -102,11 +106,47 @@ def test_a_plate_that_falls_back_breaks():
 
 
 def test_two_hands_lift_the_plate_between_them_but_get_no_farther():
-    world = load(TASK, NOMINAL)
-    end = play_shortcut(TASK, NOMINAL, "squeeze_it_between_the_hands", world)
+    """Without the rule on raising they come as far as the shelf."""
+
+    class MayRaise(PlateShelfHobi):
+        def raised_unpressed(self, world):
+            return False
+
+    free = with_values(MayRaise(), values(NOMINAL))
+    world = load(TASK, free)
+    end = play_shortcut(TASK, free, "squeeze_it_between_the_hands", world)
     assert end.reason == "the plate knocked against the shelf"
     assert world.pos("plate")[2] - TABLE_TOP > 0.1
     assert world.touching("robot0", "plate") and world.touching("robot1", "plate")
+    end = play_shortcut(TASK, NOMINAL, "squeeze_it_between_the_hands")
+    assert end.reason == "the plate was raised without being pressed"
+
+
+@pytest.mark.parametrize(
+    ("tilt", "up", "where", "lost"),
+    [
+        (6.0, 0.0, 0.9, False),  # pressed: the hand is on the side that goes down
+        (6.0, 0.0, -0.9, True),
+        (6.0, 0.0, 0.0, True),
+        (1.0, 0.0, -0.9, False),  # it only rocks
+        (15.0, 0.0, -0.9, False),  # it has been pressed
+        (0.0, 0.006, 0.9, True),  # off the table, level
+        (15.0, 0.006, -0.9, False),
+    ],
+)
+def test_a_plate_is_raised_only_once_it_has_been_pressed(tilt, up, where, lost):
+    """A world that holds nothing but the pose of the plate, one hand, and what touches what."""
+    turn, middle = rotation(np.array([math.radians(tilt), 0.0, 0.0])), np.array([0.0, 0.0, TABLE_TOP + up])
+    down = np.array([0.0, -1.0, 0.0])
+    arm = SimpleNamespace(label="robot0", hand=middle + where * PLATE.radius * down)
+    world = SimpleNamespace(
+        arms=(arm,),
+        pos=lambda body: middle,
+        rot=lambda body: turn,
+        tilt=lambda body: math.radians(tilt),
+        touching=lambda a, b: {a, b} != {"plate", "table"} or up == 0.0,
+    )
+    assert NOMINAL.raised_unpressed(cast(World, world)) == lost
 
 
 def test_a_replay_from_a_state_with_the_plate_pressed_ends_in_the_same_bits():
