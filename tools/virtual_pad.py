@@ -67,23 +67,29 @@ class VirtualPad:
 
 
 class _Timed(Session):
-    """A take that remembers when the effect of each event on a stick has been simulated."""
+    """A take that remembers when each event on a stick has become an action, and when that has been simulated."""
 
     def __init__(self, stage: Stage):
         super().__init__(stage)
+        self.acted: dict[float, float] = {}
         self.effects: dict[float, float] = {}
+        self._values: list[float] = []
 
     def tick(self, events=()):
+        self._values = [event.value for event in events if event.control == "leftx"]
         super().tick(events)
-        now = time.perf_counter()
-        self.effects |= {event.value: now for event in events if event.control == "leftx"}
+        self.effects |= dict.fromkeys(self._values, time.perf_counter())
+
+    def _step(self, action):
+        self.acted |= dict.fromkeys(self._values, time.perf_counter())
+        super()._step(action)
 
 
-def measure(seconds: float = DURATION) -> tuple[Timing, list[float]]:
+def measure(seconds: float = DURATION) -> tuple[Timing, list[float], list[float]]:
     """Drive with a virtual pad whose stick moves at random times.
 
     Returns:
-        Times of the loop, and the delays from each event to the end of the control period in which it acted [s].
+        Times of the loop, and the delays from each event to its action, and to the end of that control period [s].
     """
     device = Gamepad()
     pad = VirtualPad()
@@ -107,14 +113,19 @@ def measure(seconds: float = DURATION) -> tuple[Timing, list[float]]:
     drive(session, device, timing)
     thread.join()
     device.close()
-    return timing, [session.effects[value] - at for value, at in sent.items() if value in session.effects]
+    acted, effects = (
+        [found[value] - at for value, at in sent.items() if value in found]
+        for found in (session.acted, session.effects)
+    )
+    return timing, acted, effects
 
 
 def main() -> None:
-    timing, delays = measure()
+    timing, acted, effects = measure()
     print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    print(f"{len(delays)} events of a pad; from the event to the simulated motion, in ms:")
-    print("  median {:.1f}, 95 % {:.1f}, 99 % {:.1f}".format(*(1000 * np.quantile(delays, [0.5, 0.95, 0.99]))))
+    for what, delays in (("its action", acted), ("the simulated motion", effects)):
+        print(f"{len(delays)} events of a pad; from the event to {what}, in ms:")
+        print("  median {:.1f}, 95 % {:.1f}, 99 % {:.1f}".format(*(1000 * np.quantile(delays, [0.5, 0.95, 0.99]))))
     print(f"{len(timing.late)} control periods; delay of their beginning, in ms:")
     late = 1000 * np.quantile(timing.late, [0.5, 0.95, 0.99])
     print("  median {:.2f}, 95 % {:.2f}, 99 % {:.2f}".format(*late))

@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -30,6 +31,8 @@ SCRIPT = "pad.js"
 """File that reads pads and keys in the browser."""
 PICTURE = (320, 240)
 """Size of the picture that shows what a policy sees [pixels]."""
+LINE_PERIOD = 0.1
+"""Time between two updates of the state line [s]: drawing text costs a browser as much as moving bodies."""
 PICTURES_PER_SECOND = 10.0
 """Rate of these pictures: drawn in software they must leave time for the control loop."""
 
@@ -235,6 +238,7 @@ class DrivePage:
 
     def _run(self) -> None:
         seen: Picture | None = None
+        due, said = 0.0, ("", "")
         while True:
             with self._fresh:
                 self._fresh.wait_for(lambda: self._latest is not None or self._closed)
@@ -246,6 +250,8 @@ class DrivePage:
                     stage, self._shown = state.session.stage, state.session
                     self._view.show(World.load(stage.scene_xml, stage.embodiment, visual=True))
                 self._view.move(state.poses)
-                self._line.content = template("studio_line.html").render(line=state.line, told=state.told)
+                if time.monotonic() >= due or (state.line.phase, state.told) != said:
+                    due, said = time.monotonic() + LINE_PERIOD, (state.line.phase, state.told)
+                    self._line.content = template("studio_line.html").render(line=state.line, told=state.told)
                 if self._picture is not None and state.picture is not None and state.picture is not seen:
                     self._picture.image = seen = state.picture

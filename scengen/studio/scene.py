@@ -1,7 +1,9 @@
 """Scenes in three dimensions: bodies of MuJoCo as meshes in the browser, moved by their poses."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -30,6 +32,15 @@ SHOWN_GROUPS = 3
 """Number of MuJoCo's geom groups that are shown, from 0: those of pictures."""
 GRID = 2.0**-12
 """Distance of the places that vertices of meshes can have [m]: 0.24 mm, which nobody sees."""
+ROBOT_SHARE = 0.08
+"""Share of the triangles of large parts of the robot that is shown. Its surface moves by some 2 mm at most, and a
+browser that draws in software gets through four times as many pictures (`tools/studio_speed.py`)."""
+SMALL_PART = 200
+"""Number of triangles up to which a part of the robot is shown as it is."""
+PEDESTAL = "pedestal"
+"""Part of the name of the body that is a pedestal."""
+PEDESTAL_GRID = 2.0**-6
+"""The same as `GRID` for a pedestal [m]: 16 mm. Its plates have gaps, over which edges cannot be collapsed."""
 STILL = 1e-5
 """Smallest change of a pose that is sent [m, and of a quaternion]."""
 FRAME_PERIODS = 4
@@ -122,7 +133,7 @@ class SceneView:
             faces := sum(_faces(world.model, geom) for body in bodies for geom in _shown(world.model, body))
         ) > MAX_FACES:
             raise PoolError(f"the scene has {faces} triangles; at most {MAX_FACES} are shown")
-        meshes = {body: _meshes(world.model, body) for body in bodies}
+        meshes = {body: _meshes(world.model, body, _simplification(world, body)) for body in bodies}
         self.clear()
         self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
         poses = poses_of(world)
@@ -161,7 +172,19 @@ class SceneView:
         self._frames, self._sent = {}, None
 
 
-def _meshes(model: mujoco.MjModel, body: int) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
+Simplification = Callable[[trimesh.Trimesh], trimesh.Trimesh]
+
+
+def _simplification(world: World, body: int) -> Simplification:
+    """How meshes of a body are simplified: things keep their shapes."""
+    if body not in world.own:
+        return partial(_rounded, grid=GRID)
+    return partial(_rounded, grid=PEDESTAL_GRID) if PEDESTAL in world.model.body(body).name else _with_fewer_triangles
+
+
+def _meshes(
+    model: mujoco.MjModel, body: int, simplification: Simplification
+) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
     """The visible geoms of a body in its axes, joined by colour."""
     found: dict[bytes, list[trimesh.Trimesh]] = {}
     for geom in _shown(model, body):
@@ -172,19 +195,32 @@ def _meshes(model: mujoco.MjModel, body: int) -> list[tuple[trimesh.Trimesh, NDA
             mesh.apply_transform(transform)
             found.setdefault(np.round(_colour(model, geom), 3).astype(np.float32).tobytes(), []).append(mesh)
     joined = ((trimesh.util.concatenate(parts), np.frombuffer(key, np.float32)) for key, parts in found.items())
-    return [(_simplified(mesh), colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
+    return [(simplification(mesh), colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
 
 
-def _simplified(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """A mesh with vertices on a fine grid, each once, and without the triangles that vanish.
+def _rounded(mesh: trimesh.Trimesh, grid: float) -> trimesh.Trimesh:
+    """A mesh with vertices on a grid, each once, and without the triangles that vanish.
 
     MuJoCo repeats a vertex for each of its normals, which flat shading does not need. A robot becomes half as large,
     and on a grid of binary fractions it compresses to 0.55 of what it would otherwise.
     """
-    mesh = trimesh.Trimesh(np.round(mesh.vertices / GRID) * GRID, mesh.faces, process=False)
+    mesh = trimesh.Trimesh(np.round(mesh.vertices / grid) * grid, mesh.faces, process=False)
     mesh.merge_vertices()
     mesh.update_faces(mesh.nondegenerate_faces())
     return mesh
+
+
+def _with_fewer_triangles(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """A mesh of the robot, its large parts by collapsed edges."""
+    parts = [
+        part
+        if len(part.faces) <= SMALL_PART
+        else part.simplify_quadric_decimation(
+            face_count=max(SMALL_PART, int(ROBOT_SHARE * len(part.faces))), aggression=4
+        )
+        for part in _rounded(mesh, GRID).split(only_watertight=False)
+    ]
+    return _rounded(cast(trimesh.Trimesh, trimesh.util.concatenate(parts)), GRID)
 
 
 def _shown(model: mujoco.MjModel, body: int) -> Iterator[int]:

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -77,7 +78,8 @@ def test_the_first_browser_plugs_the_pad_in_and_the_last_one_out():
             yield '["leftx", 0.5]'
             yield '["a", 1]'
 
-    asyncio.run(pad.serve(Connection()))
+    with ThreadPoolExecutor(1) as thread:  # an open browser keeps the loop of this thread running
+        thread.submit(asyncio.run, pad.serve(Connection())).result()
     events = pad.read(None)
     assert events[:3] == [PadEvent("connected", 1.0), PadEvent("leftx", 0.5), PadEvent("a", 1.0)]
     assert PadEvent("leftx", 0.0) in events and events[-1] == PadEvent("connected", 0.0)
