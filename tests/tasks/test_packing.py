@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scengen import load_task
 from scengen.assets import guillotine
 from scengen.params import values, with_values
+from scengen.scenario import Strict
 from scengen.tasks.packing import Packing, Spot
 
 TASK = load_task("packing")
@@ -121,6 +122,30 @@ def test_a_piece_on_the_table_beside_the_bin_does_not_count_and_one_below_the_ta
     world.data.joint("piece_0_free").qpos[:3] = [0.0, 0.6, 0.7]
     world.loop.restore(world.loop.state())
     assert scenario.failure(world) == "a piece fell off the table"
+
+
+def touching_in_the_bin(scenario, world, i, shift, turn):
+    """The verdict when piece `i` has touched the floor in its slot, and then at a shift [m] and a turn [rad]."""
+    for off, yaw in ((0.0, 0.0), (shift, turn)):
+        (x, y, z), right = scenario.goal(i)
+        place = world.data.joint(f"piece_{i}_free").qpos
+        place[:3] = [x + off, y, z]
+        place[3:] = [np.cos((right + yaw) / 2), 0.0, 0.0, np.sin((right + yaw) / 2)]
+        world.loop.restore(world.loop.state())
+        for _ in range(2):  # events see the contacts of the period before
+            with world.events():
+                scenario.events(world)
+            world.apply(world.idle)
+    return scenario.failure(world)
+
+
+@pytest.mark.parametrize(
+    ("shift", "turn", "lost"), [(0.0, 0.0, False), (0.5, 0.0, False), (1.2, 0.0, True), (0.0, math.pi / 2, True)]
+)
+def test_a_piece_that_touched_the_bin_may_be_shifted_by_half_a_unit_and_not_tried_elsewhere(shift, turn, lost):
+    world = load(TASK, NOMINAL)
+    verdict = touching_in_the_bin(NOMINAL, world, 1, shift * NOMINAL.unit, turn)
+    assert (verdict == "a piece was tried in a second place" and isinstance(verdict, Strict)) == lost
 
 
 # --- plans -------------------------------------------------------------------------------
