@@ -18,6 +18,8 @@ Decisions, where the paper (App. B, T08) says no more than "a horizontal slot fi
   slot's wall stops the cup while the box has 1 to 2 cm left to fall.
 * If a corner of the box goes down faster than 0.35 m/s, as of a box that falls from 6 mm, its crackers break and the
   episode is lost: neither knocking it over nor dropping it is a way. No hand lowers anything faster than 0.3 m/s.
+* A small box that is held by its top in the air stays on the cup: laid askew on the slot's walls and let go, it shows
+  its broad face upwards. So a box that leans or lies anywhere but in the slot may not be let go.
 * One arm, as in the catalogue (App. B.1); the text has a second one, which is frozen.
 """
 
@@ -37,7 +39,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import Arm, World
+from ..sim.world import ROBOT, Arm, World
 from ..skills.jaw import poke
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, push, retreat, turn_to, until
 from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
@@ -45,6 +47,9 @@ from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 
 SEAT_TOLERANCE = 0.006  # largest distance of the box' middle from its seat along the table [m]
 MAX_FALL_SPEED = 0.35  # speed of a corner on its way down above which the crackers break [m/s]
+LEANING = math.radians(30.0)  # tilt above which a box does not stand [rad]
+REST_SPEED = 0.05  # speed of a corner on its way down below which a box does not fall [m/s]
+SEATED = 0.03, 0.010  # distances from its seat, along the table and in height, within which a box is in the slot [m]
 GRIP_SHARE = 0.6
 """Share of the box' height at which the cup takes it. It is so high that links 6 and 7, which reach 47 mm below the
 middle of a level cup, pass over the slot, and so low that the box slides along: it tips where the friction exceeds
@@ -81,7 +86,16 @@ class CrackerBoxSuction(BoxAndSlot):
     def failure(self, world: World) -> str | None:
         if fallen(world, "box"):
             return "the box fell off the table"
-        return Strict("the box was dropped") if self.fall_speed(world) > MAX_FALL_SPEED else None
+        if self.fall_speed(world) > MAX_FALL_SPEED:
+            return Strict("the box was dropped")
+        return Strict("the box was laid down beside its seat") if self.laid_elsewhere(world) else None
+
+    def laid_elsewhere(self, world: World) -> bool:
+        """Whether the box rests, let go, where it neither stands nor lies in the slot."""
+        if world.tilt("box") < LEANING or world.touching(ROBOT, "box") or not world.touching_bodies("box"):
+            return False
+        off, (aside, high) = world.com("box") - self.seat, SEATED
+        return self.fall_speed(world) < REST_SPEED and (math.hypot(off[0], off[1]) > aside or abs(off[2]) > high)
 
     def fall_speed(self, world: World) -> float:
         """Speed of the box' fastest corner on its way down [m/s]."""
