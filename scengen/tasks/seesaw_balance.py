@@ -11,7 +11,9 @@ The seesaw is a balance, not a plank on an edge (assets/seesaw.py): between stop
 the excess moment. The counterweight may stand within tan(5 deg) * stiffness / (its mass), in training some 5 to 8 mm,
 of the balancing place, which can be anywhere on an arm of 0.36 m. Chance, for a policy that sees the geometry and knows
 how masses are distributed: the best single guess levels the deck in 7 % of training, one of three guesses in 19 %.
-Weighing the counterweight does not help.
+Weighing the counterweight alone does not help. A hand with a sense of force finds the place without a trial in half of
+training: it presses the raised arm down until the deck is level, and weighs the counterweight (docs/cheats.md). So the
+task asks for a torque balance, by trial or by feel.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 
