@@ -21,6 +21,8 @@ Decisions, where the paper (App. B, T07) says no more than "bowl", "rack" and "g
   that is put down on its side rocks upright by itself. Here such an accident ends the episode: while the bowl leans by
   more than 30 deg, only hands may touch it, except for the rack in which it is upside down. A bowl that falls faster
   than 0.40 m/s, as from 8 mm, breaks.
+* A bowl that the cup lays on two open fingers rolls upright between them, and the cup eases it down to the table. So
+  while the opening looks up from the side, by more than a cup can turn it, the rim is between the closed fingers.
 * The paper ships two sizes of bowls and gives no lengths. Training has soup bowls; larger and smaller ones are axes.
 
 The oracle reads the place of the rim and the bowl's tilt when it needs them: the bowl shifts on the cup by millimetres
@@ -57,6 +59,8 @@ from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_t
 UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a bowl that stands [rad]
 FALL_ANGLE = math.radians(30.0)
 """Largest tilt of a bowl that may touch anything but a hand [rad]: it tips over at 35 deg and more."""
+TURNED_UP = math.radians(75.0)  # largest tilt of a bowl that only the jaw can have turned: the cup gets to 85 deg [rad]
+RIM_REACH = 0.015  # largest distance of the rim from the grip site of a jaw that holds it [m]
 MAX_FALL_SPEED = 0.40  # speed of a fall above which the bowl breaks [m/s]
 RIM_CLEARANCE = 0.004  # gap between the rim and the ring [m]
 DOME_CLEARANCE = 0.012
@@ -124,7 +128,17 @@ class BowlTable(Scenario):
         touched, tilt = world.touching_bodies("bowl") - {ROBOT}, world.tilt("bowl")
         stored = touched == {"rack"} and tilt > math.pi - FALL_ANGLE
         askew = touched and tilt > FALL_ANGLE and not stored
-        return Strict("the bowl lay on its side or upside down") if askew else None
+        if askew:
+            return Strict("the bowl lay on its side or upside down")
+        loose = FALL_ANGLE < tilt < TURNED_UP and not self.rim_held(world)
+        return Strict("the bowl was turned up without the jaw on its rim") if loose else None
+
+    def rim_held(self, world: World) -> bool:
+        """Whether the rim is between the closed fingers of the jaw."""
+        jaw_arm = world.arms[1]
+        x, y, z = world.rot("bowl").T @ (jaw_arm.hand - world.pos("bowl"))
+        away = math.hypot(math.hypot(x, y) - self.bowl.radius + self.bowl.bead / 2, z - self.bowl.depth)
+        return away < RIM_REACH and self.bowl.bead / 2 < jaw_arm.gap < self.bowl.bead + RIM_REACH
 
     # --- oracle ---------------------------------------------------------------------------
 
