@@ -141,7 +141,13 @@ class PickPlaceYcb(Scenario):
     def _bring_near(self, world: World) -> Plan:
         """Carry the object above the square as it is now, until the square jumps."""
         spot = world.pos("patch")
-        yield from self.bring(world, spot, ends=lambda: math.dist(world.pos("patch"), spot) > 0.0)
+
+        def jumped() -> bool:
+            return math.dist(world.pos("patch"), spot) > 0.0
+
+        yield from self.bring(world, spot, ends=jumped)
+        if not jumped():
+            yield world.arm.idle  # who believes in a jump that does not come waits until the time is over
 
     def bring(self, world: World, spot: Vec3, height: float = CARRY_HEIGHT, ends: Condition = lambda: False) -> Plan:
         """Carry the object above a place on the table, at a height above where it stood [m]."""
