@@ -64,8 +64,8 @@ FLAT_TOLERANCE = math.radians(2.0)
 FLOOR_TOLERANCE = 0.0015
 """Largest height of the foot of a piece above the bin's floor at which the piece lies on it [m]."""
 MAX_TURN = math.radians(45.0)
-"""Largest turn of a piece after its first touch in the bin [rad]; the largest shift is a unit. Walls and neighbours
-shift a piece by half a unit. Another slot is farther away, or a quarter turn."""
+"""Largest turn of a piece after its first touch in the bin [rad]; the largest shift is a unit. Under jitter, walls and
+neighbours shift a piece by more than 0.75 units. Another slot is farther away, or a quarter turn."""
 MIN_CLEARANCE = 0.008
 """Least distance of two bodies on the table at the start [m]: a cup may be a little off, a piece a little turned."""
 CARRY_HEIGHT = 0.05  # height above the table at which pieces are carried [m], twice the height of bin and pieces
