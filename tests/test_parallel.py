@@ -3,6 +3,7 @@
 import errno
 import math
 import os
+import resource
 import shlex
 import signal
 import subprocess
@@ -163,6 +164,19 @@ def test_a_lack_of_memory_that_comes_from_outside_is_not_the_fault_of_an_item(mo
 
 def hungry(item):
     raise MemoryError
+
+
+@pytest.mark.skipif(not machine.LINUX, reason="limits are those of Linux")
+def test_threads_that_limit_memory_at_the_same_time_leave_no_limit_behind():
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    first, second = machine.memory_bounded(10**9), machine.memory_bounded(2 * 10**9)
+    first.__enter__()
+    second.__enter__()
+    assert resource.getrlimit(resource.RLIMIT_AS) != before
+    first.__exit__(None, None, None)
+    assert resource.getrlimit(resource.RLIMIT_AS) != before
+    second.__exit__(None, None, None)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 def test_without_what_only_linux_has_work_is_done_all_the_same(monkeypatch):

@@ -134,20 +134,16 @@ class PickPlaceYcb(Scenario):
     def oracle(self, world: World) -> Plan:
         """Pick the object up, follow the square until it is locked, put the object down on it."""
         yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
-        while world.memory["jumps"] < self.jumps:
+        while (before := world.memory["jumps"]) < self.jumps:
             yield from self._bring_near(world)
+            if world.memory["jumps"] == before:
+                yield world.arm.idle  # who believes in a jump that does not come waits until the time is over
         yield from self.set_down(world, world.pos("patch"))
 
     def _bring_near(self, world: World) -> Plan:
         """Carry the object above the square as it is now, until the square jumps."""
         spot = world.pos("patch")
-
-        def jumped() -> bool:
-            return math.dist(world.pos("patch"), spot) > 0.0
-
-        yield from self.bring(world, spot, ends=jumped)
-        if not jumped():
-            yield world.arm.idle  # who believes in a jump that does not come waits until the time is over
+        yield from self.bring(world, spot, ends=lambda: math.dist(world.pos("patch"), spot) > 0.0)
 
     def bring(self, world: World, spot: Vec3, height: float = CARRY_HEIGHT, ends: Condition = lambda: False) -> Plan:
         """Carry the object above a place on the table, at a height above where it stood [m]."""

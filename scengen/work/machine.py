@@ -9,6 +9,7 @@ import math
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -112,20 +113,56 @@ def bound_memory(megabytes: int) -> bool:
 def memory_bounded(more: int) -> Iterator[None]:
     """Limit the memory that this process may take in addition to what it has during a `with` statement.
 
+    Threads may be in such statements at the same time. The latest one sets the limit; the last to leave lifts it.
+
     Args:
         more: the limit [bytes].
     """
     if not LINUX:
         yield
         return
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    taken = _address_space()
-    bound = taken + more if soft == resource.RLIM_INFINITY else min(soft, taken + more)
-    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+    _BOUNDING.enter(more)
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+        _BOUNDING.leave()
+
+
+class _Bounding:
+    """The limit that the threads of this process share, and the limits before it."""
+
+    def __init__(self) -> None:
+        self._lock, self._inside = threading.Lock(), 0
+        self._before = (0, 0)
+
+    def enter(self, more: int) -> None:
+        with self._lock:
+            if not self._inside:
+                self._before = resource.getrlimit(resource.RLIMIT_AS)
+            self._inside += 1
+            soft, hard = self._before
+            bound = _address_space() + more
+            resource.setrlimit(
+                resource.RLIMIT_AS, (bound if soft == resource.RLIM_INFINITY else min(soft, bound), hard)
+            )
+
+    def leave(self) -> None:
+        with self._lock:
+            if self._inside:  # a process that began within a statement has left it already
+                self._inside -= 1
+                if not self._inside:
+                    resource.setrlimit(resource.RLIMIT_AS, self._before)
+
+    def leave_all(self) -> None:
+        """Lift the limit in a new process, whose only thread is in no such statement but its parent's were."""
+        if self._inside:
+            resource.setrlimit(resource.RLIMIT_AS, self._before)
+        self._lock, self._inside = threading.Lock(), 0
+
+
+_BOUNDING = _Bounding()
+if LINUX:
+    os.register_at_fork(after_in_child=_BOUNDING.leave_all)
 
 
 def _address_space() -> int:

@@ -152,12 +152,14 @@ def test_a_piece_that_touched_the_bin_may_be_shifted_by_half_a_unit_and_not_trie
 
 
 @pytest.mark.parametrize("split", ["id", "four_pieces"])
-def test_shortcuts_are_played_to_their_end_and_leave_gaps(split):
+def test_shortcuts_leave_gaps_or_try_a_piece_twice(split):
     scenario = TASK.draw(split, 0, 0).scenario
     world = load(TASK, scenario)
     for name in scenario.shortcuts():
         rollout = play_shortcut(TASK, scenario, name, world)
-        assert rollout.reason == "everything came to rest without reaching the goal"
+        if rollout.reason != "everything came to rest without reaching the goal":
+            assert rollout.reason == "a piece was tried in a second place"
+            continue
         gap = free(scenario, world) - joints(scenario)
         assert gap > 0.9 * min(piece.area for piece in scenario.pieces)
         assert name != "all_but_one" or gap == pytest.approx(scenario.pieces[-1].area)
