@@ -36,10 +36,9 @@ class Eye:
         known = cameras_of(session.stage.embodiment)
         if camera is not None and camera not in known:
             raise UnknownName("camera", camera, known)
-        held = session.stage.scenario.orientation
-        if camera is None and held != UPRIGHT:
+        if camera is None and session.stage.scenario.orientation != UPRIGHT:
             camera = POLICY_CAMERA
-        self._camera, self._held = known[camera] if camera else None, held if camera else UPRIGHT
+        self._camera = known[camera] if camera else None
         self._size, self._least = (width, height), 1.0 / rate
         self.picture: Picture = np.zeros((height, width, 3), np.uint8)
         """The latest picture, RGB, shape (height, width, 3)."""
@@ -80,11 +79,12 @@ class Eye:
         try:
             while self._open:
                 stage = self._stage
+                held = stage.scenario.orientation if self._camera else UPRIGHT
                 with closing(Camera(stage.world(visual=True), *self._size)) as eye:
                     while self._open and stage is self._stage:
                         begun = time.monotonic()
                         _place(eye, self._state)
-                        self.picture = self._held.apply(eye.take(self._camera)).copy()
+                        self.picture = held.apply(eye.take(self._camera)).copy()
                         self.drawn += 1
                         self._ready.set()
                         with self._fresh:
