@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from arguments import parted
 from paper_page import failures
 
 from scengen import cli, list_tasks, load_task
@@ -25,6 +26,8 @@ SEED = 4242
 """Seed of the draws and of the attack."""
 FOLDERS = {STRICT: Path("records/attacks"), PAPER: Path("records/attacks/paper")}
 """Folders of the reports, by the rules of the episodes."""
+HITS = {STRICT: Path("generated/attack"), PAPER: Path("generated/attack/paper")}
+"""Folders of the hits and logs, likewise."""
 PAGE = Path("docs/attacks.md")
 HEAD = f"""# Every task, attacked
 
@@ -71,19 +74,14 @@ COLUMNS = (
 
 def main(budget: str, *others: str) -> None:
     """Attack all tasks, or some, and write the page."""
-    options = dict(other.split("=", 1) for other in others if "=" in other)
-    rules, workers = check_rules(options.pop("rules", STRICT)), options.pop("workers", "2")
-    if options:
-        sys.exit(f"attack_all: {', '.join(options)} is no option; there are rules= and workers=")
+    names, options = parted(others, "rules", "workers")
+    rules, workers = check_rules(options.get("rules", STRICT)), options.get("workers", "2")
     FOLDERS[rules].mkdir(parents=True, exist_ok=True)
     refuted = []
-    for task in [other for other in others if "=" not in other] or list_tasks():
+    for task in names or list_tasks():
         if rules == PAPER and not has_strict_rules(task):
             continue
-        target, folder = (
-            FOLDERS[rules] / f"{task}.json",
-            Path("generated", "attack", *([PAPER] * (rules == PAPER)), task),
-        )
+        target, folder = FOLDERS[rules] / f"{task}.json", HITS[rules] / task
         argv = (f"task={task}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", f"rules={rules}")
         status = cli.run(("attack", *argv, f"workers={workers}", f"json={target}", f"to={folder}"))
         if status and rules == STRICT:

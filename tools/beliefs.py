@@ -10,10 +10,11 @@ rollouts, about a second of processor time. `python tools/all_axes.py page` writ
 import sys
 from collections.abc import Iterator
 
+from arguments import parted
 from axis_records import BELIEFS, ROOT, read, store
 
 from scengen import list_tasks, load_task
-from scengen.errors import ScengenError, nearest
+from scengen.errors import ScengenError
 from scengen.ood.behaviour import Trials
 from scengen.ood.belief import measure_belief
 from scengen.samplers.task import Task
@@ -27,11 +28,8 @@ TWINS = 8
 
 def main(*arguments: str) -> None:
     """Play what is missing."""
-    given = dict(argument.split("=", 1) for argument in arguments if "=" in argument)
-    if unknown := given.keys() - {"n", "workers"}:
-        sys.exit(f"no setting named {min(unknown)!r}{nearest(min(unknown), ('n', 'workers'))}; known: n, workers")
+    names, given = parted([argument for argument in arguments if argument != "fresh"], "n", "workers")
     n, workers = int(given.get("n", TWINS)), int(given.get("workers", 1))
-    names = [argument for argument in arguments if "=" not in argument and argument != "fresh"]
     failed = []
     for task, axis in wanted(names, n, fresh="fresh" in arguments):
         try:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from arguments import parted
 
 from scengen import compose, list_tasks, load_task
 from scengen.envs.agreement import compare_all
@@ -70,11 +71,9 @@ def feasible(task: Task, split: str, draws: int) -> Iterator[Scenario]:
 
 def main(n: str, *others: str) -> None:
     """Measure the splits, and write after each one, so that several processes may share the tasks."""
-    options = dict(other.split("=") for other in others if "=" in other)
-    wanted, draws, replays = (options.pop(name, None) for name in ("split", "draws", "replays"))
-    if options:
-        sys.exit(f"certified: {', '.join(options)} is no option; there are split=, draws= and replays=")
-    for name in [other for other in others if "=" not in other] or list_tasks():
+    names, options = parted(others, "split", "draws", "replays")
+    wanted, draws, replays = (options.get(name) for name in ("split", "draws", "replays"))
+    for name in names or list_tasks():
         task = load_task(name)
         for split in wanted.split(",") if wanted else (ID, *task.axes):
             asked = int(n), int(draws or 100), int(replays or 3)

@@ -4,15 +4,14 @@ Printed are the time from the address to the first words about a scenario, and, 
 480, the pictures that the browser draws in a second and the times of the control loop.
 """
 
-import contextlib
 import os
-import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
+from browser import ARGUMENTS, PAD, installed
 from playwright.sync_api import Page, sync_playwright
 
 from scengen.analysis.redraw import task_of
@@ -24,38 +23,22 @@ from scengen.studio.driving import Driver
 from scengen.task_files import search_path
 from scengen.teleop.collect import TeleopSettings
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-ARGUMENTS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+HOST = "127.0.0.1"
 SIZE = (640, 480)
 """Size of the page [pixels]."""
 DURATION = 10.0
 """Duration of driving [s]."""
 OPENINGS = 5
 """How often the page is opened."""
-PAD = """
-window.pad = {mapping: "standard", connected: true, axes: [0, 0, 0, 0],
-              buttons: Array.from({length: 17}, () => ({value: 0}))};
-navigator.getGamepads = () => [window.pad];
-"""
-"""A gamepad that the program moves."""
 COUNTER = "window.drawn = 0; (function next() { window.drawn++; requestAnimationFrame(next); })();"
 """Counts the pictures that the browser draws."""
-
-
-@contextlib.contextmanager
-def running(content: Content) -> Iterator[Studio]:
-    """A studio that is closed at the end."""
-    studio = Studio(content, "127.0.0.1", 8090)
-    try:
-        yield studio
-    finally:
-        studio.close()
 
 
 def openings(pool: Pool, page: Page) -> list[float]:
     """Times from the address to the first words about a scenario [s]."""
     found = []
-    with running(Content(Shelf([pool], {str(pool.folder): task_of(pool, search_path(()))}))) as studio:
+    shelf = Shelf([pool], {str(pool.folder): task_of(pool, search_path(()))})
+    with closing(Studio(Content(shelf), HOST, 0)) as studio:
         for _ in range(OPENINGS):
             begun = time.perf_counter()
             page.goto(studio.address)
@@ -68,9 +51,8 @@ def openings(pool: Pool, page: Page) -> list[float]:
 def driven(pool: Pool, page: Page, folder: Path) -> tuple[float, str]:
     """Pictures per second while the robot moves, and the times of the control loop in words."""
     settings = TeleopSettings(device="browser", n=1, to=str(folder))
-    with running(Content(None, driver=Driver(source_of_pool(pool, (), None), settings))) as studio:
-        driver = studio.content.driver
-        assert driver is not None
+    driver = Driver(source_of_pool(pool, (), None), settings)
+    with closing(Studio(Content(None, driver=driver), HOST, 0)) as studio:
         page.goto(studio.address)
         page.wait_for_selector(".studio-line", timeout=60_000)
         page.wait_for_timeout(3000)
@@ -96,8 +78,7 @@ def main(pool: str = "generated/reference") -> None:
     """Measure and print."""
     print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with sync_playwright() as player, tempfile.TemporaryDirectory() as folder:
-        found = next(filter(None, map(shutil.which, BROWSERS)), None)
-        browser = player.chromium.launch(executable_path=found, args=ARGUMENTS)
+        browser = player.chromium.launch(executable_path=installed(), args=ARGUMENTS)
         page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         page.add_init_script(PAD)
         opened = Pool.open(pool).check()

@@ -162,10 +162,8 @@ def _axes(task: Task) -> Iterator[str]:
 def _attacks(task: Task) -> Iterator[str]:
     """Results of the adversary."""
     yield from ("## Attacks", "")
-    yield from list(_measured(ATTACKS, task)) or (
-        "The adversary in its present form has not attacked this task yet.",
-        "",
-    )
+    found = list(_measured(ATTACKS, task))
+    yield from found or ("The adversary in its present form has not attacked this task yet.", "")
 
 
 def _measured(page: Path, task: Task) -> Iterator[str]:

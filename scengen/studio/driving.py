@@ -31,10 +31,10 @@ SCRIPT = "pad.js"
 """File that reads pads and keys in the browser."""
 PICTURE = (320, 240)
 """Size of the picture that shows what a policy sees [pixels]."""
-LINE_PERIOD = 0.1
-"""Time between two updates of the state line [s]: drawing text costs a browser as much as moving bodies."""
 PICTURES_PER_SECOND = 10.0
 """Rate of these pictures: drawn in software they must leave time for the control loop."""
+LINE_PERIOD = 0.1
+"""Time between two updates of the state line [s]: drawing text costs a browser as much as moving bodies."""
 
 
 class BrowserPad:

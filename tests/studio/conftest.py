@@ -1,13 +1,10 @@
 """A headless Chromium. Tests are skipped only where there is no browser."""
 
 import importlib.util
-import shutil
 
 import pytest
+from browser import ARGUMENTS, installed
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""Chromium as root and without a graphics card."""
 PATIENCE = 120_000
 """Longest wait for the page [ms]: two cores draw it in software, beside other work."""
 
@@ -20,7 +17,7 @@ def chromium():
     from playwright.sync_api import Error, sync_playwright
 
     with sync_playwright() as player:
-        found = next(filter(None, map(shutil.which, BROWSERS)), None)
+        found = installed()
         try:
             browser = player.chromium.launch(executable_path=found, args=ARGUMENTS)
         except Error:

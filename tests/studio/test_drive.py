@@ -16,6 +16,7 @@ pytest.importorskip("viser", reason="no viser; it is in the extra studio")
 
 import websockets.exceptions
 import websockets.sync.client
+from browser import PAD
 from helpers import REFERENCE
 from pads import Domino
 from studios import running
@@ -34,12 +35,6 @@ from scengen.teleop.eye import POLICY_CAMERA
 from scengen.teleop.pad import PadEvent
 from scengen.teleop.session import ENDED, PAUSED, READY
 
-FAKE_PAD = """
-window.pad = {mapping: "standard", connected: true, axes: [0, 0, 0, 0],
-              buttons: Array.from({length: 17}, () => ({value: 0}))};
-navigator.getGamepads = () => [window.pad];
-"""
-"""A gamepad that the test moves."""
 BUTTONS = ["a", "b", "x", "y", "leftshoulder", "rightshoulder", "lefttrigger", "righttrigger", "back", "start"]
 AXES = ["leftx", "lefty", "rightx", "righty"]
 
@@ -117,7 +112,7 @@ def test_a_scripted_gamepad_in_the_browser_solves_a_scenario(chromium, opened, t
     folder = tmp_path / "driven"
     with running(content_of(folder)) as studio:
         driver = studio.content.driver
-        tab = opened(studio.address, FAKE_PAD, (400, 300))  # small pictures leave the time to drive
+        tab = opened(studio.address, PAD, (400, 300))  # small pictures leave the time to drive
         page = tab.page
         page.wait_for_selector(".studio-line")
         tab.wait(lambda: bool(driver.session.pad["connected"]), "a pad")
@@ -150,7 +145,7 @@ def test_a_page_shows_the_picture_that_a_policy_sees_where_it_is_turned(chromium
     task = load_task("mirror_pick_place")
     source = Source.of_task(task, compose.certify_levels(task)["quick"], settings)
     with running(Content(shelf=None, driver=Driver(source, settings))) as studio:
-        tab = opened(studio.address, FAKE_PAD, (800, 600))
+        tab = opened(studio.address, PAD, (800, 600))
         tab.page.wait_for_selector(".studio-line")
         tab.wait(lambda: shown_picture(tab.page) is not None and shown_picture(tab.page).std() > 10, "a picture")
         shown = shown_picture(tab.page)
