@@ -218,7 +218,7 @@ def _with_fewer_triangles(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
         else part.simplify_quadric_decimation(
             face_count=max(SMALL_PART, int(ROBOT_SHARE * len(part.faces))), aggression=4
         )
-        for part in _rounded(mesh, GRID).split(only_watertight=False)
+        for part in _rounded(mesh, GRID).split(only_watertight=False, repair=False)
     ]
     return _rounded(cast(trimesh.Trimesh, trimesh.util.concatenate(parts)), GRID)
 
