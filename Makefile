@@ -53,7 +53,7 @@ wheel:
 slow: setup
 	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "slow and not long"
 
-# Tests that take 10 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
+# Tests that take 7 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
 long: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m long
 

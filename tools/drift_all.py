@@ -2,9 +2,10 @@
 
     python tools/drift_all.py 2 POOLS 3.5.0,4.0.0 [task ...]
 
-Pools are in POOLS/<task>; missing ones are generated. Results are stored in records/drift, in one folder for each set
-of versions. A task whose pool has been compared is left out: the command can be interrupted and repeated. Tasks that
-were never compared have no line.
+N training scenarios of each task are compared, and two of an axis: the paper's where the task has one, else its first.
+Their pools are POOLS/<task> and POOLS/<task>-<axis>; missing ones are generated. Results are stored in records/drift,
+in one folder for each set of versions. A task whose pools have been compared is left out: the command can be
+interrupted and repeated. Tasks that were never compared have no line.
 """
 
 import json
@@ -13,12 +14,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from scengen import cli, list_tasks
+from scengen import cli, list_tasks, load_task
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.pool import Pool
 from scengen.pool.manifest import MANIFEST
+from scengen.samplers.split import ID
 
+OOD = 2
+"""Number of scenarios of an axis."""
 LEVEL = "recheck"
 """Level of the checks."""
 FOLDER = Path("records/drift")
@@ -26,9 +30,10 @@ FOLDER = Path("records/drift")
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
-Written by `make drift`: the results of `scengen drift` on training scenarios of every task. Each version of MuJoCo has
-an environment of its own, made by venv and pip and kept in `~/.cache/scengen`. Everything else in it (Python, numpy,
-numba, scengen itself) is that of the running environment, so only MuJoCo differs.
+Written by `make drift`: the results of `scengen drift` on training scenarios of every task and on some of one axis (the
+paper's where the task has one). Each version of MuJoCo has an environment of its own, made by venv and pip and kept in
+`~/.cache/scengen`. Everything else in it (Python, numpy, numba, scengen itself) is that of the running environment, so
+only MuJoCo differs.
 
 * **same bits**: the witness ends in the same bits, and every repeated check agrees with the certificate.
 * **same verdict**: every repeated check agrees with the certificate; the witness ends in other bits.
@@ -62,7 +67,7 @@ def main(n: str, pools: str, versions: str, *tasks: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     missing = []
     for task in tasks or list_tasks():
-        if not compared(task, n, Path(pools, task), versions, folder / f"{task}.json"):
+        if not compared(task, int(n), Path(pools), versions, folder / f"{task}.json"):
             missing.append(task)
         PAGE.write_text(page(stored()))
     sys.exit(f"not compared: {', '.join(missing)}" if missing else 0)
@@ -76,22 +81,32 @@ def stored() -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def compared(task: str, n: str, pool: Path, versions: str, record: Path) -> bool:
+def axis_of(task: str) -> str:
+    """The axis of a task that is compared."""
+    loaded = load_task(task)
+    return next((name for name, axis in loaded.axes.items() if loaded.of_paper(axis)), next(iter(loaded.axes)))
+
+
+def compared(task: str, n: int, pools: Path, versions: str, record: Path) -> bool:
     """Compare one task, and store the part of the result that the page needs, unless it is there.
 
     Returns:
         Whether there is a result.
     """
-    if not (pool / MANIFEST).is_file():
-        cli.run(("generate", f"task={task}", f"n={n}", f"pool={pool}"))
-    if not (pool / MANIFEST).is_file():
-        return False
-    known = json.loads(record.read_text()) if record.is_file() else {"pools": [], "scenarios": []}
-    if len(known["scenarios"]) == int(n) and Pool.open(pool).sha256 in [one["sha256"] for one in known["pools"]]:
+    axis = axis_of(task)
+    wanted = {pools / task: (ID, n), pools / f"{task}-{axis}": (axis, OOD)}
+    for pool, (split, count) in wanted.items():
+        if not (pool / MANIFEST).is_file():
+            cli.run(("generate", f"task={task}", f"split={split}", f"n={count}", f"pool={pool}"))
+        if not (pool / MANIFEST).is_file():
+            return False
+    known = json.loads(record.read_text()) if record.is_file() else {"pools": []}
+    if {Pool.open(pool).sha256 for pool in wanted} == {one["sha256"] for one in known["pools"]}:
         return True
     with TemporaryDirectory() as folder:
         found = Path(folder, "drift.json")
-        cli.run(("drift", f"pool={pool}", f"mujoco=[{versions}]", f"level={LEVEL}", f"n={n}", f"json={found}"))
+        both = ",".join(map(str, wanted))
+        cli.run(("drift", f"pool=[{both}]", f"mujoco=[{versions}]", f"level={LEVEL}", f"json={found}"))
         if found.is_file():
             told = json.dumps(shortened(json.loads(found.read_text())), indent=1, sort_keys=True)
             record.write_text(f"{told}\n")
@@ -130,10 +145,12 @@ def table(told: list[dict[str, Any]]) -> str:
     if any(each[FLIPPED] for each in every.values()):
         lines += [
             "\n### What flipped, with its margins\n",
-            "The last column shows the margins of the certificate: successful jittered runs of the oracle, the time at",
-            "which the witness reached the goal, and other numerics under which the witness failed.\n",
-            "| MuJoCo | scenario | check | now | the certificate |",
-            "|---|---|---|---|---|",
+            "If a witness no longer reaches the goal, its actions are played under both versions: the fifth column has",
+            "the first times at which a body is 0.1, 1 and 10 mm elsewhere, and what it touches then. The last has",
+            "the margins of the certificate: successful jittered runs of the oracle, the time at which the witness",
+            "reached the goal, and other numerics under which the witness failed.\n",
+            "| MuJoCo | scenario | check | now | how it parts | the certificate |",
+            "|---|---|---|---|---|---|",
             *(f"| {' | '.join(each)} |" for one in told for each in flips(one)),
         ]
     return "\n".join(lines) + "\n"

@@ -77,7 +77,9 @@ def found_python(version: str) -> str:
     if not version:
         return sys.executable
     own = sorted((Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python"))
-    return shutil.which(f"python{version}") or (str(own[-1]) if own else "")
+    found = [shutil.which(f"python{version}"), *map(str, own[-1:])]
+    works = (path for path in found if path and not subprocess.run([path, "--version"], capture_output=True).returncode)
+    return next(works, "")  # pyenv has a command for each version, which fails unless the version is selected
 
 
 def made(stack: Stack, interpreter: str) -> Path:

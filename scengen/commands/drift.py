@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..drift.environment import Environment, environment
-from ..drift.matrix import FLIPPED, UNKNOWN, matrix, remarks, tables, under
+from ..drift.matrix import FLIPPED, UNKNOWN, flipped, matrix, remarks, tables, under
+from ..drift.tracks import parted
 from ..errors import BadConfig, ScengenError, at_least
 from ..pool import Pool
 from ..runs.progress import ProgressBar
@@ -16,7 +17,9 @@ from . import BAD_INPUT, FAILED, OK, Arguments, err, out, remark, say, several, 
 from .settings import read
 
 MODULE = "scengen.drift.judge"
-"""Module that runs in each environment."""
+"""Module that judges the pools in each environment."""
+TRACKS = "scengen.drift.tracks"
+"""Module that follows the witnesses whose verdict flipped."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ def command(arguments: Arguments) -> int:
     environments = [environment(version, say) for version in versions]
     found = {each.mujoco: _judged(each, pools, settings, search_path(arguments)) for each in environments}
     result = matrix(pools, found, settings.level, settings.n)
+    _add_partings(result, environments, search_path(arguments))
     if settings.json:
         write_json(settings.json, result)
     for table in tables(result):
@@ -84,3 +88,31 @@ def _judged(
             judged[answer.pop("pool")].append(answer)
             progress_bar.show(done)
     return {"fingerprint": about["fingerprint"], "judged": judged}
+
+
+def _add_partings(result: dict[str, Any], environments: Sequence[Environment], search: Sequence[str]) -> None:
+    """Add how each witness that no longer succeeds parts from its course under the version that made the pool.
+
+    A version whose control is not among the environments keeps its flips without that explanation.
+    """
+    made = {folder: pool["versions"]["mujoco"] for folder, pool in result["pools"].items()}
+    lost = [
+        (one, version, judgement)
+        for one in result["scenarios"]
+        for version, judgement in one["mujoco"].items()
+        if "witness" in flipped(judgement) and version != made[one["pool"]]
+    ]
+    wanted: dict[str, dict[str, list[str]]] = {each.mujoco: {} for each in environments}
+    for one, version, _ in lost:
+        for where in {version, made[one["pool"]]} & wanted.keys():
+            wanted[where].setdefault(one["pool"], []).append(one["id"])
+    followed = {
+        (each.mujoco, line["pool"], line["id"]): line["track"]
+        for each in environments
+        if wanted[each.mujoco]
+        for line in each.lines(TRACKS, {"pools": wanted[each.mujoco], "search": list(search)})
+    }
+    for one, version, judgement in lost:
+        before, now = (followed.get((where, one["pool"], one["id"])) for where in (made[one["pool"]], version))
+        if before and now:
+            judgement["parted"] = parted(before, now)

@@ -22,6 +22,7 @@ from typing import Any
 
 from filelock import FileLock
 
+from ..control import native
 from ..errors import BadConfig, ScengenError, cut, nearest
 from ..work.targets import cache_folder, refused
 
@@ -80,6 +81,28 @@ class Environment:
                 errors.seek(0)
                 why = _last_word(errors.read())
                 raise ScengenError(f"under mujoco {self.mujoco}: {cut(why, 600)}")
+
+
+def answer(answers: Callable[[dict[str, Any]], Iterator[Mapping[str, Any]]]) -> int:
+    """Answer a request as `Environment.lines` makes it: the main function of a module that runs in an environment.
+
+    Args:
+        answers: function that makes the lines of the answer of a request.
+
+    Returns:
+        The exit status, with the error on standard error.
+    """
+    lines = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # so that output of a task does not mix with the answers
+    native.silence()
+    try:
+        for content in answers(json.load(sys.stdin)):
+            lines.write(json.dumps(content) + "\n")
+            lines.flush()
+    except ScengenError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
 
 
 def _last_word(said: str) -> str:

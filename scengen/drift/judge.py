@@ -4,8 +4,6 @@ Verification declines a pool that another MuJoCo has made, because its claims ar
 measures how much of a verdict depends on the version, so every check is made even if an earlier one failed.
 """
 
-import json
-import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,7 +15,6 @@ import mujoco
 from .. import compose
 from ..attack.check import attacked
 from ..certificate import Check
-from ..control import native
 from ..errors import NoOracle, ScengenError
 from ..fingerprint import fingerprint
 from ..pool import Pool, PoolRow
@@ -31,6 +28,7 @@ from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
 from ..validate.stored import settings_of_manifest, task_of_manifest
 from ..work.parallel import Limits, each
+from .environment import answer
 from .models import model_difference
 
 ORACLES = ("shortcuts", "solved", "robust")
@@ -160,29 +158,15 @@ def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[Repe
     return tuple(repeated)
 
 
-def main() -> int:
-    """Read a request, judge its pools, and write a line for every scenario; see `scengen.commands.drift`."""
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # so that output of a task does not mix with the answers
-    native.silence()
-
-    def answer(content: Mapping[str, Any]) -> None:
-        answers.write(json.dumps(content) + "\n")
-        answers.flush()
-
-    request = json.load(sys.stdin)
-    answer({"mujoco": mujoco.__version__, "fingerprint": fingerprint()})
+def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """The version and fingerprint of this process, then a judgement of every scenario; see `commands.drift`."""
+    yield {"mujoco": mujoco.__version__, "fingerprint": fingerprint()}
     limits = Limits(request["limit_seconds"], request["limit_mb"])
-    try:
-        for folder in request["pools"]:
-            asked = (request["search"], request["level"], request["n"], request["workers"], limits)
-            for judgement in judge(folder, *asked):
-                answer({"pool": folder, **asdict(judgement)})
-    except ScengenError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    for folder in request["pools"]:
+        asked = (request["search"], request["level"], request["n"], request["workers"], limits)
+        for judgement in judge(folder, *asked):
+            yield {"pool": folder, **asdict(judgement)}
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(answer(answers))

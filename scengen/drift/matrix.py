@@ -9,6 +9,7 @@ from rich.table import Table
 
 from ..pool import Pool
 from ..samplers.task import leaves
+from .tracks import in_words
 
 SAME_BITS = "same bits"
 """Outcome: every repeated check agrees with the certificate, and the witness ends in the same bits."""
@@ -125,17 +126,21 @@ def cell(told: Mapping[str, Any]) -> str:
     return numbers + (f" ({checks})" if checks else "") + (f", {told[UNKNOWN]} unknown" if told[UNKNOWN] else "")
 
 
-def flips(result: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str, str]]:
-    """Every flipped check, with its margins.
+def flips(result: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str, str, str]]:
+    """Every flipped check, with its cause and margins.
 
     Yields:
-        Version, scenario, check; the check's numbers in the certificate and now; the margins of the certificate.
+        Version, scenario, check; the check's numbers in the certificate and now; where the witness parts from its
+        course; the margins of the certificate.
     """
     for one in result["scenarios"]:
         for version, judgement in one["mujoco"].items():
             for check in judgement["checks"]:
                 if check["flipped"]:
-                    yield version, one["name"], check["name"], change(check), margins(one["certificate"])
+                    cause = (
+                        in_words(judgement["parted"]) if "parted" in judgement and check["name"] == "witness" else ""
+                    )
+                    yield version, one["name"], check["name"], change(check), cause, margins(one["certificate"])
 
 
 def change(check: Mapping[str, Any]) -> str:
@@ -196,7 +201,7 @@ def tables(result: Mapping[str, Any]) -> list[Table]:
         found.add_section()
         found.add_row("all", *(cell(under(result, version)) for version in result["mujoco"]))
     flipped_checks = Table(
-        "mujoco", "scenario", "check", "now", "the certificate", title="flipped", title_justify="left"
+        "mujoco", "scenario", "check", "now", "how it parts", "the certificate", title="flipped", title_justify="left"
     )
     for line in flips(result):
         flipped_checks.add_row(*line)

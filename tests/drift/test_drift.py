@@ -18,6 +18,7 @@ from scengen.drift import environment as environments
 from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge
 from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
+from scengen.drift.tracks import in_words, parted, track
 from scengen.errors import BadConfig, ScengenError
 from scengen.fingerprint import fingerprint
 from scengen.pool.files import sha256
@@ -87,7 +88,7 @@ def test_a_flipped_check_stands_with_its_margins(made, result):
     assert rest[:3] == ("3.0.0", str(first.name), "rest")
     assert "mm while nobody acts" in rest[3] and "bar drift 0" in rest[3]
     assert witness[1:3] == (str(second.name), "witness") and "the goal was not reached" in witness[3]
-    assert "1 of 1 jittered runs, goal after" in witness[4]
+    assert "1 of 1 jittered runs, goal after" in witness[5]
 
 
 def test_where_the_recording_fails_the_oracle_is_asked(changed):
@@ -207,3 +208,28 @@ def test_another_mujoco_is_really_another_one(made, tmp_path, monkeypatch, capsy
     assert [path.name for path in (tmp_path / "scengen").glob("mujoco-*[!k]")] == [
         path.name for path in (tmp_path / "scengen").glob("mujoco-3.4.0-????????????")
     ], "nothing is left of what could not be made"
+
+
+def test_a_witness_parts_from_its_course_when_a_body_is_elsewhere(made):
+    task, row = load_task(made.task), next(made.rows())
+    one, again = track(task, row), track(task, row)
+    assert one == again and parted(one, again) == []
+    assert in_words([]) == "no body is 0.1 mm elsewhere while the actions last"
+    raised = json.loads(json.dumps(one))
+    for sample in raised:
+        if sample["at"] >= 0.5:
+            for place, _ in sample["bodies"].values():
+                place[2] += 2e-3
+    small, large = parted(one, raised)
+    assert (small["mm"], large["mm"]) == (0.1, 1.0) and small["seconds"] == large["seconds"] == 0.5
+    assert "0.1 mm elsewhere after 0.5 s, touching" in in_words([small])
+
+
+@pytest.mark.slow
+def test_a_witness_that_flipped_is_followed_under_both_versions(here, result):
+    """Both environments have the same MuJoCo here, so that no body parts."""
+    again = json.loads(json.dumps(result))
+    drift._add_partings(again, [here, replace(here, mujoco="3.0.0")], ())
+    first, second = (one["mujoco"]["3.0.0"] for one in again["scenarios"])
+    assert "parted" not in first and second["parted"] == []
+    assert [line[4] for line in flips(again)] == ["", in_words([])]
