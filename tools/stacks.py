@@ -50,7 +50,7 @@ class Stack:
 
 STACKS = (
     Stack("mujoco4", "", ("mujoco==4.0.0", "numpy>=2")),
-    Stack("mujoco4-python3.12-lerobot", "3.12", ("mujoco==4.0.0", "numpy>=2", "lerobot>=0.6,<0.7")),
+    Stack("mujoco4-python3.12-lerobot", "3.12", ("mujoco==4.0.0", "numpy>=2", "lerobot[training]>=0.6,<0.7")),
     Stack("mujoco4-python3.13", "3.13", ("mujoco==4.0.0", "numpy>=2")),
     Stack("mujoco4-python3.14", "3.14", ("mujoco==4.0.0", "numpy>=2")),
 )

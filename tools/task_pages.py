@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from scengen import list_tasks, load_task
 from scengen.agents import facts
@@ -41,6 +41,8 @@ COLUMNS = 4
 """Scenes in a row of the overview."""
 SMALL = (300, 225)
 """Width and height of a scene in the overview [pixels]."""
+LABEL = 24
+"""Height of the text under a scene in the overview [pixels]."""
 
 
 def main(*names: str) -> None:
@@ -60,15 +62,22 @@ def main(*names: str) -> None:
 
 
 def overview() -> Picture:
-    """First states of one training scenario of every task, side by side."""
+    """First states of one training scenario of every task, each under its code and name, in the order of the paper."""
     scenes = []
-    for task in map(load_task, list_tasks()):
+    for task in sorted(map(load_task, list_tasks()), key=lambda task: (task.category, task.code)):
         scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
         with camera(scene_xml, task.embodiment, *SMALL) as view:
-            scenes.append(view.take())
+            scenes.append(labelled(view.take(), f"{task.code} {task.name}"))
     empty = np.full_like(scenes[0], 255)
     scenes += [empty] * (-len(scenes) % COLUMNS)
     return np.vstack([np.hstack(scenes[k : k + COLUMNS]) for k in range(0, len(scenes), COLUMNS)])
+
+
+def labelled(picture: Picture, text: str) -> Picture:
+    """A picture above a line of text."""
+    line = Image.new("RGB", (picture.shape[1], LABEL), "white")
+    ImageDraw.Draw(line).text((6, LABEL // 2), text, "black", ImageFont.load_default(LABEL * 2 // 3), anchor="lm")
+    return np.vstack([picture, np.asarray(line)])
 
 
 def page(task: Task, certified: Certified, seconds: float) -> str:

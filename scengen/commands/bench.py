@@ -1,13 +1,17 @@
 """measure the costs that scengen documents, as ratios within one run"""
 
 from dataclasses import dataclass
+from typing import Any
 
 from rich.table import Table
 
-from ..errors import at_least
-from ..evaluate.speed import bench, certificates
+from ..drift import speed as by_version
+from ..drift.environment import environment
+from ..errors import BadConfig, at_least
+from ..evaluate.certificate_cost import certificates
+from ..evaluate.speed import bench
 from ..work.targets import try_file
-from . import OK, Arguments, out, remark, write_json
+from . import OK, Arguments, out, remark, say, write_json
 from .settings import read
 
 
@@ -18,6 +22,7 @@ class BenchSettings:
     json: str | None
     repeats: int
     certify: bool
+    mujoco: str | list[str] | None
 
 
 def command(arguments: Arguments) -> int:
@@ -25,8 +30,16 @@ def command(arguments: Arguments) -> int:
     at_least(settings, repeats=1)
     try_file(settings.json)
     tables: list[Table]
+    result: Any
     noise = ""
-    if settings.certify:
+    if settings.mujoco:
+        if settings.certify:
+            raise BadConfig("certify=true measures under the installed MuJoCo alone; leave out mujoco=")
+        versions = [settings.mujoco] if isinstance(settings.mujoco, str) else list(dict.fromkeys(settings.mujoco))
+        found = by_version.measured([environment(version, say) for version in versions], settings.repeats)
+        tables = [by_version.table(found)]
+        result = {version: {name: each.values for name, each in told.items()} for version, told in found.items()}
+    elif settings.certify:
         table, result = certificates()
         tables = [table]
     else:

@@ -9,17 +9,15 @@ import os
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 from rich.table import Table
 
-from .. import compose, task_files
-from ..certificate import CHECKS
+from .. import compose
 from ..control.loop import ACTION, Loop
 from ..envs.gym import PoolEnv
 from ..episode import Actions, Episode
@@ -27,29 +25,18 @@ from ..pictures.render import NoPictures
 from ..pool import Pool, PoolRow
 from ..robots import panda
 from ..runs.generate import GenerateSettings, generate
-from ..samplers.split import ID
-from ..samplers.task import Task
+from ..scenario import Scenario
 from ..sim.world import JAW, World
-from ..validate.certify import Trial
 from ..validate.playable import stored_world
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..validate.settings import QUICK
+from .quiet import disturbance, scheduled
 from .timing import SLICE, Measure, Promise, Side, alternated, ratio, step_with
 from .vector_speed import vector_ratios
 
 PERIODS = 200
 """Number of control periods of the comparison with robosuite: two seconds."""
-MAX_SPREAD = 0.1
-"""Largest spread of a measure, as a share of its median, of a quiet machine. Twice what an idle one shows."""
-MAX_LOAD = 0.5
-"""Largest load average at the start of a run on a quiet machine [processes]."""
-MAX_WAIT = 0.05
-"""Largest share of its time for which the run waits for a core on a quiet machine."""
-SCHEDULED = Path("/proc/self/schedstat")
-"""File in which Linux says for how long a process has run, and has waited for a core [ns]."""
-NEGLIGIBLE_COST = 0.05
-"""Processor time below which a check is left out of the cost of a certificate [s]."""
 CAMERA_PERIODS = 20
 """Number of control periods with a camera, which takes a hundred times as long without a graphics card."""
 
@@ -92,7 +79,7 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
         Tables, the result, and why the machine was not quiet; an empty text if it was. Measures of robosuite are
         missing where it is not installed.
     """
-    load, begin = os.getloadavg()[0], _scheduled()
+    load, begin = os.getloadavg()[0], scheduled()
     found = {
         "rollout_to_raw": rollout_to_raw(repeats),
         **two_arms(repeats),
@@ -102,7 +89,7 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     }
     with _pool() as pool:
         found |= vector_ratios(str(pool.folder), next(pool.rows()), repeats)
-    ran, waited = (now - before for now, before in zip(_scheduled(), begin, strict=True))
+    ran, waited = (now - before for now, before in zip(scheduled(), begin, strict=True))
     table = Table("measure", "median", "spread", "limit", "what", title="bench", title_justify="left")
     for name, measure in found.items():
         promise = PROMISES[name]
@@ -117,62 +104,21 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     noise = disturbance(load, waited / max(ran + waited, 1.0), ratios)
     result = {name: measure.median for name, measure in found.items()}
     spreads = {name: measure.spread for name, measure in found.items()}
-    return [table, beside], {**result, "control_period_ms": periods, "spread": spreads, "disturbed_by": noise}, noise
+    parts = parts_of_a_rollout(repeats)
+    share = Table("a control period of a rollout", "times MuJoCo", title="parts of a rollout", title_justify="left")
+    for name, value in parts.items():
+        share.add_row(name, f"{value:.2f}")
+    told = {"control_period_ms": periods, "rollout_parts": parts, "spread": spreads, "disturbed_by": noise}
+    return [table, beside, share], {**result, **told}, noise
 
 
-def _scheduled() -> tuple[float, float]:
-    """Time for which this process has run, and for which it has waited for a core [ns]; 0 where Linux does not say."""
-    try:
-        ran, waited = SCHEDULED.read_text().split()[:2]
-        return float(ran), float(waited)
-    except (OSError, ValueError):
-        return 0.0, 0.0
-
-
-def disturbance(load: float, waiting: float, ratios: Mapping[str, Measure]) -> str:
-    """Why the machine was not quiet; empty if it was.
-
-    Args:
-        load: load average at the start [processes].
-        waiting: share of the run's time for which it waited for a core.
-        ratios: the measured ratios.
-    """
-    told = []
-    if load > MAX_LOAD:
-        told.append(f"its load average was {load:.1f} at the start")
-    if waiting > MAX_WAIT:
-        told.append(f"the run waited for a core in {waiting:.0%} of the time")
-    wide = [name for name, ratio in ratios.items() if ratio.spread > MAX_SPREAD * ratio.median]
-    if wide:
-        told.append(f"{', '.join(wide)} spread by more than {MAX_SPREAD:.0%}")
-    return "; ".join(told)
-
-
-def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
-    """Processor time of a quick certificate of every task's first training scenario, by check [s]."""
-    costs = {name: _certificate(compose.load_task(name)) for name in task_files.tasks()}
-    named = [check for check in CHECKS if any(check in cost for cost in costs.values())]
-    table = Table("task", *named, "all", title="processor time of a certificate (s)", title_justify="left")
-    for name, cost in costs.items():
-        cells = (f"{cost[check]:.1f}" if check in cost else "" for check in named)
-        table.add_row(name, *cells, f"{sum(cost.values()):.1f}")
-    totals = [sum(cost.get(check, 0.0) for cost in costs.values()) for check in named]
-    table.add_section()
-    table.add_row("all", *(f"{total:.1f}" for total in totals), f"{sum(totals):.1f}")
-    return table, costs
-
-
-def _certificate(task: Task) -> dict[str, float]:
-    """Processor time of each check of the first training scenario [s]."""
-    trial = Trial(task.draw(ID, 0, 0).scenario, task.horizon, QUICK, task.embodiment)
-    cost = {}
-    for name in CHECKS:
-        begin = time.process_time()
-        check = trial.check(name)
-        cost[name] = time.process_time() - begin
-        if check.passed is False:
-            break
-    return {name: seconds for name, seconds in cost.items() if seconds >= NEGLIGIBLE_COST}
+def core(repeats: int) -> dict[str, Measure]:
+    """The measures that hold for every version of MuJoCo, and need no robosuite."""
+    return {
+        "rollout_to_raw": rollout_to_raw(repeats),
+        "env_step_to_raw": gym_costs(repeats)["env_step_to_raw"],
+        "scenario_to_first_step_ms": scenario_to_first_step(repeats),
+    }
 
 
 def rollout_to_raw(repeats: int) -> Measure:
@@ -181,17 +127,59 @@ def rollout_to_raw(repeats: int) -> Measure:
     scenario = task.draw("id", 0, 0).scenario
     world, bare = world_of(scenario), world_of(scenario)
     recorded = run(scenario, world, scenario.oracle, task.horizon).actions
+    rollout = _rollout(scenario, world, task.horizon, len(recorded))
+    return ratio(alternated([rollout, _bare(bare, recorded)], repeats))
+
+
+def _rollout(scenario: Scenario, world: World, horizon: float, periods: int) -> Side:
+    """An oracle rollout."""
 
     def rollout() -> Iterator[None]:
         world.reset()
-        plan, episode = scenario.oracle(world), Episode(scenario, world, task.horizon)
-        for number in range(len(recorded)):
+        plan, episode = scenario.oracle(world), Episode(scenario, world, horizon)
+        for number in range(periods):
             action = next(plan, world.idle) if episode.outcome is None else world.idle
             episode.step(world.filter(action))
             if number % SLICE == SLICE - 1:
                 yield
 
-    return ratio(alternated([rollout, _bare(bare, recorded)], repeats))
+    return rollout
+
+
+def parts_of_a_rollout(repeats: int) -> dict[str, float]:
+    """Processor time of a control period of an oracle rollout, part by part, over the bare mj_step calls: 1 and more.
+
+    Each side does what the one before does, and one thing more.
+    """
+    task = compose.load_task("domino_single")
+    scenario = task.draw("id", 0, 0).scenario
+    world, bare, played, judged, planned = (world_of(scenario) for _ in range(5))
+    actions = run(scenario, world, scenario.oracle, task.horizon).actions
+
+    def replayed() -> Iterator[None]:
+        world.reset()
+        for start in range(0, len(actions), SLICE):
+            world.loop.replay(actions[start : start + SLICE])
+            yield
+
+    def called() -> Iterator[None]:
+        played.reset()
+        yield from _sliced(played.apply, actions)
+
+    def episode() -> Iterator[None]:
+        judged.reset()
+        yield from _sliced(Episode(scenario, judged, task.horizon).step, actions)
+
+    sides = {
+        "MuJoCo: five bare mj_step": _bare(bare, actions),
+        "and controller, suction, contact tables: one compiled call for ten periods": replayed,
+        "and a call from Python for each period": called,
+        "and events, goal and rules": episode,
+        "and plan and filter: a rollout": _rollout(scenario, planned, task.horizon, len(actions)),
+    }
+    found = list(zip(*alternated(list(sides.values()), repeats), strict=True))
+    ratios = (ratio(zip(times, found[0], strict=True)).median for times in found)
+    return dict(zip(sides, ratios, strict=True))
 
 
 def two_arms(repeats: int) -> dict[str, Measure]:

@@ -13,7 +13,7 @@ from pools import make
 
 from scengen import cli, load_task
 from scengen.certificate import CHECKS
-from scengen.commands import drift
+from scengen.commands import bench, drift
 from scengen.drift import environment as environments
 from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge
@@ -233,3 +233,18 @@ def test_a_witness_that_flipped_is_followed_under_both_versions(here, result):
     first, second = (one["mujoco"]["3.0.0"] for one in again["scenarios"])
     assert "parted" not in first and second["parted"] == []
     assert [line[4] for line in flips(again)] == ["", in_words([])]
+
+
+@pytest.mark.slow
+def test_costs_under_several_versions_are_measured_by_turns(here, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(bench, "environment", lambda version, told: replace(here, mujoco=version))
+    told = tmp_path / "bench.json"
+    assert cli.run(("bench", f"mujoco=[{HERE},3.0.0]", "repeats=2", f"json={told}")) == 0
+    found = json.loads(told.read_text())
+    assert list(found) == [HERE, "3.0.0"]
+    assert all(len(values) == 2 and min(values) > 0.0 for measures in found.values() for values in measures.values())
+    assert list(found[HERE]) == ["rollout_to_raw", "env_step_to_raw", "scenario_to_first_step_ms"]
+    out = capsys.readouterr().out
+    assert "3.0.0" in out and "at most 1.25" in out
+    assert cli.run(("bench", f"mujoco=[{HERE}]", "certify=true")) == 2
+    assert "leave out mujoco=" in capsys.readouterr().err

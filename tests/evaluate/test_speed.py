@@ -7,7 +7,8 @@ from helpers import REFERENCE
 
 from scengen.envs.vector import PoolVectorEnv
 from scengen.evaluate import speed, vector_speed
-from scengen.evaluate.speed import Measure, alternated, disturbance
+from scengen.evaluate.quiet import disturbance
+from scengen.evaluate.timing import Measure, alternated
 from scengen.pool import Pool
 
 
