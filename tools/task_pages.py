@@ -64,7 +64,7 @@ def main(*names: str) -> None:
 def overview() -> Picture:
     """First states of one training scenario of every task, each under its code and name, in the order of the paper."""
     scenes = []
-    for task in sorted(map(load_task, list_tasks()), key=lambda task: (task.category, task.code)):
+    for task in sorted(map(load_task, list_tasks()), key=lambda task: (task.code[0] != "T", task.code)):
         scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
         with camera(scene_xml, task.embodiment, *SMALL) as view:
             scenes.append(labelled(view.take(), f"{task.code} {task.name}"))
