@@ -36,6 +36,13 @@ def shift(body, offset):
     body.pos = body.pos + turned
 
 
+def certified_here(pool):
+    """Skip a test of a stored pool that was certified under another MuJoCo: its verdicts are about that version."""
+    made = Pool.open(pool).manifest.versions["mujoco"]
+    if made != mujoco.__version__:
+        pytest.skip(f"{pool.name} was certified under MuJoCo {made}")
+
+
 def env_class(task, search=()):
     """The class of a task's environments in robosuite. Without robosuite the test is skipped."""
     pytest.importorskip("robosuite", reason="no robosuite; it is an extra")

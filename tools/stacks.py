@@ -19,19 +19,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "stacks"
 RECORDS = ROOT / "records" / "stacks"
-TESTS = (
-    "pytest",
-    "pytest-xdist",
-    "hypothesis",
-    "av",
-    "h5py",
-    "trimesh",
-    "rtree",
-    "coacd",
-    "scikit-learn",
-    "markdown-it-py",
-)
-"""Packages that the tests need."""
 SAMPLE_TASKS = ("domino_single", "cup_extract")
 """Tasks of the sample: the smallest one, and the one whose scene depends on a flag that MuJoCo 4 has inverted."""
 SAMPLE_TESTS = ("tests/control", "tests/sim", "tests/robots", "tests/skills")
@@ -86,13 +73,13 @@ def made(stack: Stack, interpreter: str) -> Path:
     """The interpreter of a stack's environment, which is made if it is missing."""
     folder = FOLDER / stack.name
     python = folder / "bin" / "python"
-    wanted = "\n".join([interpreter, *stack.requirements, *TESTS, (ROOT / "pyproject.toml").read_text()])
+    wanted = "\n".join([interpreter, *stack.requirements, (ROOT / "pyproject.toml").read_text()])
     ready = folder / "ready"
     if not ready.is_file() or ready.read_text() != wanted:
         shutil.rmtree(folder, ignore_errors=True)
         subprocess.run([interpreter, "-m", "venv", folder], check=True)
         told = ["--quiet", "--disable-pip-version-check"]
-        subprocess.run([python, "-m", "pip", "install", *told, "-e", ROOT, *stack.requirements, *TESTS], check=True)
+        subprocess.run([python, "-m", "pip", "install", *told, "-e", f"{ROOT}[dev]", *stack.requirements], check=True)
         ready.write_text(wanted)
     return python
 

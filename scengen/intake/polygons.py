@@ -114,6 +114,7 @@ def _cut(points: Points, corners: Indices) -> Indices:
     drawn = np.stack([own @ x, own @ np.cross(normal, x)], axis=1)
     cut = np.asarray(triangulate([drawn], allow_convex=False), np.int64)
     p, q, r = np.moveaxis(drawn[cut], 1, 0)
-    if (np.cross(q - p, r - p) / 2).min() < -flat:
+    one, other = (q - p).T, (r - p).T
+    if ((one[0] * other[1] - one[1] * other[0]) / 2).min() < -flat:
         raise CrossesItself
     return corners[cut]

@@ -4,6 +4,7 @@ import hashlib
 import math
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -25,6 +26,26 @@ WHOLE = frozenset(
 _ELEMENTS = re.compile(r"(opt|body|jnt|dof|geom|site|cam|light|eq|exclude|pair|tendon|wrap|actuator|sensor|mat)_")
 """Beginning of the fields of a model whose whole numbers say what its elements are. Meshes and search trees have whole
 numbers that depend on rounding."""
+SECTIONS = (
+    "compiler",
+    "option",
+    "size",
+    "visual",
+    "statistic",
+    "default",
+    "extension",
+    "custom",
+    "asset",
+    "worldbody",
+    "contact",
+    "deformable",
+    "equality",
+    "tendon",
+    "actuator",
+    "sensor",
+    "keyframe",
+)
+"""Sections of a scene in the order in which they count for its hash, that of MuJoCo 3.5."""
 NOT_REBUILT = "the scene is not the one that the family builds from the parameters"
 
 
@@ -45,11 +66,18 @@ def portable_sha256(text: str) -> str:
     numbers, and rounding changes one in some thousand millions of them so.
     """
     words = []
-    for element in ET.fromstring(text).iter():
+    for element in _elements(ET.fromstring(text)):
         words.append(f"<{element.tag} {len(element)}")
         for name, value in sorted(element.attrib.items()):
             words.append(f"{name}={' '.join(map(_rounded, value.split()))}")
     return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+def _elements(root: ET.Element) -> Iterator[ET.Element]:
+    """All elements of a scene in depth-first order, the sections in the order of `SECTIONS`."""
+    yield root
+    for section in sorted(root, key=lambda section: SECTIONS.index(section.tag) if section.tag in SECTIONS else -1):
+        yield from section.iter()
 
 
 def _rounded(word: str) -> str:

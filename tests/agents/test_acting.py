@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import by_hand
 import numpy as np
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, certified_here
 
 from scengen.agents import runner
 from scengen.agents.models import Call, Reply
@@ -55,6 +55,7 @@ def test_a_list_written_by_hand_from_the_poses_topples_every_chain(tmp_path, mon
     ],
 )
 def test_lists_written_by_hand_solve_tasks_from_the_poses_alone(tmp_path, monkeypatch, model, pool):
+    certified_here(BASE / pool)
     (result,) = played(tmp_path, monkeypatch, model(), pool=BASE / pool)
     assert result["grades"]["right"], result["grades"]
 

@@ -23,7 +23,7 @@ def pool(tmp_path_factory):
     """The reference pool with a number that MuJoCo does not read."""
     folder = shutil.copytree(REFERENCE, tmp_path_factory.mktemp("unreadable") / "pool")
     of = Pool.open(folder)
-    rows = [replace(row, scene_xml=row.scene_xml.replace('pos="0 ', 'pos="1e-400 ', 1)) for row in of.rows()]
+    rows = [replace(row, scene_xml=row.scene_xml.replace('pos="0 ', 'pos="1e400 ', 1)) for row in of.rows()]
     write_pool(folder, of.manifest.without_files(), rows)
     return folder
 

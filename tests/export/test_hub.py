@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from helpers import REFERENCE
+from helpers import REFERENCE, certified_here
 from pools import certificate_of, rewritten
 
 from scengen import cli
@@ -30,6 +30,7 @@ def card(*pools, to, **settings):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
+    certified_here(POOLS[0])
     folder = tmp_path_factory.mktemp("hub") / "data"
     assert card(*POOLS, to=folder, license="cc-by-4.0") == 0
     return folder
@@ -129,6 +130,7 @@ def test_accessibility_adds_up_hits_of_checks():
 
 
 def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
+    certified_here(POOLS[0])
     shutil.copytree(POOLS[0], tmp_path / "false")
     rewritten(tmp_path / "false", lambda row: certificate_of(row, final_state="0" * 16))
     assert card(tmp_path / "false", to=tmp_path / "out") == 2

@@ -45,6 +45,7 @@ APART = {
     "scengen evaluate policy=replay edition=v1": "certifies 40 scenarios: minutes",
     "scengen edition edition=mine.yaml": "certifies 40 scenarios: minutes",
     "scengen stats": "the recording is not made",
+    "scengen evaluate policy=lerobot_env_scengen": "needs an environment with LeRobot",
     "scengen evaluate policy=ws://": "needs a server of policies",
     "scengen evaluate policy=zmq://": "needs a server of policies",
     "scengen studio": "runs until it is interrupted",
