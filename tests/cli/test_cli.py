@@ -297,7 +297,7 @@ def test_it_runs_from_any_folder_as_a_module(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "scengen", "--version"], cwd=tmp_path, capture_output=True, text=True, env=os.environ
     )
-    assert done.returncode == 0 and "mujoco 3.5" in done.stdout
+    assert done.returncode == 0 and f"mujoco {mujoco.__version__}" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,12 @@
 """Recordings at the paper's rates, and recordings of chosen streams."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, certified_here, pictures_are_possible
 
 from scengen import cli
 from scengen.envs.gym import PoolEnv
@@ -14,6 +15,7 @@ from scengen.pool import Pool
 from scengen.sim.world import JAW
 
 TABLES = {100: "native/100hz", 50: "native/50hz"}
+MIRRORED = Path(__file__).parents[1] / "checker" / "base" / "mirror_id"
 CAMERA = "rgb_gripper_cam"
 
 
@@ -79,13 +81,12 @@ def test_chosen_streams_stand_beside_the_robots_own_pose_and_no_others(tmp_path)
 
 def test_positions_as_pictures_show_them_are_those_of_the_environment(tmp_path):
     task = "mirror_pick_place"
+    certified_here(MIRRORED)
     assert cli.run(["demos", f"task={task}", "n=1", f"to={tmp_path / 'demos'}"]) == 0
     assert record(tmp_path / "data", f"pool={tmp_path / 'demos'}", "observations=[seen_cube_pos,cube_pos]") == 0
     rows = columns(tmp_path / "data", "data")
     assert not np.allclose(rows["seen_cube_pos"], rows["cube_pos"], atol=0.01), "pictures of this task are turned"
-    env = PoolEnv(
-        task, REFERENCE.parents[1] / "tests" / "checker" / "base" / "mirror_id", ["seen_cube_pos", "cube_pos"]
-    )
+    env = PoolEnv(task, MIRRORED, ["seen_cube_pos", "cube_pos"])
     seen, _ = env.reset()
     middle = (seen["seen_cube_pos"] + seen["cube_pos"])[:2]
     assert np.allclose((rows["seen_cube_pos"] + rows["cube_pos"])[0, :2], middle, atol=1e-3), "the same centre"
