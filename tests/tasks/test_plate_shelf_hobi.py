@@ -90,7 +90,7 @@ def test_one_jaw_lifts_the_flat_plate_by_its_rim_where_it_is_rough(friction, lif
             highest = max(highest, float(world.com("plate")[2] - TABLE_TOP))
     except GaveUp:
         pass
-    assert (highest > 0.03) == lifts
+    assert (highest > 0.05) == lifts
 
 
 def test_beside_the_table_one_arm_finds_room_but_for_the_rule():
