@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Table
 
 from ..drift import speed as by_version
-from ..drift.environment import environment
+from ..drift.environment import environment, versions_of
 from ..errors import BadConfig, at_least
 from ..evaluate.certificate_cost import certificates
 from ..evaluate.speed import bench
@@ -32,11 +32,11 @@ def command(arguments: Arguments) -> int:
     tables: list[Table]
     result: Any
     noise = ""
-    if settings.mujoco:
+    if settings.mujoco is not None:
         if settings.certify:
             raise BadConfig("certify=true measures under the installed MuJoCo alone; leave out mujoco=")
-        versions = [settings.mujoco] if isinstance(settings.mujoco, str) else list(dict.fromkeys(settings.mujoco))
-        found = by_version.measured([environment(version, say) for version in versions], settings.repeats)
+        environments = [environment(version, say) for version in versions_of(settings.mujoco)]
+        found = by_version.measured(environments, settings.repeats)
         tables = [by_version.table(found)]
         result = {version: {name: each.values for name, each in told.items()} for version, told in found.items()}
     elif settings.certify:

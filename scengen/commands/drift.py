@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..drift.environment import Environment, environment
+from ..drift.environment import Environment, environment, versions_of
 from ..drift.matrix import FLIPPED, UNKNOWN, flipped, matrix, remarks, tables, under
 from ..drift.tracks import parted
 from ..errors import BadConfig, ScengenError, at_least
@@ -42,9 +42,7 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(f"level = {settings.level}; it must be {', '.join(LEVELS[:-1])} or {LEVELS[-1]}")
     at_least(settings, n=1, workers=1, limit_seconds=1, limit_mb=200)
     try_file(settings.json)
-    versions = [settings.mujoco] if isinstance(settings.mujoco, str) else list(dict.fromkeys(settings.mujoco))
-    if not versions:
-        raise BadConfig("mujoco = []; give versions, such as mujoco=[3.4.0,3.5.0]")
+    versions = versions_of(settings.mujoco)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     environments = [environment(version, say) for version in versions]
     found = {each.mujoco: _judged(each, pools, settings, search_path(arguments)) for each in environments}

@@ -112,6 +112,18 @@ def _last_word(said: str) -> str:
     return (named or lines)[-1]
 
 
+def versions_of(setting: str | list[str]) -> list[str]:
+    """Versions in the setting `mujoco`, each once, in their order.
+
+    Raises:
+        BadConfig: there is none.
+    """
+    versions = [setting] if isinstance(setting, str) else list(dict.fromkeys(setting))
+    if not versions:
+        raise BadConfig("mujoco = []; give versions, such as mujoco=[3.5.0,4.0.0]")
+    return versions
+
+
 def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
     """The environment with a version of MuJoCo. It is made if it does not exist.
 
@@ -122,7 +134,7 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
         BadConfig: there is no such version, or the environment cannot be written.
     """
     if not VERSION.fullmatch(mujoco):
-        raise BadConfig(f"mujoco = {cut(mujoco)}; give whole versions, as in mujoco=[3.4.0,3.5.0]")
+        raise BadConfig(f"mujoco = {cut(mujoco)}; give whole versions, as in mujoco=[3.5.0,4.0.0]")
     shared = _shared()
     key = hashlib.sha256("\n".join([shared, platform.python_version(), sys.executable]).encode()).hexdigest()[:12]
     folder = cache_folder() / f"mujoco-{mujoco}-{key}"
