@@ -9,7 +9,7 @@ from ..curate.page import write_page
 from ..curate.people import DECISIONS
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
-from . import OK, Arguments, err, out, say, warn
+from . import OK, Arguments, err, out, remark, say, warn
 from .settings import read
 
 
@@ -28,6 +28,8 @@ def command(arguments: Arguments) -> int:
         for name, count in counts.most_common():
             table.add_row(name, str(count), style="dim")
     out.print(table)
+    if curated.uncompared:
+        remark("pictures were not compared with the replay: no OpenGL, or every replay failed")
     if undecided := curated.undecided:
         say(
             f"{len(undecided)} flagged episodes wait for a decision: open {folder / 'index.html'}, and save {DECISIONS}"

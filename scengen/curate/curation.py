@@ -32,9 +32,9 @@ from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
 from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
 from .remarks import with_remarks
-from .replays import Recorded, lost, replayed
+from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
-from .videos import check_video
+from .videos import Probe, Prober, check_video
 
 FOLDER = "curation"
 """Folder of the results, below that of the recording."""
@@ -65,6 +65,12 @@ class Curated:
     """Number of answers of the model that have no meaning."""
 
     @property
+    def uncompared(self) -> bool:
+        """Whether there are pictures, and none of a replay beside them: OpenGL is missing."""
+        made = {check for report in self.reports for check in report.checks}
+        return "replay" in made and any(comparison_of(camera) not in made for camera in self.recording.cameras)
+
+    @property
     def undecided(self) -> list[EpisodeReport]:
         """Flagged episodes with a sufficient score that nobody has decided about; they stay out."""
         scored = (report for report in self.reports if report.score >= KEPT_SCORE)
@@ -86,10 +92,11 @@ def curate(settings: CurateSettings, progress: Callable[[int, int], None], searc
     count = len(recording.episodes)
     people, decisions = scores_by_people(folder / SCORES, count), decisions_of_people(folder / DECISIONS, count)
     reports, jobs = _examined(recording, settings, search, lambda done: progress(done, 2 * count))
-    for done, (number, finding) in enumerate(_replays(jobs, settings.workers), 1):
+    for done, (number, played) in enumerate(_replays(jobs, settings.workers), 1):
         progress(count + done, 2 * count)
-        if finding is not None:
-            reports[number] = replace(reports[number], findings=(*reports[number].findings, finding))
+        report = reports[number]
+        findings, checks = (*report.findings, *played.findings), (*report.checks, *played.checks)
+        reports[number] = replace(report, findings=findings, checks=checks)
     reports, unread = [_with_score(report, people.get(report.episode)) for report in reports], 0
     if settings.model is not None:
         lengths = [int(episode["length"]) for episode in recording.episodes]
@@ -105,6 +112,7 @@ def _examined(
     """Reports with the scores of the measured terms, and what is to be replayed."""
     reports, jobs, terms, tasks, solved = [], list[Recorded](), list[dict[str, float]](), list[str](), list[bool]()
     twins: dict[str, int] = {}
+    size = recording.picture_size
     for episode in recording.read():
         made, findings = check_rows(episode, recording)
         readable = not any(one.check in ("MISSING_FIELD", "NAN") for one in findings)
@@ -112,7 +120,8 @@ def _examined(
         tasks.append(episode.task)
         solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
         if readable:
-            findings += _videos(episode, recording)
+            films, told = _videos(episode, recording)
+            findings += told
             made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
             content = sha256(
                 np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + episode.about["scengen/id"].encode()
@@ -122,8 +131,7 @@ def _examined(
             if settings.replay:
                 task = compose.load_task(episode.task, search)
                 entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
-                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns, entries))
-                made = (*made, "replay")
+                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films))
         about = episode.about
         style = str(about.get("scengen/style", ""))
         reports.append(
@@ -148,20 +156,30 @@ def _scores_of_readable(
     return found
 
 
-def _videos(episode: EpisodeData, recording: Recording) -> list[Finding]:
+def _videos(episode: EpisodeData, recording: Recording) -> tuple[dict[str, tuple[Probe, ...]], list[Finding]]:
+    """Parts of the films that are to be compared with a replay, and what the films alone show."""
     moving = Subject(episode, recording).moves.any(axis=1)
     findings: list[Finding] = []
+    films = {}
     for camera in recording.cameras:
-        findings += check_video(camera, recording.frames(episode, camera), len(episode), moving)
-    return findings
+        prober = Prober(len(episode))
+        pictures = prober.watched(recording.frames(episode, camera))
+        findings += check_video(camera, pictures, len(episode), moving)
+        films[camera] = prober.probes
+    return films, findings
 
 
 def _replays(jobs: Sequence[Recorded], workers: Workers) -> Any:
     """Number of each replayed episode and what its replay has found."""
-    return each(_numbered_replay, jobs, workers, UNTRUSTED_LIMITS, lambda job, reason: (job.number, lost(job, reason)))
+    pictures = any(job.films for job in jobs)  # OpenGL has threads, which a copy of a process that has used it lacks
+    return each(_numbered_replay, jobs, workers, UNTRUSTED_LIMITS, _numbered_loss, fork=not pictures)
 
 
-def _numbered_replay(job: Recorded) -> tuple[int, Finding | None]:
+def _numbered_loss(job: Recorded, reason: str) -> tuple[int, Replayed]:
+    return job.number, lost(job, reason)
+
+
+def _numbered_replay(job: Recorded) -> tuple[int, Replayed]:
     return job.number, replayed(job)
 
 

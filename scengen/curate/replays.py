@@ -1,7 +1,8 @@
-"""The strictest check of an episode: its actions, played again, must give the recorded states."""
+"""The strictest check of an episode: its actions, played again, must give the recorded states and pictures."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +11,19 @@ from numpy.typing import NDArray
 
 from ..control.loop import ACTION
 from ..envs.object_state import ObjectState
-from ..envs.observations import streams_of
+from ..envs.observations import cameras_of, streams_of
 from ..episode import Episode
 from ..errors import ScengenError
+from ..export.lerobot import IMAGES_PREFIX
 from ..export.recording import CONTROL_ACTIONS
 from ..export.streams import ENVIRONMENT
+from ..pictures.render import Camera, NoPictures
 from ..samplers.task import Task
+from ..scenario import Scenario
 from ..sim.world import World, hands
-from ..validate.rebuilt import world_of
+from ..validate.rebuilt import rebuild
 from .findings import Finding
+from .videos import Probe, compared
 
 MAX_REPLAY_ERROR = 1e-6
 """Largest difference of a stream [its unit]: streams are stored in single precision."""
@@ -42,6 +47,10 @@ class Recorded:
     """Streams at the beginning of each row."""
     entries: tuple[str, ...]
     """Names of the entries of the environment state; empty if it was not recorded."""
+    size: tuple[int, int]
+    """Width and height of the pictures [pixels]."""
+    films: Mapping[str, tuple[Probe, ...]]
+    """Parts of the film of each camera."""
 
     @classmethod
     def of(
@@ -51,6 +60,8 @@ class Recorded:
         about: Mapping[str, Any],
         columns: Mapping[str, NDArray[Any]],
         entries: Sequence[str],
+        size: tuple[int, int],
+        films: Mapping[str, tuple[Probe, ...]],
     ) -> "Recorded":
         """The parts of an episode that a replay compares.
 
@@ -60,9 +71,9 @@ class Recorded:
         Raises:
             ValueError: its parameters are not JSON.
         """
-        compared = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
+        states = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
-        return cls(number, task, params, horizon, columns[CONTROL_ACTIONS], compared, tuple(entries))
+        return cls(number, task, params, horizon, columns[CONTROL_ACTIONS], states, tuple(entries), size, films)
 
     def readers(self) -> dict[str, Callable[[World], NDArray[Any]]]:
         """Functions that read the streams from a world."""
@@ -77,38 +88,88 @@ class Recorded:
         return found
 
 
-def replayed(recorded: Recorded) -> Finding | None:
-    """What the replay of an episode finds; None if it gives the recorded states and the recorded success."""
+@dataclass(frozen=True)
+class Replayed:
+    """What the replay of an episode finds."""
+
+    findings: tuple[Finding, ...] = ()
+    checks: tuple[str, ...] = ("replay",)
+    """Names of the checks that were made."""
+
+
+def replayed(recorded: Recorded) -> Replayed:
+    """Play an episode again, and compare states, success and pictures."""
     try:
         return _replayed(recorded)
     except (ScengenError, ValueError, TypeError, KeyError) as error:
-        return Finding(
-            "REPLAY", "error", (), {}, f"the episode cannot be replayed: {' '.join(str(error).split())[:200]}"
-        )
+        return _fault(f"the episode cannot be replayed: {' '.join(str(error).split())[:200]}")
 
 
-def _replayed(recorded: Recorded) -> Finding | None:
-    task = recorded.task
-    scenario = task.scenario(recorded.params)
-    world, readers = world_of(scenario, task.embodiment), recorded.readers()
-    if recorded.actions.shape[2] != ACTION * len(hands(task.embodiment)):
-        return Finding("REPLAY", "error", (), {}, f"the actions are not those of {task.embodiment}")
-    episode = Episode(scenario, world, recorded.horizon)
-    for row, actions in enumerate(recorded.actions):
-        for name, values in recorded.streams.items():
-            error = float(np.abs(readers[name](world) - values[row]).max(initial=0.0))
-            if not error <= MAX_REPLAY_ERROR:
-                numbers = {"error": error, "limit": MAX_REPLAY_ERROR}
-                return Finding("REPLAY", "error", (row, row), numbers, f"replayed, {name} has other values")
-        for action in actions:
-            episode.step(action)
-    if episode.outcome != "success":
-        return Finding(
-            "REPLAY", "error", (), {}, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}"
-        )
-    return None
+def comparison_of(camera: str) -> str:
+    """Name of the check that compares a film with pictures of the replay."""
+    return f"pictures {camera}"
 
 
-def lost(recorded: Recorded, reason: str) -> Finding | None:
+def lost(recorded: Recorded, reason: str) -> Replayed:
     """The finding of a replay that has crashed its process, or has reached a limit."""
-    return Finding("REPLAY", "error", (), {}, f"replaying it {reason}")
+    return _fault(f"replaying it {reason}")
+
+
+def _fault(explanation: str, row: int | None = None, **numbers: float) -> Replayed:
+    frames = () if row is None else (row, row)
+    return Replayed((Finding("REPLAY", "error", frames, numbers, explanation),))
+
+
+def _replayed(recorded: Recorded) -> Replayed:
+    task = recorded.task
+    scenario, robot = task.scenario(recorded.params), task.embodiment
+    world, readers = World.load(rebuild(scenario), robot, visual=bool(recorded.films)), recorded.readers()
+    if recorded.actions.shape[2] != ACTION * len(hands(robot)):
+        return _fault(f"the actions are not those of {robot}")
+    with ExitStack() as stack:
+        films = _Films(recorded, scenario, world, stack)
+        episode = Episode(scenario, world, recorded.horizon)
+        for row, actions in enumerate(recorded.actions):
+            for name, values in recorded.streams.items():
+                error = float(np.abs(readers[name](world) - values[row]).max(initial=0.0))
+                if not error <= MAX_REPLAY_ERROR:
+                    return _fault(f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR)
+            films.compare(row)
+            for action in actions:
+                episode.step(action)
+    if episode.outcome != "success":
+        return _fault(f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
+    return Replayed(films.findings, ("replay", *films.checks))
+
+
+class _Films:
+    """The films of an episode beside pictures of its replay. Without OpenGL none is compared."""
+
+    def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack):
+        self._held, self._camera = scenario.orientation, None
+        self._probes: dict[tuple[str, int], Probe] = {}
+        self._differences: dict[str, list[NDArray[np.float64]]] = {}
+        if recorded.films:
+            with suppress(NoPictures):
+                self._camera = Camera(world, *recorded.size)
+                stack.callback(self._camera.close)
+                self._views = cameras_of(recorded.task.embodiment)
+                self._differences = {key: [] for key in recorded.films}
+                self._probes = {(key, each.row): each for key, probes in recorded.films.items() for each in probes}
+
+    def compare(self, row: int) -> None:
+        """Take the pictures of a row anew, if it is one of those to be compared."""
+        for key, differences in self._differences.items():
+            if self._camera and (probe := self._probes.get((key, row))):
+                picture = self._held.apply(self._camera.take(self._views[key.removeprefix(IMAGES_PREFIX)]))
+                differences.append(probe.differences(picture))
+
+    @property
+    def checks(self) -> list[str]:
+        """Names of the checks that were made."""
+        return [comparison_of(key) for key in self._differences]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the comparison of all rows has found."""
+        return tuple(one for key, told in self._differences.items() for one in compared(key, told))

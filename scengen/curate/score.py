@@ -18,6 +18,8 @@ OUTER = 3.0
 LEAST_SPREAD = 0.1
 """Smallest interquartile range that is assumed [medians]: demonstrations of a script are nearly alike, and one that is
 a little slower is not worse."""
+LEAST_GRIPS = 1.0
+"""Smallest interquartile range that is assumed for the number of grips: one more change is no retry, two are."""
 KEPT_SCORE = 4
 """Lowest score that is kept (paper, App. C)."""
 
@@ -57,7 +59,8 @@ def scores_of(terms: Sequence[Mapping[str, float]], tasks: Sequence[str], solved
     for number, task in enumerate(tasks):
         groups[task].append(number)
     for task, numbers in groups.items():
-        fences[task] = {name: _fences(np.array([terms[k][name] for k in numbers])) for name in terms[numbers[0]]}
+        measured = {name: np.array([terms[k][name] for k in numbers]) for name in terms[numbers[0]]}
+        fences[task] = {name: _fences(name, values) for name, values in measured.items()}
     found = []
     for own, task, success in zip(terms, tasks, solved, strict=True):
         high = sum(value > fences[task][name][0] for name, value in own.items())
@@ -67,9 +70,9 @@ def scores_of(terms: Sequence[Mapping[str, float]], tasks: Sequence[str], solved
     return found
 
 
-def _fences(values: NDArray[np.float64]) -> tuple[float, float]:
+def _fences(name: str, values: NDArray[np.float64]) -> tuple[float, float]:
     low, median, high = np.quantile(values, [0.25, 0.5, 0.75])
-    spread = max(high - low, LEAST_SPREAD * median)
+    spread = max(high - low, LEAST_SPREAD * median, LEAST_GRIPS if name == "grips" else 0.0)
     return float(high + INNER * spread), float(high + OUTER * spread)
 
 

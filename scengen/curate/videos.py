@@ -1,6 +1,8 @@
 """Checks of the decoded pictures of one episode and one camera."""
 
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,88 @@ WHITE = 245.0
 """Mean level above which a picture is white (lerobot-lint)."""
 STRIDE = 4
 """Distance of the rows and columns of pictures that are compared."""
+PROBE_EDGE = 32
+"""Width or height, whichever is larger, to which pictures are reduced before they are compared with a replay."""
+NEAR = 6
+"""Number of pictures before and after the one of a moment among which it is looked for."""
+PROBES = 3
+"""Number of moments of a film that are taken anew: in each third of it the one with most motion."""
+CLEARLY = 0.8
+"""Share of the difference from the picture of the same row below which another one is clearly more alike."""
+MISMATCH = 5.0
+"""Mean difference of a film from pictures taken anew above which it shows something else [grey levels]. Compression
+makes 1.2 to 1.6, another camera of the same scene 8."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A picture of a film with its neighbours, to be compared with one that is taken anew."""
+
+    row: int
+    near: NDArray[np.uint8]
+    """Reduced pictures of the rows from `row - NEAR` to `row + NEAR`, shape (2 NEAR + 1, height, width)."""
+
+    def differences(self, picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Mean differences of the pictures from one of the same size [grey levels], shape (2 NEAR + 1,)."""
+        return np.abs(self.near.astype(float) - reduced(picture)).mean(axis=(1, 2))
+
+
+def reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Mean grey levels of the blocks of a picture, shape (height / block, width / block)."""
+    block = max(1, max(picture.shape) // PROBE_EDGE)
+    height, width = (edge // block for edge in picture.shape[:2])
+    blocks = picture[: height * block, : width * block].reshape(height, block, width, block, -1)
+    return blocks.mean(axis=(1, 3, 4)).round().astype(np.uint8)
+
+
+class Prober:
+    """Chooses the probes of a film while it is decoded."""
+
+    def __init__(self, rows: int):
+        self._rows, self._near, self._count = rows, deque[NDArray[np.uint8]](maxlen=2 * NEAR + 1), 0
+        self._best: dict[int, tuple[float, Probe]] = {}
+
+    def watched(self, pictures: Iterable[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
+        """The same pictures."""
+        for picture in pictures:
+            self._near.append(reduced(picture))
+            self._count += 1
+            if len(self._near) == 2 * NEAR + 1:
+                self._consider(self._count - 1 - NEAR)
+            yield picture
+
+    def _consider(self, row: int) -> None:
+        before, now, after = (self._near[k].astype(float) for k in (NEAR - 1, NEAR, NEAR + 1))
+        motion = min(float(np.abs(now - other).mean()) for other in (before, after))
+        part = row * PROBES // self._rows
+        if part not in self._best or motion > self._best[part][0]:
+            self._best[part] = motion, Probe(row, np.array(self._near))
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """The probes of the pictures so far, in the order of their rows."""
+        return tuple(self._best[part][1] for part in sorted(self._best))
+
+
+def compared(camera: str, differences: Sequence[NDArray[np.float64]]) -> Iterator[Finding]:
+    """What the comparison of a film with pictures taken anew finds.
+
+    Args:
+        camera: key of the video.
+        differences: of each probe, see `Probe.differences`.
+    """
+    if not differences:
+        return
+    least = float(np.median([each.min() for each in differences]))
+    if least > MISMATCH:
+        told = {"difference": least, "limit": MISMATCH}
+        yield found("VIDEO_MISMATCH", f"{camera} shows something else than the replay", **told)
+        return
+    moved = [int(each.argmin()) - NEAR for each in differences if each.min() < CLEARLY * each[NEAR]]
+    if 2 * len(moved) > len(differences):
+        shift = float(np.median(moved))
+        explanation = f"{camera} is {'late' if shift > 0 else 'early'}: the replay looks as it does in other rows"
+        yield found("VIDEO_SHIFT", explanation, rows=shift, probes=len(moved))
 
 
 def check_video(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -32,6 +31,9 @@ DETOUR = 0.03
 """Largest displacement of the middle of a move through free space [m]: a third of the shortest such move."""
 PAUSE = 0.4
 """Longest pause before a move through free space [s]."""
+HESITATES = 1 / 3
+"""Share of the moves through free space that begin with a pause. With a pause before each of them a plan of twenty such
+moves took five seconds longer, and one run of six of `seesaw_balance` exceeded the time limit."""
 DISPLACEMENT = 0.015
 """Displacement of the commanded position from which a run recovers [m]."""
 GRASP_SLACK = 0.1
@@ -72,7 +74,11 @@ def style_of(name: str, *key: str | int) -> Style | None:
     """The style of one run, with its own pace; None for `NOMINAL`."""
     if name == NOMINAL:
         return None
-    number = partial(unit, "style", *key)
+
+    def number(*what: str | int) -> float:
+        drawn = unit("style", *key, *what)
+        return max(0.0, 1.0 - (1.0 - drawn) / HESITATES) if what[-1] == "pause" else drawn
+
     pace = SLOWEST + (FASTEST - SLOWEST) * number("pace")
     displacement = DISPLACEMENT if name == RECOVER else 0.0
     return Style(name, number, pace, DETOUR, PAUSE, displacement, GRASP_SLACK)

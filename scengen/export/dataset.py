@@ -101,6 +101,22 @@ class Recording:
         """Keys of the videos."""
         return [name for name, feature in self.info["features"].items() if feature["dtype"] == "video"]
 
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of the pictures [pixels]; 0 and 0 if there are none.
+
+        Raises:
+            PoolError: the description of a video has no size.
+        """
+        shapes = [self.info["features"][name].get("shape") for name in self.cameras]
+        match shapes:
+            case []:
+                return 0, 0
+            case [[int(height), int(width), *_], *_]:
+                return width, height
+            case _:
+                raise PoolError(f"{self.folder}/meta/info.json has no size of the pictures; record it again")
+
     def read(self) -> Iterator[EpisodeData]:
         """All episodes in their order.
 

@@ -19,9 +19,10 @@ from scengen.commands.settings import read_task
 from scengen.curate.curation import CurateSettings, curate
 from scengen.curate.findings import SCHEMA
 from scengen.curate.score import scores_of
-from scengen.curate.videos import check_video
+from scengen.curate.videos import PROBES, Prober, check_video, compared
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.errors import BadConfig, PoolError
+from scengen.export.dataset import Recording
 
 
 @pytest.fixture(scope="module")
@@ -213,6 +214,75 @@ def test_a_camera_may_stand_still_while_the_arm_does():
     assert not list(check_video("camera", still, 40, np.zeros(40, bool)))
 
 
+def probed(film, replay):
+    """Findings of a film beside pictures of its replay."""
+    prober = Prober(len(film))
+    assert len(list(prober.watched(film))) == len(film)
+    assert len(prober.probes) == PROBES
+    return list(compared("camera", [probe.differences(replay[probe.row]) for probe in prober.probes]))
+
+
+def test_a_film_of_the_replay_has_no_findings():
+    assert not probed(list(pictures()), list(pictures()))
+    assert not probed(list(noisy(pictures())), list(pictures()))
+
+
+def noisy(film):
+    """The same film after compression."""
+    pick = np.random.default_rng(1)
+    for picture in film:
+        yield np.clip(picture + pick.normal(0.0, 6.0, picture.shape), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("rows", [-5, -1, 1, 3])
+def test_a_film_that_is_late_or_early_is_found(rows):
+    film, shown = list(pictures(60)), list(pictures(60))
+    late = [*film[:1] * rows, *film[:-rows]] if rows > 0 else [*film[-rows:], *film[-1:] * -rows]
+    (finding,) = probed(list(noisy(late)), shown)
+    assert finding.check == "VIDEO_SHIFT" and finding.numbers["rows"] == rows
+    assert ("late" if rows > 0 else "early") in finding.explanation
+
+
+def test_a_film_of_something_else_is_found():
+    (finding,) = probed([255 - picture for picture in pictures()], list(pictures()))
+    assert finding.check == "VIDEO_MISMATCH"
+
+
+def test_films_are_compared_with_the_replay(tmp_path, capsys, monkeypatch):
+    made = (
+        ["demos", "task=domino_single", "n=1", f"to={tmp_path / 'demos'}"],
+        [
+            "record",
+            f"pool={tmp_path / 'demos'}",
+            f"to={tmp_path / 'data'}",
+            "cameras=[rgb_exo_right_cam]",
+            "width=96",
+            "height=72",
+        ],
+    )
+    assert [cli.run(words) for words in made] == [0, 0]
+    film = "observation.images.rgb_exo_right_cam"
+    clean = curated(tmp_path / "data").reports[0]
+    assert not clean.findings and clean.checks[-2:] == ("replay", f"pictures {film}")
+    whole = Recording.frames
+
+    def late(self, episode, camera):
+        pictures = list(whole(self, episode, camera))
+        return iter([*pictures[:1] * 4, *pictures[:-4]])
+
+    monkeypatch.setattr(Recording, "frames", late)
+    (finding,) = curated(tmp_path / "data").reports[0].findings
+    assert finding.check == "VIDEO_SHIFT" and finding.numbers["rows"] == 4
+
+    monkeypatch.setattr(Recording, "frames", whole)
+    monkeypatch.setenv("MUJOCO_GL", "glfw")  # which needs a display
+    monkeypatch.delenv("DISPLAY", raising=False)
+    report = curated(tmp_path / "data").reports[0]
+    assert not report.findings and report.checks[-1] == "replay", "what was not compared is not said to be"
+    assert cli.run(["curate", f"data={tmp_path / 'data'}"]) == 0
+    assert "pictures were not compared with the replay: no OpenGL" in capsys.readouterr().err
+
+
 # --- scores -----------------------------------------------------------------------------------
 
 
@@ -226,6 +296,13 @@ def test_scores_follow_from_the_terms():
     ]
     scores = scores_of([*usual, *strange], ["task"] * 24, [True] * 23 + [False])
     assert scores == [5] * 20 + [4, 3, 2, 1]
+
+
+def test_a_retry_is_seen_where_no_other_episode_has_one():
+    grips = [0.0] * 9
+    assert scores_of([{"grips": each} for each in [*grips, 1.0]], ["task"] * 10, [True] * 10)[-1] == 5
+    assert scores_of([{"grips": each} for each in [*grips, 2.0]], ["task"] * 10, [True] * 10)[-1] == 4
+    assert scores_of([{"grips": each} for each in [*grips, 4.0]], ["task"] * 10, [True] * 10)[-1] == 3
 
 
 # --- models -----------------------------------------------------------------------------------

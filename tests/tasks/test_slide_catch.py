@@ -19,6 +19,7 @@ from controls import (
     unchecked,
     unguarded,
 )
+from helpers import other_under_mujoco_4
 
 from scengen import load_task
 from scengen.assets.catch_bin import CatchBin
@@ -52,7 +53,10 @@ def idle():
     return np.array(times), np.array(places), np.array(velocities)
 
 
-@pytest.mark.parametrize("lane", range(3))
+RATTLES = other_under_mujoco_4("a block that rattles crosses the lip at 0.23 instead of 0.14 m/s")
+
+
+@pytest.mark.parametrize("lane", [0, 1, pytest.param(2, marks=RATTLES)])
 def test_a_block_is_over_the_lip_when_its_friction_and_its_place_say(idle, lane):
     times, places, velocities = idle
     row = int(np.argmax(places[:, lane, 0] < 0.0))
