@@ -72,10 +72,11 @@ SEED ?= 0
 fuzz: setup
 	$(BIN)/python tests/fuzz/run.py $(FUZZ) $(SEED)
 
-# Kills and continues KILLS generation runs. Their pools must have the same bytes at the end.
+# Kills and continues KILLS runs of scengen generate, or with RUNS=demos of scengen demos. They must have the same bytes at the end.
 KILLS ?= 50
+RUNS ?= generate
 kills: setup
-	$(BIN)/python tests/fuzz/kills.py $(KILLS) $(SEED)
+	$(BIN)/python tests/fuzz/kills.py $(KILLS) $(SEED) $(RUNS)
 
 check: setup
 	$(BIN)/ruff format --check

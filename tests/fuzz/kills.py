@@ -1,8 +1,9 @@
-"""Kills generation runs in every way and compares their pools in the end: `python tests/fuzz/kills.py 50 [seed] [ray]`.
+"""Kills runs in every way and compares what they make in the end: `python tests/fuzz/kills.py 50 [seed] [demos] [ray]`.
 
-A run is begun, killed after a random time, and continued until it ends. Its pool must have the bytes of one that was
-made without a break, and no process may stay. A kill that comes too late, after the end, is not counted. With `ray`,
-the runs that are killed work on a cluster of this machine (`executor.address=local`), and are finished without it.
+A run of `scengen generate`, or with `demos` of `scengen demos`, is begun, killed after a random time, and continued
+until it ends. Its folder must have the bytes of one that was made without a break, and no process may stay. A kill
+that comes too late, after the end, is not counted. With `ray`, the runs that are killed work on a cluster of this
+machine (`executor.address=local`), and are finished without it.
 """
 
 import os
@@ -16,6 +17,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -26,11 +28,29 @@ ON_RAY = ("executor=ray", "executor.address=local")
 """Settings of a run on a cluster of this machine."""
 RAY_LEAVES = 30.0
 """Time in which the processes of Ray end after those that they work for [s]."""
-N = 3
-"""Scenarios of a pool."""
 
 
-def start(pool: Path, workers: int, limit: int | None = None, more: Sequence[str] = ()) -> subprocess.Popen[str]:
+@dataclass(frozen=True)
+class Kind:
+    """A kind of run."""
+
+    words: tuple[str, ...]
+    """Command and settings."""
+    target: str
+    """Name of the setting for the folder."""
+    summary: str
+    """File of the folder that holds the hashes of all others."""
+
+
+KINDS = {
+    "generate": Kind(("generate", "n=3", *QUICKLY), "pool", "manifest.json"),
+    "demos": Kind(("demos", "n=30", "keep=[failed]"), "to", "demonstrations.json"),
+}
+
+
+def start(
+    kind: Kind, folder: Path, workers: int, limit: int | None = None, more: Sequence[str] = ()
+) -> subprocess.Popen[str]:
     """Begin or continue a run, in a process group of its own."""
 
     def prepare() -> None:
@@ -38,9 +58,9 @@ def start(pool: Path, workers: int, limit: int | None = None, more: Sequence[str
         if limit:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    argv = [sys.executable, "-m", "scengen", "generate", "task=domino_single", *QUICKLY, f"n={N}"]
+    argv = [sys.executable, "-m", "scengen", *kind.words, "task=domino_single"]
     return subprocess.Popen(
-        [*argv, *more, f"workers={workers}", f"pool={pool}"],
+        [*argv, *more, f"workers={workers}", f"{kind.target}={folder}"],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -60,10 +80,10 @@ def group(leader: int) -> list[int]:
     return found
 
 
-def hit(pool: Path, way: str, after: float, workers: int, more: Sequence[str] = ()) -> str | None:
+def hit(kind: Kind, folder: Path, way: str, after: float, workers: int, more: Sequence[str] = ()) -> str | None:
     """Begin or continue a run and kill it. What went wrong, or nothing; None if it had ended before."""
-    before = set(pool.parent.rglob("*.part"))
-    process = start(pool, workers, int(20_000 + 10_000 * after) if way == "disk" else None, more)
+    before = set(folder.parent.rglob("*.part"))
+    process = start(kind, folder, workers, int(20_000 + 10_000 * after) if way == "disk" else None, more)
     if way != "disk":
         with suppress(subprocess.TimeoutExpired):
             process.wait(after)
@@ -89,27 +109,27 @@ def hit(pool: Path, way: str, after: float, workers: int, more: Sequence[str] = 
     lines = [line for line in told.splitlines() if line.startswith("scengen") and "a Ray cluster" not in line]
     if "Traceback" in told or len(lines) > 1 or "damaged" in told:
         return f"said {told[-600:]!r}"
-    if way != "SIGKILL" and set(pool.parent.rglob("*.part")) - before:
+    if way != "SIGKILL" and set(folder.parent.rglob("*.part")) - before:
         return "a .part is left"
     return None if late or (way == "disk" and process.returncode == 0) else ""
 
 
-def finish(pool: Path) -> bytes:
-    """Continue a run to its end; its manifest, which holds the hashes of all files."""
-    process = start(pool, workers=1)
+def finish(kind: Kind, folder: Path) -> bytes:
+    """Continue a run to its end; the file that holds the hashes of all others."""
+    process = start(kind, folder, workers=1)
     _, told = process.communicate()
     if process.returncode != 0:
         raise RuntimeError(f"the run does not go on: {told[-600:]}")
-    return (pool / "manifest.json").read_bytes()
+    return (folder / kind.summary).read_bytes()
 
 
-def run(kills: int, seed: int, each: int = 3, more: Sequence[str] = ()) -> list[str]:
-    """Kill runs, at most `each` times every pool, until so many kills have hit; what went wrong."""
+def run(kind: Kind, kills: int, seed: int = 0, each: int = 3, more: Sequence[str] = ()) -> list[str]:
+    """Kill runs, at most `each` times every folder, until so many kills have hit; what went wrong."""
     pick, wrong = random.Random(seed), []
     hits: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         begun = time.monotonic()
-        whole = finish(Path(folder, "whole"))
+        whole = finish(kind, Path(folder, "whole"))
         seconds, pools = time.monotonic() - begun, 0
         if more:
             seconds += 8.0  # until a cluster has started
@@ -119,13 +139,13 @@ def run(kills: int, seed: int, each: int = 3, more: Sequence[str] = ()) -> list[
             pool = Path(folder, f"pool{pools}")
             for _ in range(min(each, kills - hits.total())):
                 way, after = min(ways, key=lambda name: (hits[name], name)), pick.uniform(0.1, seconds)
-                fault = hit(pool, way, after, workers=pick.choice((1, 2)), more=more)
+                fault = hit(kind, pool, way, after, workers=pick.choice((1, 2)), more=more)
                 hits[way] += fault is not None
                 if fault:
                     wrong.append(f"{way} after {after:.1f} s: {fault}")
                     print(wrong[-1], flush=True)
             try:
-                if finish(pool) != whole:
+                if finish(kind, pool) != whole:
                     wrong.append(f"pool {pools}: other bytes")
             except RuntimeError as error:
                 wrong.append(f"pool {pools}: {error}")
@@ -135,8 +155,9 @@ def run(kills: int, seed: int, each: int = 3, more: Sequence[str] = ()) -> list[
 
 
 def main() -> int:
+    numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
     more = ON_RAY if "ray" in sys.argv else ()
-    wrong = run(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0, more=more)
+    wrong = run(KINDS["demos" if "demos" in sys.argv else "generate"], *numbers, more=more)
     print("\n".join(wrong))
     return bool(wrong)
 
