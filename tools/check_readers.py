@@ -201,9 +201,8 @@ def by_lint(python: Path, recordings: Sequence[Path]) -> Iterator[Found]:
 def reason_of(one: Found) -> str:
     """Reason of a finding; empty if there is none."""
     text = f"{one.check} {one.message}" if one.reader == "lerobot-lint" else one.message
-    return next(
-        (why for (reader, words), why in REASONS.items() if reader == one.reader and re.search(words, text)), ""
-    )
+    reasons = (each for each in REASONS if each["reader"] == one.reader and re.search(each["words"], text))
+    return next((each["why"] for each in reasons), "")
 
 
 def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
@@ -238,6 +237,11 @@ def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
         "output of a policy, `action`, and fills a batch. robomimic's `SequenceDataset` reads sequences of 10 rows "
         "with two stacked frames, normalised single rows, and every filter key. Both must give the numbers of the "
         "files.",
+        "",
+        "lerobot-lint is made for arms whose actions are the joint angles of the next moment, entry by entry those of "
+        "`observation.state`. Here, as in LIBERO's recordings, an action is a motion of the hand, and the state has "
+        "more entries than the action: two of its checks end with an error of their own, and others take velocities "
+        "and quaternions for angles.",
         "",
     ]
     silent = [name for name in ("lerobot", "robomimic") if not any(one.reader == name for one in found)]
