@@ -26,7 +26,8 @@ from .findings import Finding
 from .videos import Probe, compared
 
 MAX_REPLAY_ERROR = 1e-6
-"""Largest difference of a stream [its unit]: streams are stored in single precision."""
+"""Largest difference of a stream [its unit], and relative to a value beyond 1: streams are stored in single
+precision."""
 FIRST = "_pos.x"
 """End of the name of a body's first entry in the environment state."""
 STREAMS = ("eef_pos", "eef_quat", "joint_pos", "gripper_qpos")
@@ -88,6 +89,11 @@ class Recorded:
         return found
 
 
+def difference(read: NDArray[np.float64], stored: NDArray[np.float32]) -> float:
+    """Largest difference of a reading from a stored one, in relation to values beyond 1."""
+    return float((np.abs(read - stored) / np.maximum(1.0, np.abs(stored))).max(initial=0.0))
+
+
 @dataclass(frozen=True)
 class Replayed:
     """What the replay of an episode finds."""
@@ -131,7 +137,7 @@ def _replayed(recorded: Recorded) -> Replayed:
         episode = Episode(scenario, world, recorded.horizon)
         for row, actions in enumerate(recorded.actions):
             for name, values in recorded.streams.items():
-                error = float(np.abs(readers[name](world) - values[row]).max(initial=0.0))
+                error = difference(readers[name](world), values[row])
                 if not error <= MAX_REPLAY_ERROR:
                     return _fault(f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR)
             films.compare(row)

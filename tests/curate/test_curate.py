@@ -18,6 +18,7 @@ from scengen.agents.models import Reply
 from scengen.commands.settings import read_task
 from scengen.curate.curation import CurateSettings, curate
 from scengen.curate.findings import SCHEMA
+from scengen.curate.replays import MAX_REPLAY_ERROR, difference
 from scengen.curate.score import scores_of
 from scengen.curate.videos import PROBES, Prober, check_video, compared
 from scengen.demos.generate import DemosSettings, generate_demonstrations
@@ -142,6 +143,16 @@ def test_an_injected_fault_is_found_in_its_episode_alone(mine, name):
     faulty = found.reports[1]
     assert check in {finding.check for finding in faulty.findings} if check else faulty.score == 1
     assert 1 not in found.kept and {0, 2, 3} <= set(found.kept)
+
+
+def test_a_stored_speed_of_a_fast_ball_is_rounded_and_no_fault():
+    speeds = np.random.default_rng(0).uniform(
+        -40.0, 40.0, 1000
+    )  # a ball of 15 mm that rolls at 0.6 m/s turns at 40 rad/s
+    stored = speeds.astype(np.float32)
+    assert np.abs(speeds - stored).max() > MAX_REPLAY_ERROR > difference(speeds, stored)
+    assert difference(speeds + 1e-4, stored) > MAX_REPLAY_ERROR
+    assert difference(np.array([0.5 + 2e-6]), np.array([0.5], np.float32)) > MAX_REPLAY_ERROR
 
 
 def test_a_frozen_state_is_found_where_the_arm_moves(mine):
