@@ -34,7 +34,7 @@ from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_
 from .remarks import with_remarks
 from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
-from .videos import Probe, Prober, check_video
+from .videos import FROZEN_CAMERA, Probe, Prober, check_video
 
 FOLDER = "curation"
 """Folder of the results, below that of the recording."""
@@ -121,7 +121,8 @@ def _examined(
         solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
         if readable:
             films, told = _videos(episode, recording)
-            findings += told
+            frozen = {camera: one for camera, one in told if settings.replay and one.check == FROZEN_CAMERA}
+            findings += [one for camera, one in told if frozen.get(camera) is not one]
             made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
             content = sha256(
                 np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + episode.about["scengen/id"].encode()
@@ -131,7 +132,9 @@ def _examined(
             if settings.replay:
                 task = compose.load_task(episode.task, search)
                 entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
-                jobs.append(Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films))
+                jobs.append(
+                    Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)
+                )
         about = episode.about
         style = str(about.get("scengen/style", ""))
         reports.append(
@@ -156,15 +159,16 @@ def _scores_of_readable(
     return found
 
 
-def _videos(episode: EpisodeData, recording: Recording) -> tuple[dict[str, tuple[Probe, ...]], list[Finding]]:
-    """Parts of the films that are to be compared with a replay, and what the films alone show."""
+def _videos(
+    episode: EpisodeData, recording: Recording
+) -> tuple[dict[str, tuple[Probe, ...]], list[tuple[str, Finding]]]:
+    """Parts of the films that are to be compared with a replay, and what each film alone shows."""
     moving = Subject(episode, recording).moves.any(axis=1)
-    findings: list[Finding] = []
-    films = {}
+    films, findings = {}, list[tuple[str, Finding]]()
     for camera in recording.cameras:
         prober = Prober(len(episode))
         pictures = prober.watched(recording.frames(episode, camera))
-        findings += check_video(camera, pictures, len(episode), moving)
+        findings += [(camera, one) for one in check_video(camera, pictures, len(episode), moving)]
         films[camera] = prober.probes
     return films, findings
 

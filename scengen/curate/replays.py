@@ -17,13 +17,13 @@ from ..errors import ScengenError
 from ..export.lerobot import IMAGES_PREFIX
 from ..export.recording import CONTROL_ACTIONS
 from ..export.streams import ENVIRONMENT
-from ..pictures.render import Camera, NoPictures
+from ..pictures.render import Camera, NoPictures, Picture
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World, hands
 from ..validate.rebuilt import rebuild
 from .findings import Finding
-from .videos import Probe, compared
+from .videos import Probe, compared, stands_still
 
 MAX_REPLAY_ERROR = 1e-6
 """Largest difference of a stream [its unit], and relative to a value beyond 1: streams are stored in single
@@ -52,6 +52,9 @@ class Recorded:
     """Width and height of the pictures [pixels]."""
     films: Mapping[str, tuple[Probe, ...]]
     """Parts of the film of each camera."""
+    frozen: Mapping[str, Finding]
+    """The finding of each camera whose picture stands still while the arm moves. It holds if that of the replay moves,
+    and if there is none."""
 
     @classmethod
     def of(
@@ -63,6 +66,7 @@ class Recorded:
         entries: Sequence[str],
         size: tuple[int, int],
         films: Mapping[str, tuple[Probe, ...]],
+        frozen: Mapping[str, Finding],
     ) -> "Recorded":
         """The parts of an episode that a replay compares.
 
@@ -74,7 +78,8 @@ class Recorded:
         """
         states = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
-        return cls(number, task, params, horizon, columns[CONTROL_ACTIONS], states, tuple(entries), size, films)
+        actions, entries = columns[CONTROL_ACTIONS], tuple(entries)
+        return cls(number, task, params, horizon, actions, states, entries, size, films, frozen)
 
     def readers(self) -> dict[str, Callable[[World], NDArray[Any]]]:
         """Functions that read the streams from a world."""
@@ -108,7 +113,7 @@ def replayed(recorded: Recorded) -> Replayed:
     try:
         return _replayed(recorded)
     except (ScengenError, ValueError, TypeError, KeyError) as error:
-        return _fault(f"the episode cannot be replayed: {' '.join(str(error).split())[:200]}")
+        return _fault(recorded, f"the episode cannot be replayed: {' '.join(str(error).split())[:200]}")
 
 
 def comparison_of(camera: str) -> str:
@@ -118,12 +123,12 @@ def comparison_of(camera: str) -> str:
 
 def lost(recorded: Recorded, reason: str) -> Replayed:
     """The finding of a replay that has crashed its process, or has reached a limit."""
-    return _fault(f"replaying it {reason}")
+    return _fault(recorded, f"replaying it {reason}")
 
 
-def _fault(explanation: str, row: int | None = None, **numbers: float) -> Replayed:
+def _fault(recorded: Recorded, explanation: str, row: int | None = None, **numbers: float) -> Replayed:
     frames = () if row is None else (row, row)
-    return Replayed((Finding("REPLAY", "error", frames, numbers, explanation),))
+    return Replayed((Finding("REPLAY", "error", frames, numbers, explanation), *recorded.frozen.values()))
 
 
 def _replayed(recorded: Recorded) -> Replayed:
@@ -131,7 +136,7 @@ def _replayed(recorded: Recorded) -> Replayed:
     scenario, robot = task.scenario(recorded.params), task.embodiment
     world, readers = World.load(rebuild(scenario), robot, visual=bool(recorded.films)), recorded.readers()
     if recorded.actions.shape[2] != ACTION * len(hands(robot)):
-        return _fault(f"the actions are not those of {robot}")
+        return _fault(recorded, f"the actions are not those of {robot}")
     with ExitStack() as stack:
         films = _Films(recorded, scenario, world, stack)
         episode = Episode(scenario, world, recorded.horizon)
@@ -139,12 +144,14 @@ def _replayed(recorded: Recorded) -> Replayed:
             for name, values in recorded.streams.items():
                 error = difference(readers[name](world), values[row])
                 if not error <= MAX_REPLAY_ERROR:
-                    return _fault(f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR)
+                    return _fault(
+                        recorded, f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR
+                    )
             films.compare(row)
             for action in actions:
                 episode.step(action)
     if episode.outcome != "success":
-        return _fault(f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
+        return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
     return Replayed(films.findings, ("replay", *films.checks))
 
 
@@ -155,6 +162,7 @@ class _Films:
         self._held, self._camera = scenario.orientation, None
         self._probes: dict[tuple[str, int], Probe] = {}
         self._differences: dict[str, list[NDArray[np.float64]]] = {}
+        self._frozen, self._ends = recorded.frozen, dict[str, list[Picture]]()
         if recorded.films:
             with suppress(NoPictures):
                 self._camera = Camera(world, *recorded.size)
@@ -165,10 +173,16 @@ class _Films:
 
     def compare(self, row: int) -> None:
         """Take the pictures of a row anew, if it is one of those to be compared."""
-        for key, differences in self._differences.items():
-            if self._camera and (probe := self._probes.get((key, row))):
-                picture = self._held.apply(self._camera.take(self._views[key.removeprefix(IMAGES_PREFIX)]))
-                differences.append(probe.differences(picture))
+        for key in self._differences:
+            probe, frozen = self._probes.get((key, row)), self._frozen.get(key)
+            if probe is None and (frozen is None or row not in frozen.frames):
+                continue
+            assert self._camera is not None
+            picture = self._held.apply(self._camera.take(self._views[key.removeprefix(IMAGES_PREFIX)]))
+            if probe:
+                self._differences[key].append(probe.differences(picture))
+            if frozen and row in frozen.frames:
+                self._ends.setdefault(key, []).append(picture)
 
     @property
     def checks(self) -> list[str]:
@@ -178,4 +192,6 @@ class _Films:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What the comparison of all rows has found."""
-        return tuple(one for key, told in self._differences.items() for one in compared(key, told))
+        shifts = [one for key, told in self._differences.items() for one in compared(key, told)]
+        still = [key for key, ends in self._ends.items() if stands_still(ends[0], ends[-1])]
+        return (*shifts, *(one for key, one in self._frozen.items() if key not in still))

@@ -18,6 +18,8 @@ SCENE_CHANGE = 10.0
 App. C: MAD score)."""
 FROZEN = 0.5
 """Mean difference of two pictures below which they are the same [grey levels] (lerobot-lint)."""
+FROZEN_CAMERA = "FROZEN_CAMERA"
+"""Name of the check for a picture that stands still while the arm moves."""
 BLACK = 10.0
 """Mean level below which a picture is black (lerobot-lint)."""
 WHITE = 245.0
@@ -87,6 +89,11 @@ class Prober:
         return tuple(self._best[part][1] for part in sorted(self._best))
 
 
+def stands_still(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> bool:
+    """Whether two pictures of a replay show the same: the arm is out of view."""
+    return float(np.abs(reduced(before).astype(float) - reduced(after)).mean()) < FROZEN
+
+
 def compared(camera: str, differences: Sequence[NDArray[np.float64]]) -> Iterator[Finding]:
     """What the comparison of a film with pictures taken anew finds.
 
@@ -147,5 +154,5 @@ def check_video(
         frozen = frozen + 1 if same[number] and moving[max(0, number - 1)] else 0
         if frozen > FROZEN_FRAMES:
             where = (number - frozen + 1, number)
-            yield found("FROZEN_CAMERA", f"{camera} shows the same picture while the arm moves", where, pictures=frozen)
+            yield found(FROZEN_CAMERA, f"{camera} shows the same picture while the arm moves", where, pictures=frozen)
             return

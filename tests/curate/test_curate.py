@@ -20,7 +20,7 @@ from scengen.curate.curation import CurateSettings, curate
 from scengen.curate.findings import SCHEMA
 from scengen.curate.replays import MAX_REPLAY_ERROR, difference
 from scengen.curate.score import scores_of
-from scengen.curate.videos import PROBES, Prober, check_video, compared
+from scengen.curate.videos import PROBES, Prober, check_video, compared, stands_still
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.errors import BadConfig, PoolError
 from scengen.export.dataset import Recording
@@ -259,6 +259,11 @@ def test_a_film_of_something_else_is_found():
     assert finding.check == "VIDEO_MISMATCH"
 
 
+def test_what_stands_still_in_the_replay_may_stand_still_in_the_film():
+    first, *_, last = pictures()
+    assert stands_still(first, first) and not stands_still(first, last)
+
+
 def test_films_are_compared_with_the_replay(tmp_path, capsys, monkeypatch):
     made = (
         ["demos", "task=domino_single", "n=1", f"to={tmp_path / 'demos'}"],
@@ -285,6 +290,12 @@ def test_films_are_compared_with_the_replay(tmp_path, capsys, monkeypatch):
     (finding,) = curated(tmp_path / "data").reports[0].findings
     assert finding.check == "VIDEO_SHIFT" and finding.numbers["rows"] == 4
 
+    def frozen(self, episode, camera):
+        pictures = list(whole(self, episode, camera))
+        return iter([*pictures[:5], *pictures[5:6] * 25, *pictures[30:]])
+
+    monkeypatch.setattr(Recording, "frames", frozen)
+    assert "FROZEN_CAMERA" in {finding.check for finding in curated(tmp_path / "data").reports[0].findings}
     monkeypatch.setattr(Recording, "frames", whole)
     monkeypatch.setenv("MUJOCO_GL", "glfw")  # which needs a display
     monkeypatch.delenv("DISPLAY", raising=False)
