@@ -1,22 +1,27 @@
-"""write a strip or a video of a witness, of a failing shortcut, or of the adversary"""
+"""write a strip or a video of a witness, a failing shortcut, a demonstration, a policy's rollout, or the adversary"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig, at_least, cut
 from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ..pictures.render import check_pictures, encode
 from ..pool import Pool
+from ..pool.demonstrations import Demonstrations, is_demonstrations
+from ..pool.row import DemonstrationRow
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
+from ..validate.stored import task_of_manifest
 from ..work.targets import try_file
-from . import OK, Arguments, chosen, err, holder, say, write
+from . import OK, Arguments, chosen, err, holder, say, several, write
 from .settings import read
 
 MAX_STRIP_PIXELS = 100_000_000
@@ -32,6 +37,7 @@ class FilmSettings:
     hit: str | None
     to: str
     of: str
+    run: int | None
     raw: bool
     camera: str | None
     frames: int
@@ -72,7 +78,7 @@ def command(arguments: Arguments) -> int:
     settings.check()
     try_file(settings.to)
     check_pictures()
-    take = _take_of_hit(settings, arguments) if settings.hit else _take_of_pool(settings, arguments)
+    take = _take(settings, arguments)
     target, size = Path(settings.to), (settings.width, settings.height)
     with ProgressBar(err, "film", 1) as bar:
         if target.suffix == ".png":
@@ -81,6 +87,45 @@ def command(arguments: Arguments) -> int:
             movie(take, target, settings.fps, *size, settings.eye, bar.of)
     say(f"wrote {target}: {take.seconds:g} s")
     return OK
+
+
+def _take(settings: FilmSettings, arguments: Arguments) -> Take:
+    if settings.hit:
+        return _take_of_hit(settings, arguments)
+    folders = several(settings.pool or "")
+    if any(map(is_demonstrations, folders)):
+        return _take_of_run(settings, folders, arguments)
+    if settings.run is not None:
+        raise BadConfig(f"run = {settings.run}; a scenario of a pool has one witness: leave out run=")
+    return _take_of_pool(settings, arguments)
+
+
+def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Arguments) -> Take:
+    """A take of a demonstration or of a rollout of a policy, failed ones included if they were kept.
+
+    Raises:
+        ScengenError: there is none of this scenario, or none of this number.
+    """
+    if settings.of != WITNESS:
+        raise BadConfig(f"of = {settings.of}; what is filmed of demonstrations is the run itself: leave out of=")
+    name, found = str(settings.id), dict[int, tuple[Demonstrations, DemonstrationRow]]()
+    for folder in folders:
+        source = Demonstrations.open(folder).check()
+        for row in chain(source.rows(), source.failures()):
+            if row.id.startswith(name) or str(row.name) == name:
+                found.setdefault(row.run, (source, row))
+    if not found:
+        raise BadConfig(f"id = {cut(name)}; no run in {', '.join(folders)} is of this scenario, or none was kept")
+    if len({row.id for _, row in found.values()}) > 1:
+        raise BadConfig(f"id = {cut(name)}; several scenarios begin so: give more of the id")
+    number = min(found) if settings.run is None else settings.run
+    if number not in found:
+        raise BadConfig(f"run = {number}; of this scenario there are {', '.join(map(str, sorted(found)))}")
+    source, row = found[number]
+    outcome = f"{row.outcome} after {row.seconds:g} s{': ' if row.reason else ''}{row.reason}"
+    say(f"{check_row(row).name}, run {number} ({row.style}): {outcome}")
+    task = task_of_manifest(source, compose.load_task(source.task, search_path(arguments)))
+    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness)
 
 
 def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:

@@ -5,8 +5,8 @@ from contextlib import contextmanager, suppress
 
 from ..episode import Actions
 from ..errors import PoolError, Unstable, cut
-from ..pool import PoolRow
 from ..pool.row import NO_WITNESS, SceneRow
+from ..pool.rows import AnyRow
 from ..sim.world import World
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, apart, each
 
@@ -67,7 +67,7 @@ def _try(row: SceneRow) -> tuple[str, str] | None:
     return None
 
 
-def check_row(row: PoolRow) -> PoolRow:
+def check_row(row: AnyRow) -> AnyRow:
     """Refuse a scenario that crashes or exceeds the limits of a scenario.
 
     Raises:

@@ -43,6 +43,24 @@ def test_kept_rollouts_say_their_policy_and_are_those_of_the_evaluation(kept):
         assert all(row.style == "policy" and row.id in scenarios and len(row.witness) for row in rows)
 
 
+def test_a_rollout_that_failed_is_filmed(kept, tmp_path, capsys):
+    folder = kept / "random" / "rollouts" / REFERENCE.name
+    (row, *_) = Demonstrations.open(folder).failures()
+    film = [f"pool={folder}", f"id={row.id[:8]}", f"to={tmp_path / 'film.png'}", "frames=2", "width=64", "height=48"]
+    assert cli.run(["film", *film]) == 0 and (tmp_path / "film.png").stat().st_size
+    assert f"{row.name}, run 0 (policy): {row.outcome} after {row.seconds:g} s: {row.reason}" in capsys.readouterr().out
+    for wrong, says in (
+        (["run=3"], "run = 3; of this scenario there are 0"),
+        (["of=push_the_slab"], "of = push_the_slab; what is filmed of demonstrations is the run itself"),
+        (["id=zzz"], "id = zzz; no run in"),
+    ):
+        assert cli.run(["film", *film, *wrong]) == 2
+        err = capsys.readouterr().err
+        assert says in err and err.count("\n") == 1
+    assert cli.run(["film", f"pool={REFERENCE}", *film[1:], "run=0"]) == 2
+    assert "a scenario of a pool has one witness" in capsys.readouterr().err
+
+
 def test_kept_rollouts_replay_bit_for_bit(kept, capsys):
     for policy in ("oracle", "random"):
         assert cli.run(["verify", f"pool={kept / policy / 'rollouts' / REFERENCE.name}"]) == 0
