@@ -57,9 +57,10 @@ that none can: the oracle solves every scenario, and doing nothing solves none; 
 * **replay**: the witness of the nearest other training scenario, played without looking: the success of pure memory.
 * Brackets: 95 % Wilson interval. **why not**: the most frequent reasons of failures.
 
-What films of failures show (`scengen evaluate keep=[episodes]`, `scengen film`): in training of `balance_medium` the
-hand stops a few millimetres over the ridge, drifts along it by 9 to 65 mm, and lets the rod go beside its middle. With
-the force at the wrist as another stream, and with three and ten times as many epochs, the rate stays between 35 and 60 %.
+What films of failures show (`scengen evaluate keep=[episodes]`, `scengen film`): in training of `balance_medium`
+the hand stops a few millimetres over the ridge, drifts along it by 9 to 65 mm, and lets the rod go beside its
+middle. With the force at the wrist as another stream, and with three and ten times as many epochs, the rate stays
+between 35 and 60 %.
 
 """
 COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
