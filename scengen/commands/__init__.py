@@ -3,7 +3,8 @@
 import json
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -100,12 +101,18 @@ def holder(pool: str | list[str] | None, name: str) -> Pool:
 
 def chosen(pool: Pool, name: str) -> PoolRow:
     """The scenario `name` of a pool. A remark is printed if the name contradicts the id in it."""
+    with misnaming_remarked():
+        return pool.row(name)
+
+
+@contextmanager
+def misnaming_remarked() -> Iterator[None]:
+    """Print a remark if a name that is looked up contradicts the id in it."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", Misnamed)
-        row = pool.row(name)
+        yield
     for one in told:
         remark(str(one.message))
-    return row
 
 
 def write_json(path: str, result: Any) -> None:

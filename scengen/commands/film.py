@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
+
+import numpy as np
 
 from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
-from ..errors import BadConfig, at_least, cut
+from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ..pictures.render import check_pictures, encode
 from ..pool import Pool
 from ..pool.demonstrations import Demonstrations, is_demonstrations
+from ..pool.directory import Directory
 from ..pool.row import DemonstrationRow
 from ..runs.progress import ProgressBar
 from ..task_files import search_path
@@ -21,7 +23,7 @@ from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
 from ..validate.stored import task_of_manifest
 from ..work.targets import try_file
-from . import OK, Arguments, chosen, err, holder, say, several, write
+from . import OK, Arguments, chosen, err, holder, misnaming_remarked, say, several, write
 from .settings import read
 
 MAX_STRIP_PIXELS = 100_000_000
@@ -108,20 +110,20 @@ def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Argu
     """
     if settings.of != WITNESS:
         raise BadConfig(f"of = {settings.of}; what is filmed of demonstrations is the run itself: leave out of=")
-    name, found = str(settings.id), dict[int, tuple[Demonstrations, DemonstrationRow]]()
-    for folder in folders:
-        source = Demonstrations.open(folder).check()
-        for row in chain(source.rows(), source.failures()):
-            if row.id.startswith(name) or str(row.name) == name:
-                found.setdefault(row.run, (source, row))
-    if not found:
-        raise BadConfig(f"id = {cut(name)}; no run in {', '.join(folders)} is of this scenario, or none was kept")
-    if len({row.id for _, row in found.values()}) > 1:
-        raise BadConfig(f"id = {cut(name)}; several scenarios begin so: give more of the id")
-    number = min(found) if settings.run is None else settings.run
-    if number not in found:
-        raise BadConfig(f"run = {number}; of this scenario there are {', '.join(map(str, sorted(found)))}")
-    source, row = found[number]
+    sources = [Demonstrations.open(folder).check() for folder in folders]
+    names = [row.name for source in sources for row in source.attempts()]
+    known = Directory(np.array([name.id for name in names], "S12"), np.array([name.index for name in names], np.int64))
+    with misnaming_remarked():
+        id_ = known.id(known.find(str(settings.id), names.__getitem__, ", ".join(folders)))
+    runs = dict[int, tuple[Demonstrations, DemonstrationRow]]()
+    for source in sources:
+        for row in source.attempts():
+            if row.id == id_:
+                runs.setdefault(row.run, (source, row))
+    number = min(runs) if settings.run is None else settings.run
+    if number not in runs:
+        raise BadConfig(f"run = {number}; of this scenario there are {', '.join(map(str, sorted(runs)))}")
+    source, row = runs[number]
     outcome = f"{row.outcome} after {row.seconds:g} s{': ' if row.reason else ''}{row.reason}"
     say(f"{check_row(row).name}, run {number} ({row.style}): {outcome}")
     task = task_of_manifest(source, compose.load_task(source.task, search_path(arguments)))

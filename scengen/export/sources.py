@@ -51,13 +51,8 @@ def rows_of(pools: Sequence[Source], count: int, failed: bool = False) -> Iterat
     Args:
         failed: whether the failed attempts of demonstrations count, too, if they were kept.
     """
-    return islice(chain.from_iterable(_rows_of(source, failed) for source in pools), count)
-
-
-def _rows_of(source: Source, failed: bool) -> Iterator[SceneRow]:
-    yield from source.rows()
-    if failed and isinstance(source, Demonstrations):
-        yield from source.failures()
+    found = (s.attempts() if failed and isinstance(s, Demonstrations) else s.rows() for s in pools)
+    return islice(chain.from_iterable(found), count)
 
 
 def number_of(source: Source, failed: bool) -> int:

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -207,6 +208,10 @@ class Demonstrations(StoredRows[DemonstrationManifest, DemonstrationRow]):
             PoolError: their file cannot be read.
         """
         return self._rows_of_file(self.manifest.failed)
+
+    def attempts(self) -> Iterator[DemonstrationRow]:
+        """The demonstrations, then the failed attempts, if they were kept."""
+        return chain(self.rows(), self.failures())
 
 
 def write_demonstrations(

@@ -74,8 +74,8 @@ def attempt_refutation():
 
 def test_the_witness_and_a_shortcut_of_a_pool(capsys):
     pool = f"pool={REFERENCE}"
-    certificate = next(row.certificate for row in Pool.open(REFERENCE).rows() if row.id.startswith("8ed4"))
-    (seconds,) = (check.numbers["seconds"] for check in certificate.checks if check.name == "witness")
+    checks = Pool.open(REFERENCE).row("8ed4").certificate.checks
+    (seconds,) = (check.numbers["seconds"] for check in checks if check.name == "witness")
     assert told(capsys, pool, "id=8ed4", "what=witness") == (
         0, [f"domino_single/id@0/8ed4a4577fe0, witness: success after {seconds} s"],
     )  # fmt: skip

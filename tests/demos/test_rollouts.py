@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -52,13 +53,23 @@ def test_a_rollout_that_failed_is_filmed(kept, tmp_path, capsys):
     for wrong, says in (
         (["run=3"], "run = 3; of this scenario there are 0"),
         (["of=push_the_slab"], "of = push_the_slab; what is filmed of demonstrations is the run itself"),
-        (["id=zzz"], "id = zzz; no run in"),
+        (["id=zzz"], f"no scenario in {folder} named 'zzz'"),
     ):
         assert cli.run(["film", *film, *wrong]) == 2
         err = capsys.readouterr().err
         assert says in err and err.count("\n") == 1
     assert cli.run(["film", f"pool={REFERENCE}", *film[1:], "run=0"]) == 2
     assert "a scenario of a pool has one witness" in capsys.readouterr().err
+
+
+def test_a_prefix_of_several_ids_names_no_rollout(tmp_path, capsys):
+    idle = ["policy=idle", "seeds=4", "rollouts=1", "keep=[episodes]", f"to={tmp_path / 'idle'}"]
+    assert cli.run(["evaluate", f"pool={REFERENCE}", *idle]) == 0
+    folder = tmp_path / "idle" / "rollouts" / REFERENCE.name
+    start = next(a for a, b in pairwise(sorted(row.id[0] for row in Demonstrations.open(folder).attempts())) if a == b)
+    capsys.readouterr()
+    assert cli.run(["film", f"pool={folder}", f"id={start}", f"to={tmp_path / 'film.png'}"]) == 2
+    assert f"'{start}' begins 2 ids in {folder}" in capsys.readouterr().err
 
 
 def test_kept_rollouts_replay_bit_for_bit(kept, capsys):
