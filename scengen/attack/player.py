@@ -15,6 +15,7 @@ from ..errors import BadConfig, GaveUp
 from ..geometry import Vec3
 from ..scenario import Plan, Scenario
 from ..sim.world import World
+from ..skills.motion import alone
 from ..validate.rollout import Stillness
 from . import macros, plans
 from .macros import Macro
@@ -141,7 +142,8 @@ class Player:
                 return by_the_clock(self.world, self.trace, macro.numbers)
             case "along":
                 way = self.trace.way_of(macro.target)
-                return plans.carry_along(self.world.arms[macro.arm], macro.target, way, *macro.numbers)
+                arm = self.world.arms[macro.arm]
+                return alone(arm, plans.carry_along(arm, macro.target, way, *macro.numbers))
             case "shortcut":
                 return self.scenario.shortcuts()[macro.target].plan(self.world)
             case "answer":

@@ -78,3 +78,11 @@ def test_a_body_is_carried_along_its_way_with_the_narrow_side_of_the_hand_across
     assert played.solved
     world = World.load(player.scene_xml, player.embodiment)
     assert "behind the wall" in replay(closed, world, played.actions, player.horizon, until_settled=True).reason
+
+
+def test_each_kind_of_plan_for_one_arm_is_played_where_there_are_two():
+    player = player_of("plate_shelf_hobi")
+    first = {attempt.macros[-1].kind: attempt for attempt in reversed(list(servo(player)))}
+    assert {"along", "bring", "move"} <= first.keys()
+    for attempt in first.values():
+        assert player.play(attempt.macros, raw=False).actions.shape[1] == 14
