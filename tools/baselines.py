@@ -8,6 +8,7 @@ docs/axes.md and docs/predictors.md read, too. A repeated call continues.
 import json
 import sys
 from collections import Counter
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,8 @@ MADE = Path("generated/baselines")
 """Folder of pools, demonstrations and policies."""
 RECORDS = Path("records/baselines")
 """Folder of the results, one file for each task."""
+CURVES = Path("records/curves")
+"""Folder of the results of tools/learning_curves.py, one file for each task."""
 PAGE = Path("docs/baselines.md")
 HEAD = f"""# Baselines
 
@@ -64,6 +67,14 @@ between 35 and 60 %.
 
 """
 COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
+LEARNING_CURVES = """
+## Learning curves
+
+Scenarios solved of 20 by policies that were trained on the first demonstrations: the mean of three trainings with
+different seeds, and in brackets the lowest and the highest of them. `knn` has no seed. Made by
+`python tools/learning_curves.py`; empty cells are not measured yet.
+
+"""
 
 
 def main(*arguments: str) -> None:
@@ -79,15 +90,8 @@ def main(*arguments: str) -> None:
 
 def measure(task: str, axes: tuple[str, ...]) -> None:
     """Make what is missing for a task, and store its results after each policy."""
-    folder, splits = MADE / task, (ID, *axes)
-    pools = [folder / split for split in splits]
-    for split, pool in zip(splits, pools, strict=True):
-        if not (pool / "manifest.json").is_file():
-            run("generate", f"task={task}", f"split={split}", f"n={SCENARIOS}", f"pool={pool}")
-    demos, data = folder / "demos", folder / "recording"
-    if not data.exists():
-        run("demos", f"task={task}", f"n={DEMONSTRATIONS}", f"to={demos}", f"apart=[{','.join(map(str, pools))}]")
-        run("record", f"pool={demos}", f"to={data}", "cameras=none")
+    pools, data = prepare(task, axes)
+    folder = MADE / task
     found: list[dict[str, Any]] = []
     RECORDS.mkdir(parents=True, exist_ok=True)
     for policy in (*POLICIES, REPLAY):
@@ -95,11 +99,42 @@ def measure(task: str, axes: tuple[str, ...]) -> None:
         if policy in POLICIES:
             run("train", f"policy={policy}", f"data={data}", f"to={trained}")
         played = folder / f"{policy}-evaluation-{len(axes)}"  # an evaluation is bound to its pools
-        name, pooled = str(trained) if policy in POLICIES else policy, ",".join(map(str, pools))
-        run("evaluate", f"policy={name}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={played}")
-        found += _results(task, policy, trained, played, dict(zip(map(str, pools), splits, strict=True)))
+        play(str(trained) if policy in POLICIES else policy, [*pools.values()], played)
+        found += _results(task, policy, trained, played, pools)
         lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in found)
         (RECORDS / f"{task}.jsonl").write_text(lines)
+
+
+def prepare(task: str, axes: tuple[str, ...]) -> tuple[dict[str, Path], Path]:
+    """Make the pools and the recording of a task that are missing. Returns the pools by split, and the recording."""
+    folder = MADE / task
+    pools = {split: folder / split for split in (ID, *axes)}
+    for split, pool in pools.items():
+        if not (pool / "manifest.json").is_file():
+            run("generate", f"task={task}", f"split={split}", f"n={SCENARIOS}", f"pool={pool}")
+    demos, data = folder / "demos", folder / "recording"
+    if not data.exists():
+        apart = ",".join(map(str, pools.values()))
+        run("demos", f"task={task}", f"n={DEMONSTRATIONS}", f"to={demos}", f"apart=[{apart}]")
+        run("record", f"pool={demos}", f"to={data}", "cameras=none")
+    return pools, data
+
+
+def play(policy: str, pools: list[Path], to: Path) -> None:
+    """Evaluate a policy once on each scenario of some pools."""
+    pooled = ",".join(map(str, pools))
+    run("evaluate", f"policy={policy}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={to}")
+
+
+def episodes(played: Path, pool: Path) -> list[dict[str, Any]]:
+    """The episodes of an evaluation that were played in a pool."""
+    every = map(json.loads, (played / "episodes.jsonl").read_text().splitlines()[1:])
+    return [episode for episode in every if episode["pool"] == str(pool)]
+
+
+def solved(played: Path, pool: Path) -> int:
+    """Number of scenarios of a pool that an evaluation has solved."""
+    return sum(episode["success"] for episode in episodes(played, pool))
 
 
 def run(*argv: str) -> None:
@@ -108,17 +143,16 @@ def run(*argv: str) -> None:
         sys.exit(f"scengen {' '.join(argv)} failed")
 
 
-def _results(task: str, policy: str, trained: Path, played: Path, splits: dict[str, str]) -> list[dict[str, Any]]:
+def _results(task: str, policy: str, trained: Path, played: Path, pools: dict[str, Path]) -> list[dict[str, Any]]:
     """One record for each split."""
     told: dict[str, Any] = {"task": task, "policy": policy}
     if policy in POLICIES:
         own = read_settings(trained)
         names = ("demonstrations", "rows", "epochs", "data_sha256", "weights_sha256")
         told |= {name: getattr(own, name) for name in names}
-    episodes = [json.loads(line) for line in (played / "episodes.jsonl").read_text().splitlines()[1:]]
     records = []
-    for pool, split in splits.items():
-        own = [episode for episode in episodes if episode["pool"] == pool]
+    for split, pool in pools.items():
+        own = episodes(played, pool)
         reasons = Counter(episode["reason"] for episode in own if not episode["success"])
         counts = {"scenarios": len(own), "solved": sum(episode["success"] for episode in own), "reasons": dict(reasons)}
         made = Pool.open(pool)
@@ -137,7 +171,30 @@ def page() -> str:
         order = {split: k for k, split in enumerate((ID, *load_task(task).axes))} if records else {}
         known = [record for record in records if record["split"] in order]
         lines += [_line(record) for record in sorted(known, key=lambda record: order[record["split"]])]
-    return HEAD + "\n".join(lines) + "\n"
+    return HEAD + "\n".join(lines) + "\n" + _learning_curves()
+
+
+def _learning_curves() -> str:
+    """The section of the learning curves; nothing if there is no record of any."""
+    records = {task: axis_records.lines(CURVES / f"{task}.jsonl") for task in list_tasks()}
+    sizes = sorted({record["size"] for known in records.values() for record in known})
+    if not sizes:
+        return ""
+    columns = ("task", "split", "policy", *(f"{size} demonstrations" for size in sizes))
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for task, known in records.items():
+        for split, policy in product(known[0]["solved"] if known else (), POLICIES):
+            own = [record for record in known if record["policy"] == policy]
+            cells = [_spread([one["solved"][split] for one in own if one["size"] == size]) for size in sizes]
+            lines.append(f"| [{task}](tasks/{task}.md) | {split} | {policy} | {' | '.join(cells)} |")
+    return LEARNING_CURVES + "\n".join(lines) + "\n"
+
+
+def _spread(solved: list[int]) -> str:
+    """The mean of some counts, and the lowest and the highest of them; nothing if there is none."""
+    if len(solved) < 2:
+        return "".join(map(str, solved))
+    return f"{sum(solved) / len(solved):.3g} [{min(solved)}, {max(solved)}]"
 
 
 def _line(record: dict[str, Any]) -> str:

@@ -54,7 +54,9 @@ class TrainingData:
     """Number of episodes that are not learned from, by reason."""
 
     @classmethod
-    def read(cls, folder: str | Path, observations: Sequence[str] | None = None) -> "TrainingData":
+    def read(
+        cls, folder: str | Path, observations: Sequence[str] | None = None, demonstrations: int | None = None
+    ) -> "TrainingData":
         """Read the demonstrations of a recording.
 
         Failed episodes are left out, and those that a curation of the recording has not kept.
@@ -62,9 +64,11 @@ class TrainingData:
         Args:
             folder: a LeRobot recording of `scengen record`.
             observations: streams to observe; default: proprioception and `object-state`.
+            demonstrations: number of demonstrations, the first ones; default: all.
 
         Raises:
-            ScengenError: the recording is damaged, holds several tasks or no success, or lacks a stream.
+            ScengenError: the recording is damaged, holds several tasks, fewer demonstrations or no success, or lacks a
+                stream.
         """
         recording = Recording.open(folder)
         tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
@@ -85,6 +89,9 @@ class TrainingData:
         if len(found) < MIN_EPISODES:
             told = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
             raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({told}); at least {MIN_EPISODES}")
+        if demonstrations is not None and demonstrations > len(found):
+            raise BadConfig(f"demonstrations = {demonstrations}; {folder} has {len(found)} to learn from")
+        found = found[:demonstrations]
         entries = tuple(name for names in columns.values() for name in names)
         identity = [*_hashes(recording), json.dumps([trajectory.scenario for trajectory in found])]
         return cls(

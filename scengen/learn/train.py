@@ -16,13 +16,15 @@ from ..pictures.plots import svg_bytes
 from ..pool.files import sha256
 from ..versions import versions
 from ..work.targets import refused, try_folder, write
-from .data import TrainingData
+from .data import MIN_EPISODES, TrainingData
 from .epochs import Training
 from .features import Features
 from .models import BC, KINDS, KNN
 from .samples import parted, samples_of, scaling_of
 from .store import LOSS, Broken, PolicySettings, StoredPolicy, is_policy
 
+GIVEN_BY_DATA = ("data", "to", "demonstrations")
+"""Settings that change no weights, or only by the data, which have a hash of their own."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
 
@@ -35,6 +37,7 @@ class TrainSettings:
     data: str = ""
     to: str = ""
     observations: list[str] | None = None
+    demonstrations: int | None = None
     steps: int = 2
     chunk: int = 8
     played: int = 4
@@ -47,6 +50,8 @@ class TrainSettings:
         """Raise `ScengenError` for invalid settings."""
         if self.policy not in KINDS:
             raise UnknownName("policy to train", self.policy, KINDS)
+        if self.demonstrations is not None and self.demonstrations < MIN_EPISODES:
+            raise BadConfig(f"demonstrations = {self.demonstrations}; it must be at least {MIN_EPISODES}")
         at_least(self, steps=1, chunk=1, played=1, epochs=1, minutes=0.01, seed=0)
         if self.played > self.chunk:
             raise BadConfig(f"played = {self.played}; it must be at most chunk = {self.chunk}")
@@ -139,7 +144,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
 
 def _identity(settings: TrainSettings, data: TrainingData) -> str:
     """Hash of everything that decides the weights."""
-    chosen = {name: value for name, value in asdict(settings).items() if name not in ("data", "to")}
+    chosen = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
     told = {**chosen, "sha256": data.sha256, "streams": data.streams, "version": _version("scengen")}
     return sha256(json.dumps(told, sort_keys=True))
 

@@ -58,6 +58,14 @@ def test_streams_can_be_chosen(recorded):
     assert data.entries[:2] == ("force_torque.force_x", "force_torque.force_y") and len(data.entries) == 6 + 64
 
 
+def test_the_first_demonstrations_are_data_of_their_own(recorded):
+    whole, first = TrainingData.read(recorded), TrainingData.read(recorded, demonstrations=2)
+    assert [one.scenario for one in first.trajectories] == [one.scenario for one in whole.trajectories[:2]]
+    assert first.sha256 != whole.sha256 == TrainingData.read(recorded, demonstrations=3).sha256
+    with pytest.raises(BadConfig, match="demonstrations = 4; .* has 3 to learn from"):
+        TrainingData.read(recorded, demonstrations=4)
+
+
 def test_other_data_have_another_hash(mine):
     first = TrainingData.read(mine)
     change_episode(mine, 1, success=False)

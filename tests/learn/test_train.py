@@ -127,6 +127,7 @@ def test_a_limit_of_time_ends_the_training(tmp_path):
         ({"policy": "bcc"}, "no policy to train named 'bcc' (did you mean 'bc'?)"),
         ({"played": 9}, "played = 9; it must be at most chunk = 1"),
         ({"epochs": 0}, "epochs = 0; it must be at least 1"),
+        ({"demonstrations": 1}, "demonstrations = 1; it must be at least 2"),
         ({"hidden": []}, "hidden = []; give the units"),
     ],
 )
