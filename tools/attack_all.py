@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import leaks_all
 from arguments import parted
 from paper_page import failures
 
@@ -56,6 +57,13 @@ witness, and the kind of answer that the family declares; it knows nothing else 
 The adversary knows the positions of the bodies, which no policy knows in `mirror_pick_place`. There a random pick at
 the right place is all that the task requires, so its rate says nothing about a policy that sees a mirrored picture.
 Servo plans are for jaws: a task for suction alone has none.
+
+"""
+OBSERVED = """
+## What observations tell
+
+Tier `leaks` on 200 draws of a split: a regression of each hidden parameter on each stream of Gymnasium and robosuite,
+at the start and after 0.3 s without action ([The adversary](adversary.md)). Made by `python tools/leaks_all.py`.
 
 """
 UNDER_PAPER = """
@@ -106,10 +114,29 @@ def page() -> str:
     told = f"The rollouts of {len(reports)} tasks took {hours:.1f} hours of one core."
     if missing := sorted({*list_tasks()} - {report["task"] for report in reports}):
         told += f" Not attacked by this adversary yet: {', '.join(f'`{task}`' for task in missing)}."
-    text = HEAD + told + "\n\n" + _table(reports)
+    text = HEAD + told + "\n\n" + _table(reports) + _observed()
     if relaxed := _reports(PAPER):
         text += UNDER_PAPER + _table([report | {"task": f"`{report['task']}`"} for report in relaxed])
     return text
+
+
+def _observed() -> str:
+    """What the observations of all splits tell; nothing if none has been searched."""
+    splits = {
+        (task, split): found
+        for task in list_tasks()
+        for split, found in leaks_all.searched(load_task(task)).items()
+        if found["hidden"]
+    }
+    if not splits:
+        return ""
+    count = sum(len(found["hidden"]) for found in splits.values())
+    told = [(*name, leak) for name, found in splits.items() for leak in found["found"]]
+    tasks = len({task for task, _ in splits})
+    text = f"Searched: {count} varying hidden parameters in {len(splits)} splits of {tasks} tasks. Told: {len(told)}.\n"
+    for task, split, leak in told:
+        text += f"\n* {task}, {split}: `{leak['stream']}` tells {leak['parameter']}, {leak['explained']:.0%} explained"
+    return OBSERVED + text + ("\n" if told else "")
 
 
 def _reports(rules: str) -> list[dict[str, Any]]:

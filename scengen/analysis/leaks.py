@@ -24,8 +24,9 @@ from ..sim.world import hands
 from ..validate.rebuilt import world_of
 from ..work.parallel import Limits, Workers, each
 
-IDLE_TIME = 0.5
-"""Time without action before the second observation [s]."""
+IDLE_TIME = 0.3
+"""Time without action before the second observation [s]. Events whose moment is hidden come later: those that have come
+may be seen."""
 MIN_EXPLAINED = 0.2
 """Explained variance on held-out draws from which a stream counts as telling a parameter."""
 COLUMNS = 8

@@ -51,9 +51,10 @@ BOUNDS = {"pos": 3.0, "quat": 1.0, "vel_lin": 100.0, "vel_ang": 1000.0}
 """Largest absolute value of each part, to which readings are clipped: far beyond the room [m], and beyond the speeds
 of all bodies here [m/s], [rad/s]."""
 
-RESOLUTION = {"pos": 1e-4, "quat": 4.4e-4, "vel_lin": 1e-3, "vel_ang": 1e-2}
+RESOLUTION = {"pos": 1e-4, "quat": 4.4e-4, "vel_lin": 1e-3, "vel_ang": 1e-2, "force": 1e-3, "torque": 1e-4}
 """Resolution of each part, in the world: 0.1 mm, 0.05 deg (entries of a quaternion are those of half the angle), 1 mm/s
-and 0.6 deg/s. Readings relative to a hand follow from the rounded ones, so that moving the hand gives no finer ones."""
+and 0.6 deg/s; of the wrist's readings 1 mN and 0.1 mN m. Readings relative to a hand follow from the rounded ones, so
+that moving the hand gives no finer ones."""
 
 
 def xyzw(rot: Mat3) -> NDArray[np.float64]:

@@ -54,8 +54,13 @@ class Stream:
         return self.names if self.grid or name == NAME else tuple(f"{name}.{entry}" for entry in self.names)
 
 
+def _wrench(arm: Arm) -> NDArray[np.float64]:
+    wrench = arm.wrench()
+    return np.concatenate([rounded(wrench[:3], "force"), rounded(wrench[3:], "torque")])
+
+
 def _world_force(arm: Arm) -> NDArray[np.float64]:
-    return arm.wrist_rot @ arm.wrench()[:3]
+    return arm.wrist_rot @ _wrench(arm)[:3]
 
 
 def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
@@ -95,7 +100,7 @@ def _arm_streams(number: int, hand: str) -> dict[str, Stream]:
         f"{robot}joint_pos": stream(joints, 7.0, lambda arm: arm.joint_pos),
         f"{robot}joint_vel": stream(joints, 100.0, lambda arm: arm.joint_vel),
         f"{robot}gripper_qpos": stream(("finger_joint1", "finger_joint2"), 0.1, lambda arm: arm.finger_pos),
-        f"{prefix}force_torque": stream((*force, "torque_x", "torque_y", "torque_z"), 1e4, lambda arm: arm.wrench()),
+        f"{prefix}force_torque": stream((*force, "torque_x", "torque_y", "torque_z"), 1e4, _wrench),
         f"{prefix}force_torque_world": stream(force, 1e4, _world_force),
         **{f"{robot}{name}": grid(pad) for name, pad in PADS.items()},
     }

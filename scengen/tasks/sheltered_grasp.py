@@ -22,6 +22,10 @@ Decisions, where the paper (App. B, T03) is silent:
   looks down on the roof of either rack. A scene in which any line of sight ends at the object is refuted.
 * The storey and the object's place in it are geometry, which no label tells: the robot must look into one storey, then
   into the other. The paper calls this exploring. So there is no `answer`.
+* Exploring is looking. Without this rule of ours, closed fingers that sweep each storey drive the object to a place
+  where the jaw takes it, blind: 7 of 12, and two of three objects in a rack of 36 cm. So the robot may not touch it in
+  the rack more than 25 mm beside the hand, and the rack is so wide that a jaw that is closed at three places without
+  looking finds 10 of 60.
 * Dropped in the tray: its middle is between the tray's walls, and it touches the tray and nothing else, at rest, for
   0.3 s, 30 steps as in the paper's T12 and T13. Raking it out of the rack and grasping it on the table counts: it came
   out of the open side, too.
@@ -47,8 +51,8 @@ from ..params import param
 from ..predicates import fallen, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
-from ..sim.world import World
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..sim.world import ROBOT, World
 from ..skills.jaw import grasp, pick, release
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, facing, facing_down, go_to, retreat
 
@@ -72,6 +76,9 @@ GRIP_DEPTH = 0.025
 """Distance of the grip site behind the front of a long object [m]: the palm stays 6 mm before it."""
 LIFT_HEIGHT = 0.008
 """Height by which the object is lifted before it is drawn out [m]; the clearance above the palm is larger."""
+MAX_BESIDE = 0.025
+"""Distance beside the hand from which a touched object is felt, not grasped [m]. Fingers that close meet it within
+13 mm."""
 RELEASE_HEIGHT = 0.072
 """Height of the grip site above the tray's floor at the release [m]: the palm stays 15 mm above the walls."""
 
@@ -123,7 +130,20 @@ class ShelteredGrasp(Scenario):
         return between and rests_on(world, "thing", "tray") and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
-        return "the thing fell off the table" if fallen(world, "thing") else None
+        if fallen(world, "thing"):
+            return "the thing fell off the table"
+        if self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE:
+            return Strict("the thing was felt for in the rack")
+        return None
+
+    def _sheltered(self, world: World) -> bool:
+        """Whether the object's middle is in the rack."""
+        at = about_z(self.turn).T @ (world.com("thing") - self.foot)
+        return bool(at[1] > self.rack.mouth)
+
+    def _beside(self, world: World) -> float:
+        """Distance of the object's middle from the hand, along the open side [m]."""
+        return abs(float((world.com("thing") - world.arm.hand) @ about_z(self.turn)[:, 0]))
 
     # --- oracle ---------------------------------------------------------------------------
 

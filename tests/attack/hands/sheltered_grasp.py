@@ -1,0 +1,70 @@
+"""T03: blind. Closed fingers sweep each storey and drive the object to a known place, where the jaw takes it."""
+
+from contextlib import suppress
+
+import numpy as np
+from hand import Hand
+
+from scengen.errors import GaveUp
+from scengen.geometry import UP, Vec3, about_z
+from scengen.params import values, with_values
+from scengen.predicates import fallen
+from scengen.scenario import Plan, Scenario
+from scengen.sim.world import World
+from scengen.skills.jaw import grasp
+from scengen.skills.motion import CLOSED, COARSE, OPEN, Pace, go_to, hold
+from scengen.tasks.sheltered_grasp import GRIP_HEIGHT, LIFT_HEIGHT, ShelteredGrasp
+
+NARROW = {"width": 0.36, "along": 0.065}
+"""Width of the rack and largest distance of the object from its middle, before [m]."""
+REACH = 0.135
+"""The same distance now [m]."""
+TIP_DEPTH = 0.088
+"""Distance of the grip site behind the open side during a sweep [m]: the fingertips are beside the object."""
+FINGER = 0.036
+"""Distance of the closed fingers from the middle of a cube that they push [m]."""
+
+
+class MayBeFelt(ShelteredGrasp):
+    """The task without its rule on an object that is felt for."""
+
+    def failure(self, world: World) -> str | None:
+        return "the thing fell off the table" if fallen(world, "thing") else None
+
+
+def unmended(scenario: Scenario) -> Scenario:
+    told = values(scenario)
+    narrow = {"rack.width": NARROW["width"], "along": float(told["along"]) * NARROW["along"] / REACH}
+    return with_values(MayBeFelt(), told | narrow)
+
+
+def herd(scenario: Scenario, world: World) -> Plan:
+    """Sweep the lower storey, then the upper one; the jaw's opening tells where the object was."""
+    assert isinstance(scenario, ShelteredGrasp)
+    arm, rot, half = world.arm, scenario.entry, scenario.rack.width / 2 - 0.111
+    yield from go_to(arm, arm.hand - np.array([0.0, 0.17 * scenario.side, 0.0]), pace=COARSE, grip=OPEN)
+    for storey in (0, 1):
+
+        def at(along: float, depth: float, storey: int = storey) -> Vec3:
+            inside = scenario.rack.inside(storey, scenario.side * along, depth)
+            return scenario.foot + about_z(scenario.turn) @ inside + GRIP_HEIGHT * UP
+
+        yield from go_to(arm, at(-half, -0.07), rot, Pace(0.5, 0.01, 3.0), CLOSED)
+        end = half - 0.049
+        sweep = ((-half, TIP_DEPTH, CLOSED), (end, TIP_DEPTH, CLOSED), (end, 0.0, CLOSED))
+        take = ((end + FINGER, 0.0, OPEN), (end + FINGER, 0.085, OPEN))
+        for along, depth, grip in (*sweep, *take):
+            with suppress(GaveUp):
+                yield from go_to(arm, at(along, depth), rot, Pace(0.3, 0.006, 2.5), grip)
+        with suppress(GaveUp):
+            yield from grasp(arm)
+        if arm.gap > 0.03:
+            yield from go_to(arm, arm.hand + LIFT_HEIGHT * UP, rot, Pace(0.3, 0.006, 2.5))
+            yield from go_to(arm, at(end + FINGER, -0.12) + LIFT_HEIGHT * UP, rot, Pace(0.3, 0.006, 2.5))
+            yield from scenario.drop(world)
+            return
+        yield from go_to(arm, at(end + FINGER, -0.07), rot, Pace(0.3, 0.006, 2.5), CLOSED)
+    yield from hold(arm, 1.0)
+
+
+HANDS = {"herd": Hand(herd, unmended)}
