@@ -27,7 +27,7 @@ Decisions that hold for all tasks:
 * Goals that the paper describes in words have numbers here, and a goal must hold for some time: `HOLD` of the family.
 * If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise
   by a strict rule that ends the episode, which the paper lacks. Certificates are made under all rules.
-  `rules="paper"` lifts the strict ones in Gymnasium, robosuite, `scengen evaluate` and `scengen attack`. A witness
+  `rules="paper"` lifts the strict ones in Gymnasium, robosuite, `scengen evaluate`, `scengen teleop` and `scengen attack`. A witness
   succeeds under both. Other failures are the paper's, or losses after which the goal cannot be reached.
 * The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are
   ours or follow another statement of the paper; each names its source.

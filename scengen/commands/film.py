@@ -10,6 +10,7 @@ from .. import compose
 from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
+from ..episode import check_rules
 from ..errors import BadConfig, at_least
 from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ..pictures.render import check_pictures, encode
@@ -127,7 +128,8 @@ def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Argu
     outcome = f"{row.outcome} after {row.seconds:g} s{': ' if row.reason else ''}{row.reason}"
     say(f"{check_row(row).name}, run {number} ({row.style}): {outcome}")
     task = task_of_manifest(source, compose.load_task(source.task, search_path(arguments)))
-    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness)
+    rules = check_rules(source.manifest.config.rules)
+    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness, rules)
 
 
 def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:

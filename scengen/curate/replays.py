@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..control.loop import ACTION
 from ..envs.object_state import ObjectState
 from ..envs.observations import cameras_of, streams_of
-from ..episode import Episode
+from ..episode import Episode, Rules
 from ..errors import ScengenError
+from ..export.dataset import rules_of
 from ..export.lerobot import IMAGES_PREFIX
 from ..export.recording import CONTROL_ACTIONS
 from ..export.streams import ENVIRONMENT
@@ -42,6 +43,7 @@ class Recorded:
     task: Task
     params: Mapping[str, Any]
     horizon: float
+    rules: Rules
     actions: NDArray[np.float32]
     """Actions of all control periods of each row, shape (rows, periods, 7 * arms)."""
     streams: Mapping[str, NDArray[np.float32]]
@@ -74,12 +76,13 @@ class Recorded:
             entries: names of the entries of the environment state; empty if it was not recorded.
 
         Raises:
+            ScengenError: there are no such rules.
             ValueError: its parameters are not JSON.
         """
         states = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
         actions, entries = columns[CONTROL_ACTIONS], tuple(entries)
-        return cls(number, task, params, horizon, actions, states, entries, size, films, frozen)
+        return cls(number, task, params, horizon, rules_of(about), actions, states, entries, size, films, frozen)
 
     def readers(self) -> dict[str, Callable[[World], NDArray[Any]]]:
         """Functions that read the streams from a world."""
@@ -139,7 +142,7 @@ def _replayed(recorded: Recorded) -> Replayed:
         return _fault(recorded, f"the actions are not those of {robot}")
     with ExitStack() as stack:
         films = _Films(recorded, scenario, world, stack)
-        episode = Episode(scenario, world, recorded.horizon)
+        episode = Episode(scenario, world, recorded.horizon, recorded.rules)
         for row, actions in enumerate(recorded.actions):
             for name, values in recorded.streams.items():
                 error = difference(readers[name](world), values[row])

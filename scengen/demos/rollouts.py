@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from ..episode import Actions
+from ..episode import Actions, check_rules
 from ..errors import BadConfig
 from ..evaluate.settings import EvaluateSettings, RolloutId
 from ..pool import Pool
@@ -89,6 +89,7 @@ class _PoolKeeper:
             keep=(FAILED,),
             settle=about.certify["settle"],
             apart=(),
+            rules=settings.rules,
         )
 
     @cached_property
@@ -112,7 +113,8 @@ class _PoolKeeper:
         """Play the actions again, and store what they do."""
         row = self.pool.at(self._places[which.scenario])
         scenario = self.task.scenario(row.params)
-        played = replay(scenario, stored_world(row), actions, row.horizon, self.config.settle)
+        rules = check_rules(self.config.rules)
+        played = replay(scenario, stored_world(row), actions, row.horizon, self.config.settle, rules=rules)
         columns = {name: value for name, value in vars(row).items() if name != "certificate"}
         kept = DemonstrationRow(
             **{**columns, "witness": played.actions, "witness_sha256": sha256(played.actions.tobytes())},

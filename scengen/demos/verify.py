@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..certificate import as_json
+from ..episode import check_rules
 from ..errors import Infeasible, PoolError, ScengenError
 from ..fingerprint import fingerprint
 from ..params import canonical
@@ -135,7 +136,8 @@ class Judge:
         """Faults of the replay, and whether it ended in the same bits."""
         scenario: Scenario = self.task.scenario(row.params)
         world = World.load(row.scene_xml, row.embodiment)
-        again = replay(scenario, world, row.witness, self.task.horizon, self.config.settle)
+        rules = check_rules(self.config.rules)
+        again = replay(scenario, world, row.witness, self.task.horizon, self.config.settle, rules=rules)
         faults, exact = [], again.digest == row.final_state
         if again.outcome != row.outcome:
             faults.append(f"replayed, the outcome is {again.outcome} ({again.reason}), not {row.outcome}")

@@ -123,8 +123,8 @@ class EvaluateSettings:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.name} acts at 100 Hz: leave it out")
         if set(self.keep) - {EPISODES}:
             raise BadConfig(f"keep = {cut(','.join(self.keep))}; it must be {EPISODES}, or be left out")
-        if self.keep and not (self.rules == STRICT and self.settle):
-            raise BadConfig("episodes are kept under the strict rules and with settle=true alone: leave out keep=")
+        if self.keep and not self.settle:
+            raise BadConfig("episodes are kept with settle=true alone: leave out keep=")
         if self.remote:
             for name, free in (("observations", None), ("action_repeat", 1)):
                 if getattr(self, name) != free:

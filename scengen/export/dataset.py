@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from ..episode import STRICT, Rules, check_rules
 from ..errors import PoolError
 from ..pool.files import MAX_JSON, open_plain
 from ..pool.shards import check_groups
@@ -50,6 +51,18 @@ class EpisodeData:
     def task(self) -> str:
         """Name of the task."""
         return str(self.about["scengen/task"])
+
+
+def rules_of(about: Mapping[str, Any]) -> Rules:
+    """Rules of a recorded episode. Witnesses, and recordings that say nothing of them, have all rules.
+
+    Args:
+        about: row of the table of episodes.
+
+    Raises:
+        UnknownName: there are no such rules.
+    """
+    return check_rules(str(about.get("scengen/rules", STRICT)))
 
 
 @dataclass(frozen=True)

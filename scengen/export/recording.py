@@ -22,6 +22,7 @@ import numpy as np
 from .. import compose
 from ..envs.object_state import bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception
+from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, at_least
 from ..orientation import Orientation
 from ..pictures.film import periods_between
@@ -190,7 +191,8 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     recorded.playing.orientation = scenario.orientation
                     observe = partial(Snapshot.of, world, writer.streams, pictures)
                     sample = partial(read, world, writer.streams) if settings.rates == NATIVE_RATES else None
-                    replay = WitnessReplay(row, scenario, world, periods_between(settings.rate), observe, sample)
+                    periods, rules = periods_between(settings.rate), check_rules(origin.get("rules", STRICT))
+                    replay = WitnessReplay(row, scenario, world, periods, observe, sample, rules)
                     if not writer.episode(replay, origin) and replay.promised:
                         failed.append(str(row.name))
                 if isinstance(row, DemonstrationRow):
@@ -227,7 +229,7 @@ class Writer(Protocol):
         """Add one scenario's episode, and return whether it reached the goal.
 
         Args:
-            origin: source and operator of a demonstration.
+            origin: source, operator and rules of a demonstration.
         """
         ...
 

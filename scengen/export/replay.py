@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..control.loop import ACTION
 from ..control.teleop import MOTION
 from ..envs.observations import Stream
-from ..episode import Actions, Episode
+from ..episode import STRICT, Actions, Episode, Rules
 from ..pictures.render import Picture
 from ..pool.row import DemonstrationRow, SceneRow
 from ..scenario import Scenario
@@ -87,6 +87,8 @@ class WitnessReplay:
     """Function that returns the present moment of the world."""
     sample: Callable[[], Mapping[str, NDArray[np.float32]]] | None = None
     """Function that reads the streams in every control period."""
+    rules: Rules = STRICT
+    """Rules of the episode."""
 
     @property
     def promised(self) -> bool:
@@ -99,7 +101,8 @@ class WitnessReplay:
         After the last recorded action the robot is idle. The control periods of the last row are all simulated.
         """
         self.world.reset()
-        episode, over, recorded = Episode(self.scenario, self.world, self.row.horizon), None, iter(self.row.witness)
+        episode = Episode(self.scenario, self.world, self.row.horizon, self.rules)
+        over, recorded = None, iter(self.row.witness)
         while over is None:
             observed, done, samples = self.observe(), [], []
             for _ in range(self.periods_per_row):

@@ -62,14 +62,15 @@ def number_of(source: Source, failed: bool) -> int:
 
 
 def origins_of(pools: Sequence[Source], count: int, failed: bool = False) -> Iterator[dict[str, str]]:
-    """Source and operator of each of the first rows, for demonstrations; nothing for pools."""
+    """Source, operator and rules of each of the first rows, for demonstrations; nothing for pools."""
     return islice(chain.from_iterable(repeat(_origin(s), number_of(s, failed)) for s in pools), count)
 
 
 def _origin(source: Source) -> dict[str, str]:
     if isinstance(source, Pool):
         return {}
-    return {"source": source.manifest.source, "operator": source.manifest.operator or ""}
+    about = source.manifest
+    return {"source": about.source, "operator": about.operator or "", "rules": about.config.rules}
 
 
 def texts_of(source: Source, name: str, failed: bool) -> set[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from ..control.loop import Loop
-from ..episode import Actions, Episode
+from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import UnknownName
 from ..pool import PoolRow
 from ..scenario import Scenario
@@ -38,6 +38,7 @@ class Take:
     scene_xml: str
     embodiment: str
     actions: Actions
+    rules: Rules = STRICT
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
@@ -61,7 +62,7 @@ class Take:
     def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:
         """Replay the actions, stop after each of these numbers of control periods, and yield time and outcome."""
         world.reset()
-        episode, done, outcome, note = Episode(self.scenario, world), 0, None, ""
+        episode, done, outcome, note = Episode(self.scenario, world, rules=self.rules), 0, None, ""
         for period in periods:
             for number, action in enumerate(self.actions[done:period], done + 1):
                 if (now := episode.step(action)) != outcome:

@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from ..episode import STRICT, check_rules
 from ..errors import PoolError, ScengenError
 from ..typed import typed
 from . import writing
@@ -71,6 +72,8 @@ class DemonstrationConfig:
     """Time for which a reached goal had to last [s]."""
     apart: tuple[str, ...]
     """Hashes of the pools from which the scenarios were kept apart."""
+    rules: str = STRICT
+    """Rules of the episodes, see `scengen.episode.Rules`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +161,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     check_whole("config.runs", config.runs, MAX_INDICES)
     demand(config.runs > 0, "config.runs is 0")
     check_settling(config.settle)
+    check_rules(config.rules)
     demand(0 < len(config.styles) <= 100, f"config.styles has {len(config.styles)} entries")
     for style in config.styles:
         check_match("config.styles", style, WORD)

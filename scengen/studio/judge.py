@@ -14,7 +14,7 @@ from ..curate.curation import FOLDER, Curated, decided_again
 from ..curate.findings import EpisodeReport
 from ..curate.page import plot
 from ..curate.people import Decision, write_decision, write_score
-from ..export.dataset import EpisodeData, Recording
+from ..export.dataset import EpisodeData, Recording, rules_of
 from ..export.recording import CONTROL_ACTIONS
 from ..pictures.report import template
 from ..pool.untrusted import read_json
@@ -159,7 +159,7 @@ class Judge:
             self._view.show(world)
         periods = episode.columns[CONTROL_ACTIONS]
         actions = periods.reshape(-1, periods.shape[-1])[: round(MAX_LENGTH * task.horizon / Loop.PERIOD)]
-        made = filmed(world, scenario, actions, task.horizon)
+        made = filmed(world, scenario, actions, task.horizon, rules_of(episode.about))
         self.player.load(made, play=False)
         self.player.outcome.content = template("studio_fault.html").render(note=f"replayed: {made.outcome}")
 

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
-from ..episode import Actions, Episode
+from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import PoolError, ScengenError, cut
 from ..pictures.render import hide_hulls
 from ..scenario import Scenario
@@ -76,10 +76,10 @@ def poses_of(world: World) -> Poses:
     return np.concatenate([world.data.xpos, world.data.xquat], axis=1).astype(np.float32)
 
 
-def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float) -> Film:
+def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float, rules: Rules = STRICT) -> Film:
     """Replay actions in a world, and keep the poses."""
     world.reset()
-    episode, frames, told = Episode(scenario, world, horizon), [poses_of(world)], "no outcome"
+    episode, frames, told = Episode(scenario, world, horizon, rules), [poses_of(world)], "no outcome"
     for period, action in enumerate(actions, 1):
         before = episode.outcome
         if episode.step(action) != before:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..demos.generate import FAILED, GIVEN_UP, KEPT, DemosSummary, finish, first_failed, row_of
+from ..episode import STRICT, check_rules
 from ..errors import BadConfig, Infeasible, at_least, cut
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, OPERATOR, TELEOP, DemonstrationConfig
@@ -46,6 +47,7 @@ class TeleopSettings:
     n: int = 10
     takes: int = 10
     limit: int | None = None
+    rules: str = STRICT
     device: str = "gamepad"
     operator: str = "op0"
     to: str | None = None
@@ -56,6 +58,7 @@ class TeleopSettings:
 
     def check(self) -> None:
         """Raise `ScengenError` for settings that are not valid."""
+        check_rules(self.rules)
         at_least(self, seed=0, index=0, n=1, limit=1, width=64, height=64)
         if not 1 <= self.takes <= 1000:
             raise BadConfig(f"takes = {self.takes}; it must lie in [1, 1000]")
@@ -141,6 +144,7 @@ class Run:
             keep=(FAILED,),
             settle=source.certify_settings.settle,
             apart=(),
+            rules=settings.rules,
         )
         checks, operator = asdict(source.certify_settings), settings.operator
         identity = {"config": asdict(self.config), "checks": checks, "operator": operator, **made_with(task)}
@@ -203,7 +207,8 @@ class Run:
             self._add(Record(first, FAILED, check.name, check.reason, tries, rejected, None, 0.0))
             return None
         name, settle = f"{task.name}/{draw.split}@{index}/{draw.scenario.id}", source.certify_settings.settle
-        return draw, Stage(name, draw.scenario, trial.text, task.embodiment, task.horizon, settle)
+        rules = check_rules(self.settings.rules)
+        return draw, Stage(name, draw.scenario, trial.text, task.embodiment, task.horizon, settle, rules)
 
     def add(self, place: Place, session: Session) -> None:
         """Store a finished take: its log, and its actions unless it was given up.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
-from ..episode import Actions, Episode, Outcome
+from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import ScengenError
 from ..scenario import Scenario
 from ..sim.world import World
@@ -52,6 +52,8 @@ class Stage:
     """Time limit for reaching the goal [s]."""
     settle: float
     """Time for which a reached goal has to last [s]."""
+    rules: Rules = STRICT
+    """Rules that end the episode."""
 
     def world(self, visual: bool = False) -> World:
         """The world of its scene at the start."""
@@ -123,7 +125,7 @@ class Session:
         """
         self.stage, self.world, self.pad = stage, world or stage.world(), Pad()
         self.world.reset()
-        self.episode = Episode(stage.scenario, self.world, stage.horizon)
+        self.episode = Episode(stage.scenario, self.world, stage.horizon, stage.rules)
         self.phase: Phase = READY
         self.message = ""
         self.ticks = 0
@@ -291,7 +293,7 @@ class Session:
             ScengenError: the replay ends in other bits, or with another outcome.
         """
         stage = self.stage
-        again = replay(stage.scenario, stage.world(), self.actions, stage.horizon, stage.settle)
+        again = replay(stage.scenario, stage.world(), self.actions, stage.horizon, stage.settle, rules=stage.rules)
         if again.digest != self.world.digest or again.outcome != self.episode.outcome:
             told = f"it ends as {again.outcome} in {again.digest}, not as {self.episode.outcome} in {self.world.digest}"
             raise ScengenError(f"{stage.name}: the take does not replay bit for bit: {told}")

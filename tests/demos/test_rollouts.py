@@ -12,6 +12,8 @@ from helpers import REFERENCE
 from scengen import cli
 from scengen.pool import Pool
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations
+from scengen.scenario import Strict
+from scengen.tasks.domino_single import DominoSingle
 
 
 def evaluate(folder, *words):
@@ -103,6 +105,34 @@ def test_rollouts_are_recorded_with_their_failures_on_request(kept, tmp_path):
     assert json.loads((tmp_path / "good" / "meta" / "info.json").read_text())["total_episodes"] == 2
 
 
+@pytest.mark.parametrize("rules", ["strict", "paper"])
+def test_episodes_are_judged_by_the_rules_that_they_were_played_under(tmp_path, monkeypatch, capsys, rules):
+    """A strict rule that every witness breaks: lifted, the witnesses count, wherever they are judged."""
+    broken = lambda self, world: Strict("too late") if world.time > 0.3 else None  # noqa: E731
+    monkeypatch.setattr(DominoSingle, "failure", broken)
+    assert evaluate(tmp_path / "out", "policy=oracle", f"rules={rules}") == 0
+    folder, data = tmp_path / "out" / "rollouts" / REFERENCE.name, tmp_path / "data"
+    found = Demonstrations.open(folder)
+    assert found.manifest.config.rules == rules and len(found) == (2 if rules == "paper" else 0)
+    assert cli.run(["verify", f"pool={folder}"]) == 0
+    assert cli.run(["record", f"pool={folder}", f"to={data}", "cameras=none", "failed=true"]) == 0
+    table = pq.read_table(data / "meta" / "episodes" / "chunk-000" / "file-000.parquet")
+    assert table["scengen/rules"].to_pylist() == [rules] * 2
+    assert table["scengen/success"].to_pylist() == [rules == "paper"] * 2
+    assert cli.run(["curate", f"data={data}"]) == 0
+    assert json.loads((data / "curation" / "kept.json").read_text()) == ([0, 1] if rules == "paper" else [])
+
+
+def test_rules_without_a_name_are_refused(kept, tmp_path, capsys):
+    forged = tmp_path / "forged"
+    shutil.copytree(kept / "oracle" / "rollouts" / REFERENCE.name, forged)
+    plain = json.loads((forged / DEMONSTRATIONS).read_text())
+    plain["config"]["rules"] = "none"
+    (forged / DEMONSTRATIONS).write_text(json.dumps(plain))
+    assert cli.run(["verify", f"pool={forged}"]) != 0
+    assert "no rules named 'none'" in capsys.readouterr().err
+
+
 def test_a_repeated_command_plays_nothing_again_and_writes_the_same_bytes(kept):
     before = rollouts(kept, "random").sha256
     assert evaluate(kept / "random", "policy=random") == 0
@@ -113,7 +143,7 @@ def test_a_repeated_command_plays_nothing_again_and_writes_the_same_bytes(kept):
     ("words", "says"),
     [
         (["keep=[pictures]"], "keep = pictures; it must be episodes"),
-        (["rules=paper"], "episodes are kept under the strict rules"),
+        (["settle=false"], "episodes are kept with settle=true alone"),
     ],
 )
 def test_what_cannot_be_kept_is_refused_before_anything_is_played(tmp_path, capsys, words, says):

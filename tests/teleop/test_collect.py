@@ -13,6 +13,8 @@ from scengen import cli
 from scengen.commands import BAD_INPUT, FAILED, OK
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
 from scengen.pool.files import sha256
+from scengen.scenario import Strict
+from scengen.tasks.domino_single import DominoSingle
 from scengen.teleop.pad import read_events
 
 
@@ -40,6 +42,14 @@ def test_a_driven_episode_is_a_demonstration_with_source_operator_and_seed(made)
     assert (found.manifest.source, found.manifest.operator, len(found)) == ("teleop", "op7", 3)
     for row in found.rows():
         assert (row.style, row.outcome, row.seed, row.run) == ("teleop", "success", 2000, 0)
+
+
+def test_takes_are_judged_by_the_rules_that_were_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(DominoSingle, "failure", lambda self, world: Strict("too late") if world.time > 0.3 else None)
+    assert teleop(tmp_path / "strict", n=1, takes=1, limit=1) == FAILED
+    assert teleop(tmp_path / "paper", n=1, rules="paper") == OK
+    found = Demonstrations.open(tmp_path / "paper")
+    assert found.manifest.config.rules == "paper" and cli.run(["verify", f"pool={tmp_path / 'paper'}"]) == OK
 
 
 def test_driven_verified_recorded_curated(made, tmp_path, capsys):
