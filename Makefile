@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs site reference bench clean checker checker-base mutants
 
 setup: $(READY)
 
@@ -130,9 +130,11 @@ beliefs: setup
 	$(BIN)/python tools/beliefs.py n=$(TWINS) $(TASKS)
 	$(BIN)/python tools/all_axes.py page
 
-# Attacks every task with BUDGET rollouts and writes docs/attacks.md (40 minutes). TASKS=packing selects tasks.
+# Searches observations for hidden parameters, attacks every task with BUDGET rollouts, and writes docs/attacks.md (an hour). TASKS=packing
+# selects tasks.
 BUDGET ?= 500
 attacks: setup
+	$(BIN)/python tools/leaks_all.py $(TASKS)
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
 
 # Compares verdicts under several VERSIONS of MuJoCo and writes docs/drift.md (hours). Uses N scenarios of the pools in POOLS and makes
@@ -146,6 +148,11 @@ drift: setup
 # selects tasks, TASKS="axes=all packing" evaluates on all their axes. An interrupted call is continued.
 baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
+
+# Trains on 25 to 200 demonstrations with three seeds for the learning curves in docs/baselines.md (half an hour for each task).
+curves: setup
+	$(BIN)/python tools/learning_curves.py $(TASKS)
+	$(BIN)/python tools/baselines.py page
 
 # Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
 docs: setup

@@ -4,7 +4,8 @@
 
 Each split is searched by `scengen attack tiers=[leaks]`: 200 draws, eight seconds of processor time. Tasks without a
 hidden parameter have nothing to tell and are left out. A record counts as long as the code of its family and of the
-observations is the same, so that a repeated call continues. `make attacks` tells the results in docs/attacks.md.
+observations is the same, so that a repeated call continues. `make attacks` runs it and tells the results in
+docs/attacks.md.
 """
 
 import hashlib
@@ -51,11 +52,14 @@ def hides(task: Task) -> bool:
 
 def searched(task: Task) -> dict[str, Any]:
     """The results that still count, by split."""
+    told = stored(task)
+    return told["splits"] if told.get("code_sha256") == code_sha256(task) else {}
+
+
+def stored(task: Task) -> dict[str, Any]:
+    """The record of a task; empty if there is none."""
     path = RECORDS / f"{task.name}.json"
-    if not path.is_file():
-        return {}
-    told = json.loads(path.read_text())
-    return told["splits"] if told["code_sha256"] == code_sha256(task) else {}
+    return json.loads(path.read_text()) if path.is_file() else {}
 
 
 def code_sha256(task: Task) -> str:
