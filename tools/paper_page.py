@@ -27,8 +27,8 @@ Decisions that hold for all tasks:
 * Goals that the paper describes in words have numbers here, and a goal must hold for some time: `HOLD` of the family.
 * If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise
   by a strict rule that ends the episode, which the paper lacks. Certificates are made under all rules.
-  `rules="paper"` lifts the strict ones in Gymnasium, robosuite, `scengen evaluate`, `scengen teleop` and `scengen attack`. A witness
-  succeeds under both. Other failures are the paper's, or losses after which the goal cannot be reached.
+  `rules="paper"` lifts the strict ones in Gymnasium, robosuite, and `scengen evaluate`, `teleop` and `attack`. A
+  witness succeeds under both. Other failures are the paper's, or losses after which the goal cannot be reached.
 * The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are
   ours or follow another statement of the paper; each names its source.
 * MuJoCo is 3.5 and robosuite is 1.5.2 (the paper: 3.1.2 and 1.5). Certificates name the versions for which they hold.
