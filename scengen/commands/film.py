@@ -129,7 +129,7 @@ def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Argu
     say(f"{check_row(row).name}, run {number} ({row.style}): {outcome}")
     task = task_of_manifest(source, compose.load_task(source.task, search_path(arguments)))
     rules = check_rules(source.manifest.config.rules)
-    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness, rules)
+    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness, rules=rules)
 
 
 def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,7 @@ class Take:
     scene_xml: str
     embodiment: str
     actions: Actions
-    rules: Rules = STRICT
+    rules: Rules = field(default=STRICT, kw_only=True)
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":

@@ -15,10 +15,6 @@ from scengen.skills.jaw import grasp
 from scengen.skills.motion import CLOSED, COARSE, OPEN, Pace, go_to, hold
 from scengen.tasks.sheltered_grasp import GRIP_HEIGHT, LIFT_HEIGHT, ShelteredGrasp
 
-NARROW = {"width": 0.36, "along": 0.065}
-"""Width of the rack and largest distance of the object from its middle, before [m]."""
-REACH = 0.135
-"""The same distance now [m]."""
 TIP_DEPTH = 0.088
 """Distance of the grip site behind the open side during a sweep [m]: the fingertips are beside the object."""
 FINGER = 0.036
@@ -33,9 +29,7 @@ class MayBeFelt(ShelteredGrasp):
 
 
 def unmended(scenario: Scenario) -> Scenario:
-    told = values(scenario)
-    narrow = {"rack.width": NARROW["width"], "along": float(told["along"]) * NARROW["along"] / REACH}
-    return with_values(MayBeFelt(), told | narrow)
+    return with_values(MayBeFelt(), values(scenario))
 
 
 def herd(scenario: Scenario, world: World) -> Plan:
