@@ -18,6 +18,7 @@ from arguments import parted
 from paper_page import failures
 
 from scengen import cli, list_tasks, load_task
+from scengen.attack.adversary import TIERS
 from scengen.attack.evidence import TierRate
 from scengen.episode import PAPER, STRICT, check_rules
 
@@ -90,7 +91,8 @@ def main(budget: str, *others: str) -> None:
         if rules == PAPER and not has_strict_rules(task):
             continue
         target, folder = FOLDERS[rules] / f"{task}.json", HITS[rules] / task
-        argv = (f"task={task}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", f"rules={rules}")
+        tiers = f"tiers=[{','.join(TIERS)}]"  # without leaks, which tools/leaks_all.py searches in all splits
+        argv = (f"task={task}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", f"rules={rules}", tiers)
         status = cli.run(("attack", *argv, f"workers={workers}", f"json={target}", f"to={folder}"))
         if status and rules == STRICT:
             refuted.append(task)

@@ -126,15 +126,14 @@ def play(policy: str, pools: list[Path], to: Path) -> None:
     run("evaluate", f"policy={policy}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={to}")
 
 
-def episodes(played: Path, pool: Path) -> list[dict[str, Any]]:
-    """The episodes of an evaluation that were played in a pool."""
-    every = map(json.loads, (played / "episodes.jsonl").read_text().splitlines()[1:])
-    return [episode for episode in every if episode["pool"] == str(pool)]
+def episodes(played: Path, pools: dict[str, Path]) -> dict[str, list[dict[str, Any]]]:
+    """The episodes of an evaluation, by split.
 
-
-def solved(played: Path, pool: Path) -> int:
-    """Number of scenarios of a pool that an evaluation has solved."""
-    return sum(episode["success"] for episode in episodes(played, pool))
+    Args:
+        pools: the pools that were played, by split.
+    """
+    every = [json.loads(line) for line in (played / "episodes.jsonl").read_text().splitlines()[1:]]
+    return {split: [one for one in every if one["pool"] == str(pool)] for split, pool in pools.items()}
 
 
 def run(*argv: str) -> None:
@@ -151,11 +150,10 @@ def _results(task: str, policy: str, trained: Path, played: Path, pools: dict[st
         names = ("demonstrations", "rows", "epochs", "data_sha256", "weights_sha256")
         told |= {name: getattr(own, name) for name in names}
     records = []
-    for split, pool in pools.items():
-        own = episodes(played, pool)
+    for split, own in episodes(played, pools).items():
         reasons = Counter(episode["reason"] for episode in own if not episode["success"])
         counts = {"scenarios": len(own), "solved": sum(episode["success"] for episode in own), "reasons": dict(reasons)}
-        made = Pool.open(pool)
+        made = Pool.open(pools[split])
         number = dict(made.columns("id", "index"))
         outcomes = [[number[episode["scenario"]], episode["success"]] for episode in own]
         moved = {"shifts": axis_records.shifts(load_task(task), split), "pool_sha256": made.sha256}

@@ -45,7 +45,8 @@ def measure(task: str) -> None:
             baselines.run("train", *settings, f"to={folder}")
             played = folder / "evaluation"
             baselines.play(str(folder), [*pools.values()], played)
-            solved = {split: baselines.solved(played, pool) for split, pool in pools.items()}
+            episodes = baselines.episodes(played, pools)
+            solved = {split: sum(one["success"] for one in own) for split, own in episodes.items()}
             told = {"policy": policy, "size": size, "seed": seed, "solved": solved, "pools_sha256": hashes}
             found.append(told)
             path.parent.mkdir(parents=True, exist_ok=True)

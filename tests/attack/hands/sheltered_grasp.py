@@ -17,6 +17,8 @@ from scengen.tasks.sheltered_grasp import GRIP_HEIGHT, LIFT_HEIGHT, ShelteredGra
 
 TIP_DEPTH = 0.088
 """Distance of the grip site behind the open side during a sweep [m]: the fingertips are beside the object."""
+IN_RACK = Pace(0.3, 0.006, 2.5)
+"""Pace in the rack."""
 FINGER = 0.036
 """Distance of the closed fingers from the middle of a cube that they push [m]."""
 
@@ -49,15 +51,15 @@ def herd(scenario: Scenario, world: World) -> Plan:
         take = ((end + FINGER, 0.0, OPEN), (end + FINGER, 0.085, OPEN))
         for along, depth, grip in (*sweep, *take):
             with suppress(GaveUp):
-                yield from go_to(arm, at(along, depth), rot, Pace(0.3, 0.006, 2.5), grip)
+                yield from go_to(arm, at(along, depth), rot, IN_RACK, grip)
         with suppress(GaveUp):
             yield from grasp(arm)
         if arm.gap > 0.03:
-            yield from go_to(arm, arm.hand + LIFT_HEIGHT * UP, rot, Pace(0.3, 0.006, 2.5))
-            yield from go_to(arm, at(end + FINGER, -0.12) + LIFT_HEIGHT * UP, rot, Pace(0.3, 0.006, 2.5))
+            yield from go_to(arm, arm.hand + LIFT_HEIGHT * UP, rot, IN_RACK)
+            yield from go_to(arm, at(end + FINGER, -0.12) + LIFT_HEIGHT * UP, rot, IN_RACK)
             yield from scenario.drop(world)
             return
-        yield from go_to(arm, at(end + FINGER, -0.07), rot, Pace(0.3, 0.006, 2.5), CLOSED)
+        yield from go_to(arm, at(end + FINGER, -0.07), rot, IN_RACK, CLOSED)
     yield from hold(arm, 1.0)
 
 
