@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ..control.loop import Loop
 from ..envs import object_state
 from ..envs.observations import Stream, cameras_of
+from ..envs.robomimic import OBJECT
 from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
 from ..pool.row import DemonstrationRow
@@ -39,8 +40,6 @@ ROBOSUITE_TYPE = 1
 """robomimic's number for robosuite environments."""
 SUCCESS = "success"
 """Name of the mask of the demonstrations that reach the goal."""
-OBJECT = "object"
-"""robomimic's name of robosuite's `object-state`."""
 
 
 def streams_of(streams: Mapping[str, Stream], embodiment: str) -> dict[str, Stream]:

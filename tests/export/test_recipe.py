@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 from helpers import REFERENCE
 
+import scengen
 from scengen import cli
 from scengen.errors import BadConfig, PoolError, UnknownName
-from scengen.export.recipe import RECIPES, RecipeSettings, write_recipe
+from scengen.export.recipes.settings import RecipeSettings
+from scengen.export.recipes.writer import RECIPES, write_recipe
 
 VIDEO = {"dtype": "video", "shape": [480, 640, 3], "names": ["height", "width", "channels"]}
 
@@ -119,4 +121,8 @@ def test_the_command_tells_what_to_run_next(recorded, tmp_path, capsys):
     assert cli.run(argv) == 0
     told = capsys.readouterr().out
     assert "requirements.txt, smoke.sh, train.sh, evaluate.sh" in told and f"sh {tmp_path / 'to' / 'smoke.sh'}" in told
-    assert all(recipe.origin.endswith(".") for recipe in RECIPES.values())
+
+
+def test_every_recipe_is_offered_by_the_command():
+    text = (Path(scengen.__file__).parents[1] / "conf" / "command" / "recipe.yaml").read_text()
+    assert all(name in text for name in RECIPES)

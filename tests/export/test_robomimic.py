@@ -9,6 +9,9 @@ import pytest
 from helpers import REFERENCE, pictures_are_possible
 
 from scengen import cli
+from scengen.envs.gym import PoolEnv
+from scengen.envs.object_state import NAME
+from scengen.envs.robomimic import names
 from scengen.errors import BadConfig
 from scengen.export.recording import RecordSettings, record
 from scengen.pool import Pool
@@ -151,3 +154,14 @@ def test_without_h5py_the_line_names_what_to_install(tmp_path, capsys, monkeypat
     monkeypatch.setitem(sys.modules, "h5py", None)
     assert cli.run(["record", "format=robomimic", f"pool={REFERENCE}", f"to={tmp_path / 'out.hdf5'}"]) == 2
     assert "pip install 'scengen[record]'" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_keys_have_the_values_of_the_environments_names(made):
+    """A policy that was trained on a recording sees the same in `scengen evaluate`."""
+    env = PoolEnv("domino_single", pool=[str(REFERENCE)], observations=["robot0_eef_pos", "robot0_eef_quat", NAME])
+    own = names(env.task.embodiment)
+    for demo in made["data"].values():
+        observation, _ = env.reset(options={"scenario": json.loads(demo.attrs["ep_meta"])["scenario"]})
+        for key in ("object", "robot0_eef_pos", "robot0_eef_quat_site"):
+            np.testing.assert_array_equal(demo[f"obs/{key}"][0].astype(np.float32), observation[own[key]])
+        assert {*demo["obs"]} - {*own} == {"robot0_eef_quat"}, "robosuite's orientation of the hand's body"

@@ -1,25 +1,19 @@
-"""Recipes: scripts that train and evaluate policies of LeRobot on a recording, in an environment of their own.
-
-Every setting that decides the result is written out, so that a default which changes with a version changes nothing.
-The names of the settings are those of LeRobot 0.6.1.
-"""
+"""Recipes for LeRobot. The names of the settings are those of LeRobot 0.6.1."""
 
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import BadConfig, UnknownName
-from ..work.targets import try_folder, write
-from .dataset import Recording
-from .streams import ENVIRONMENT
+from ...errors import BadConfig
+from ..dataset import Recording
+from ..streams import ENVIRONMENT
+from .settings import EPISODES, SMOKE_BATCHES, RecipeSettings, Scripts, script
 
 LEROBOT = "0.6.1"
 """Version of LeRobot whose settings the recipes name."""
-SMOKE = {"steps": 20, "batch_size": 2, "save_freq": 20, "log_freq": 1, "num_workers": 0}
-"""Settings of the short run that shows whether the environment works."""
-EPISODES = 20
-"""Number of evaluation episodes in each split, as in the paper."""
+SMOKE = {"steps": SMOKE_BATCHES, "batch_size": 2, "save_freq": SMOKE_BATCHES, "log_freq": 1, "num_workers": 0}
+"""Settings of the short run."""
 PICTURES = "observation.images."
 """Beginning of LeRobot's names of cameras."""
 SMOLVLA_CAMERAS = 3
@@ -131,17 +125,6 @@ RECIPES: Mapping[str, Recipe] = {
 
 
 @dataclass(frozen=True)
-class RecipeSettings:
-    """Settings of `scengen recipe`; conf/command/recipe.yaml explains them."""
-
-    train: str = ""
-    data: str = ""
-    to: str = ""
-    device: str = "cuda"
-    seed: int = 1000
-
-
-@dataclass(frozen=True)
 class Order:
     """A recipe for a recording."""
 
@@ -165,36 +148,28 @@ class Order:
         pairs = [f'"{PICTURES}{name}": "{PICTURES}camera{k}"' for k, name in enumerate(self.cameras, 1)]
         return {"rename_map": f"{{{', '.join(pairs)}}}"}
 
-    def path(self, name: str) -> str:
-        """Absolute path of something below the folder of the scripts."""
-        return str(Path(self.settings.to).resolve() / name)
 
-
-def write_recipe(settings: RecipeSettings) -> tuple[Recipe, list[str]]:
-    """Write the scripts of a recipe for a recording.
-
-    Returns:
-        The recipe, and the names of the files.
+def scripts(settings: RecipeSettings) -> Scripts:
+    """The scripts of a recipe for a recording.
 
     Raises:
-        ScengenError: there is no such recipe or recording, the policy cannot be trained on it, or it cannot be written.
+        ScengenError: there is no such recording, or the policy cannot be trained on it.
     """
-    if settings.train not in RECIPES:
-        raise UnknownName("recipe", settings.train, RECIPES)
-    order = Order(RECIPES[settings.train], Recording.open(settings.data), settings)
+    recipe = RECIPES[settings.train]
+    order = Order(recipe, Recording.open(settings.data), settings)
     _check(order)
-    folder = Path(settings.to)
-    try_folder(folder)
-    trial = {**SMOKE, "policy.device": "cpu"}
-    files = {
-        "requirements.txt": _requirements(order),
-        "smoke.sh": _script(order, "Trains for 20 batches on the processor.", _training(order, "smoke", trial)),
-        "train.sh": _script(order, "Trains the policy.", _training(order, "training", {})),
-        "evaluate.sh": _script(order, "Evaluates the policy: sh evaluate.sh POOL[,POOL]", _evaluation(order)),
+    trial, origin = {**SMOKE, "policy.device": "cpu"}, f"{settings.train}, LeRobot {LEROBOT}. {recipe.origin}"
+    parts = {
+        "smoke.sh": (f"Trains for {SMOKE_BATCHES} batches on the processor.", _training(order, "smoke", trial)),
+        "train.sh": ("Trains the policy.", _training(order, "training", {})),
+        "evaluate.sh": ("Evaluates the policy: sh evaluate.sh POOL[,POOL]", _evaluation(order)),
     }
-    for name, text in files.items():
-        write(folder / name, text)
-    return order.recipe, list(files)
+    written = {name: script(title, origin, " \\\n".join(lines)) for name, (title, lines) in parts.items()}
+    install = (
+        f"with Python 3.12 in an environment of its own: pip install -r {Path(settings.to, 'requirements.txt')} "
+        f"(LeRobot {LEROBOT})"
+    )
+    return Scripts(recipe.origin, install, {"requirements.txt": _requirements(order), **written})
 
 
 def _check(order: Order) -> None:
@@ -237,7 +212,7 @@ def _training(order: Order, output: str, changed: Mapping[str, Value]) -> Iterat
             "num_workers": 4,
             "env_eval_freq": 0,
             "wandb.enable": "false",
-            "output_dir": order.path(output),
+            "output_dir": order.settings.path(output),
             **changed,
         },
     )
@@ -253,7 +228,7 @@ def _evaluation(order: Order) -> Iterator[str]:
     yield from _command(
         "lerobot-eval",
         {
-            "policy.path": order.path("training/checkpoints/last/pretrained_model"),
+            "policy.path": order.settings.path("training/checkpoints/last/pretrained_model"),
             "policy.device": order.settings.device,
             "env.type": "scengen",
             "env.task": order.recording.episodes[0]["scengen/task"],
@@ -264,16 +239,10 @@ def _evaluation(order: Order) -> Iterator[str]:
             "eval.n_episodes": EPISODES,
             "eval.batch_size": EPISODES // 2,
             "seed": order.settings.seed,
-            "output_dir": order.path("evaluation"),
+            "output_dir": order.settings.path("evaluation"),
         },
     )
     yield '    --env.pool="$1"'
-
-
-def _script(order: Order, title: str, lines: Iterator[str]) -> str:
-    """A shell script with one command."""
-    origin = f"# {order.settings.train}, LeRobot {LEROBOT}. {order.recipe.origin}\n"
-    return f"#!/bin/sh\n# {title}\n{origin}set -eu\n" + " \\\n".join(lines) + "\n"
 
 
 def _command(program: str, settings: Mapping[str, Value]) -> Iterator[str]:

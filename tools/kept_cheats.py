@@ -1,0 +1,118 @@
+"""Play the cheats that people found, into records/cheats.jsonl, and write docs/kept_cheats.md.
+
+    python tools/kept_cheats.py [TASK ...]
+
+Each cheat of `tests/attack/hands` is played on the same draws of training in its task as it is and without its mend. A
+record counts as long as the code of the task and of the cheat is the same, so that a repeated call continues. With
+`page` alone, the tool only writes the page. What the adversary finds by itself is told by `tests/attack/recall.py`.
+"""
+
+import hashlib
+import importlib
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
+
+from hand import Hand
+from test_hands import HANDS, outcome
+
+from scengen import load_task
+from scengen.validate.identity import source_sha256
+
+ROOT = Path(__file__).parents[1]
+RECORDS = ROOT / "records" / "cheats.jsonl"
+"""File of the results."""
+RECALL = ROOT / "records" / "recall.jsonl"
+"""File of the cheats that the adversary looked for where their mends are taken out."""
+PAGE = ROOT / "docs" / "kept_cheats.md"
+DRAWS = 12
+"""Number of training draws."""
+HEAD = f"""# Kept cheats
+
+Written by `python tools/kept_cheats.py`. Every cheat was found by a person with the skills that oracles use, and reads
+no hidden parameter. It is kept in `tests/attack/hands`, with the rule or the physics that closes it
+([Attacking a task by hand](cheats.md)). Here each is played on {DRAWS} fresh training draws, in the task as it is and
+without that mend, and through the filter unless stated otherwise. The last column is what the adversary finds without
+the mend (`python tests/attack/recall.py`): the tier whose plan the closed task refuses, or, if the mend is one of
+physics, the tiers that succeed more than twice as often as in the closed task.
+
+| task | idea | cheat | solved | without the mend | the adversary finds |
+|---|---|---|---|---|---|
+"""
+
+
+def main(*names: str) -> None:
+    """Play what is missing, and write the page."""
+    if names != ("page",):
+        known = lines(RECORDS)
+        for task, cheat in HANDS:
+            about = identity(task, cheat)
+            if (names and task not in names) or newest(known, about):
+                continue
+            record = {**about, **played(task, cheat)}
+            with open(RECORDS, "a") as file:
+                file.write(json.dumps(record) + "\n")
+            print(f"{task} {cheat}: {record['closed']} of {DRAWS}, {record['open']} without its mend", flush=True)
+    PAGE.write_text(page())
+    print(f"wrote {PAGE.relative_to(ROOT)}")
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    """The records of a file; none if there is no file."""
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def identity(task: str, cheat: str) -> dict[str, Any]:
+    """What a record is about: it counts while this is the same."""
+    plan = Path(str(importlib.import_module(f"hands.{task}").__file__))
+    code = source_sha256(load_task(task).family) + hashlib.sha256(plan.read_bytes()).hexdigest()
+    return {"task": task, "cheat": cheat, "draws": DRAWS, "code_sha256": hashlib.sha256(code.encode()).hexdigest()}
+
+
+def newest(known: list[dict[str, Any]], about: dict[str, Any]) -> dict[str, Any] | None:
+    """The newest record with this identity."""
+    return next((record for record in reversed(known) if about.items() <= record.items()), None)
+
+
+def played(task: str, cheat: str) -> dict[str, int]:
+    """How many draws a cheat solves in the task as it is, and without its mend."""
+    return {
+        name: [outcome(task, cheat, index, mended) for index in range(DRAWS)].count("success")
+        for name, mended in (("closed", True), ("open", False))
+    }
+
+
+def page() -> str:
+    """The page of all cheats."""
+    return HEAD + "".join(f"{row}\n" for row in rows())
+
+
+def rows() -> Iterator[str]:
+    """The rows of the table."""
+    known, recalled, last = lines(RECORDS), lines(RECALL), ""
+    for (task, cheat), hand in HANDS.items():
+        number, _, idea = str(importlib.import_module(f"hands.{task}").__doc__).partition(":")
+        name = f"{number} [{task}](tasks/{task}.md)" if task != last else ""
+        found = newest(known, identity(task, cheat))
+        counts = [f"{found[part]} of {DRAWS}" for part in ("closed", "open")] if found else ["not counted yet"] * 2
+        plan = cheat.removesuffix("_raw").replace("_", " ") + (", raw" if hand.raw else "")
+        idea = " ".join(idea.split()) if task != last else ""
+        yield f"| {' | '.join((name, idea, plan, *counts, found_by(recalled, task, hand)))} |"
+        last = task
+
+
+def found_by(recalled: list[dict[str, Any]], task: str, hand: Hand) -> str:
+    """The tiers that find a way without a cheat's mend. Cheats with the same mend share them."""
+    mended = {cheat for (name, cheat), other in HANDS.items() if name == task and other.unmended == hand.unmended}
+    code = source_sha256(load_task(task).family)
+    of = [record for record in recalled if record["task"] == task and record["cheat"] in mended]
+    record = newest(of, {"source_sha256": code})
+    return "not tried yet" if record is None else record["found"].partition(":")[0] or "nothing"
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
