@@ -17,6 +17,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
+import mutation_score
 from hand import Hand
 from test_hands import HANDS, outcome
 
@@ -41,6 +42,18 @@ the mend (`python tests/attack/recall.py`): the tier whose plan the closed task 
 physics, the tiers that succeed more than twice as often as in the closed task.
 
 | task | idea | cheat | solved | without the mend | the adversary finds |
+|---|---|---|---|---|---|
+"""
+CLAUSES = """
+## Rules and parts of goals, left out one at a time
+
+Made by `python tools/mutation_score.py`. Each clause of a rule or of a goal is left out, and every cheat that somebody
+wrote for the task is played, declared shortcuts included. If one succeeds, the adversary attacks without them on two
+scenarios until it finds a way that the whole task refuses, with at most 200 rollouts. "Random" is what random macros
+find with as many. The last column counts runs of the oracle with 1.5 times a certificate's jitter, in the whole task,
+that would be taken for a way around it.
+
+| task | clauses | exploited by a written cheat | found by the adversary | random | varied runs flagged |
 |---|---|---|---|---|---|
 """
 
@@ -88,7 +101,21 @@ def played(task: str, cheat: str) -> dict[str, int]:
 
 def page() -> str:
     """The page of all cheats."""
-    return HEAD + "".join(f"{row}\n" for row in rows())
+    return HEAD + "".join(f"{row}\n" for row in rows()) + CLAUSES + "".join(f"{row}\n" for row in clauses())
+
+
+def clauses() -> Iterator[str]:
+    """The rows of the table of clauses, and their sums."""
+    found = mutation_score.stored()
+    for name in ("all", *sorted({record["task"] for record in found})):
+        of = [record for record in found if name in ("all", record["task"])]
+        mutants, varied = ([one for one in of if bool(one["mutant"]) is which] for which in (True, False))
+        exploited = [one for one in mutants if one["cheats"]]
+        counts = [sum(bool(one[what]) for one in exploited) for what in ("found", "random")]
+        runs, flagged = (sum(one[what] for one in varied) for what in ("runs", "flagged"))
+        flags = f"{flagged} of {runs}" if runs else "-"
+        row = (name, len(mutants), len(exploited), *counts, flags)
+        yield f"| {' | '.join(map(str, row))} |"
 
 
 def rows() -> Iterator[str]:

@@ -26,12 +26,13 @@ from mutants import BARS, TASKS, Mutant, mutants
 
 from scengen import load_task
 from scengen.attack.adversary import MEMORY, PRIOR, RANDOM, TIERS, Attack
-from scengen.attack.campaign import FITTING_SEED, AttackJob, AttackSettings, Subject, drawn, fitted, player_of
+from scengen.attack.campaign import FITTING_SEED, GRAMMAR, AttackJob, AttackSettings, Subject, drawn, fitted, player_of
 from scengen.attack.evidence import CausalContacts, Hit
 from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
 from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
+from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
@@ -50,19 +51,28 @@ WIDER_JITTER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=
 def main(budget: str = "200", *tasks: str) -> None:
     """Score all mutants, or those of some tasks, and print the score."""
     RESULTS.parent.mkdir(exist_ok=True)
-    records = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
+    records = stored()
     done = {(record["task"], record["mutant"]) for record in records}
     with open(RESULTS, "a") as page:
         for mutant in mutants():
             if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
                 continue
-            records.append(scored(mutant, int(budget)))
-            _keep(page, records[-1])
+            records.append(_keep(page, scored(mutant, int(budget))))
         for task in tasks or TASKS:
             if (task, "") not in done:
-                records.append(flagged(task))
-                _keep(page, records[-1])
+                records.append(_keep(page, flagged(task)))
     print(_summary(records))
+
+
+def stored() -> list[dict[str, Any]]:
+    """The records that count: the code of their family is the same, and so are the adversary's plans."""
+    found = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
+    return [record for record in found if identity(record["task"]).items() <= record.items()]
+
+
+def identity(task: str) -> dict[str, Any]:
+    """What a record is about, beside its mutant."""
+    return {"task": task, "grammar": GRAMMAR, "source_sha256": source_sha256(load_task(task).family)}
 
 
 def compare(budget: str = "60", *tasks: str) -> None:
@@ -220,10 +230,13 @@ def _told(hit: Hit | None) -> str:
     return f"{hit.tier} {'raw' if hit.raw else 'filtered'}: {hit.plan[:120]}"
 
 
-def _keep(page: Any, record: dict[str, Any]) -> None:
+def _keep(page: Any, found: dict[str, Any]) -> dict[str, Any]:
+    """Store a record and return it."""
+    record = identity(found["task"]) | found
     page.write(json.dumps(record) + "\n")
     page.flush()
     print(json.dumps(record), flush=True)
+    return record
 
 
 def _summary(records: Sequence[dict[str, Any]]) -> str:
