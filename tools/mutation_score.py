@@ -16,13 +16,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
 from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
+from opened import Opened
 
 from scengen import load_task
 from scengen.attack.adversary import MEMORY, PRIOR, RANDOM, TIERS, Attack
@@ -32,14 +33,17 @@ from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
 from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
+from scengen.samplers.task import Task
 from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
 RESULTS = Path("records/mutation_score.jsonl")
 """File of the results."""
-SCENARIOS = 2
-"""Number of scenarios for each mutant."""
+SCENARIOS = 10
+"""Number of scenarios for each mutant, as for a task in `scengen attack`."""
+CHEATED = 2
+"""Number of these scenarios in which written cheats are played."""
 PLAYED = tuple(tier for tier in TIERS if tier != "shortcut")
 """Tiers that attack a mutant: shortcuts are written cheats, so that they would find nothing by themselves."""
 VARIED_RUNS = 40
@@ -48,7 +52,7 @@ WIDER_JITTER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=
 """Jitter of these runs: 1.5 times that of a certificate."""
 
 
-def main(budget: str = "200", *tasks: str) -> None:
+def main(budget: str = "500", *tasks: str) -> None:
     """Score all mutants, or those of some tasks, and print the score."""
     RESULTS.parent.mkdir(exist_ok=True)
     records = stored()
@@ -111,7 +115,7 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
         return guessed(mutant)
     with mutant.weakened():
         subjects = mutant.subjects(SCENARIOS)
-        cheats = exploits(mutant, subjects[:2])
+        cheats = exploits(mutant, subjects[:CHEATED])
         used, found = hunted(mutant, subjects, budget, PLAYED) if cheats else (0, None)
         luck = hunted(mutant, subjects, used, [RANDOM])[1] if found else None
     return {
@@ -188,7 +192,9 @@ def hunted(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequ
 
 def _job(mutant: Mutant, subjects: Sequence[Subject], budget: int, tiers: Sequence[str]) -> AttackJob:
     """The attack on a mutant, with `budget` rollouts for each scenario."""
-    priors = fitted(load_task(mutant.task), AttackSettings()) if PRIOR in tiers and not mutant.change else []
+    task = load_task(mutant.task)
+    asked = cast(Task, Opened(task, mutant.change)) if mutant.change else task
+    priors = fitted(asked, AttackSettings()) if PRIOR in tiers else []
     known = trained(mutant.task) if MEMORY in tiers else Experience()
     return AttackJob(tuple(subjects), budget, 0, tuple(tiers), tuple(priors), known=known)
 

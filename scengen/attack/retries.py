@@ -72,13 +72,15 @@ def bare(player: Player, arm: Arm) -> Iterator[Attempt]:
 
 
 def placed(player: Player, arm: Arm) -> Iterator[Attempt]:
-    """Every graspable free body is put down at several places of a face, one after the other."""
+    """Every graspable free body is put down at several places of a face, one after the other, from each end on."""
     for one, other in _pairs(player, arm):
         for pick in picks(player, arm, one)[:1]:
-            moves: list[Macro] = []
-            for share in FACE_SHARES:
-                moves += [pick, Macro("place", other.name, (0.0, share, 0.0, 0.08)), Macro("wait", "", (0.8,))]
-            yield Attempt(RETRY, tuple(moves))
+            for across, sign in ((True, 1.0), (False, 1.0), (False, -1.0), (True, -1.0)):
+                moves: list[Macro] = []
+                for share in FACE_SHARES:
+                    place = (0.0, sign * share) if across else (sign * share, 0.0)
+                    moves += [pick, Macro("place", other.name, (*place, 0.0, 0.08)), Macro("wait", "", (0.8,))]
+                yield Attempt(RETRY, tuple(moves))
 
 
 def tipped(player: Player, arm: Arm) -> Iterator[Attempt]:

@@ -1,7 +1,7 @@
 """Tier of feedback plans: pursue, press down, block, cradle, and carry to the place where the witness leaves a body.
 
 The plans are those of `plans`, which know no task. Each attempt is for one body that the robot handles in the witness,
-with a few leads, directions and routes. Jaws alone play this tier.
+with a few leads, directions and routes. An arm with a suction cup only carries.
 """
 
 import math
@@ -16,6 +16,7 @@ from ..sim.world import Arm
 from .macros import Macro
 from .player import Attempt, Player
 from .retries import picks
+from .solids import handles
 
 SERVO = "servo"
 """Tier of feedback plans."""
@@ -47,6 +48,8 @@ ROUTES = (
 )
 """Ways to carry a body: height above its goal [m], turn of the hand [rad], and the largest distance to the left of the
 straight way [m]. They go through a gap, over an obstacle, straight, high, and around both sides."""
+CARRIED = tuple(dict.fromkeys((HIGH, *ROUTES)))
+"""The same ways, the one over everything first: there the height of the drop matters most."""
 RAISE = 0.008
 """Height above its way at which a body is carried along it [m]: the fingers keep off the table."""
 DROPS = (0.0, 0.04, 0.12)
@@ -58,8 +61,9 @@ MIN_MOTION = 0.03
 
 
 def servo(player: Player) -> Iterator[Attempt]:
-    """All attempts, for every arm with a jaw and every handled body in turn, the most promising ones first."""
-    jaws = [arm for arm in player.world.arms if not arm.suction]
+    """All attempts, for every arm and every handled body in turn, the most promising ones first."""
+    arms = player.world.arms
+    jaws, cups = ([arm for arm in arms if arm.suction is sucks] for sucks in (False, True))
     bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
     restless = moving(player)
     of_one = _in_turn(
@@ -68,10 +72,11 @@ def servo(player: Player) -> Iterator[Attempt]:
             for arm, body in product(jaws, bodies)
             for made in ((chased, carried, cradled) if body in restless else (carried, cradled))
         ]
+        + [carried(player, arm, body) for arm, body in product(cups, bodies)]
     )
     swinging = [body for body in player.trace.handled if body not in bodies and body in restless]
-    of_hinged = [met(player, arm, body) for arm, body in product(jaws, swinging)]
-    of_all = _in_turn([all_carried(player, arm, bodies) for arm in jaws]) if len(bodies) > 1 else iter(())
+    of_hinged = [made(player, arm, body) for arm, body in product(jaws, swinging) for made in (met, stopped)]
+    of_all = _in_turn([all_carried(player, arm, bodies) for arm in arms]) if len(bodies) > 1 else iter(())
     yield from _in_turn([of_all, of_one, *of_hinged])
 
 
@@ -88,13 +93,24 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     """
     rest = bring(player, arm, body, ROUTES[1], 0.0)
     later = Macro("await", body, (), arm.number)
+    for chase in chases(arm, body):
+        yield Attempt(SERVO, (later, chase, rest))
+        yield Attempt(SERVO, (chase, rest))
+
+
+def stopped(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
+    """Pursue, press down and block a hinged body that moves by itself, wherever it is."""
+    for chase in chases(arm, body):
+        yield Attempt(SERVO, (chase,))
+
+
+def chases(arm: Arm, body: str) -> Iterator[Macro]:
+    """Macros that stop a moving body, each with several leads."""
     plans = [("pursue", PURSUIT_LEADS), ("pin", BLOCK_LEADS), ("block", BLOCK_LEADS)]
     for leads in zip_longest(*(leads for _, leads in plans)):
         for (kind, _), lead in zip(plans, leads, strict=True):
             if lead is not None:
-                chase = Macro(kind, body, (lead,), arm.number)
-                yield Attempt(SERVO, (later, chase, rest))
-                yield Attempt(SERVO, (chase, rest))
+                yield Macro(kind, body, (lead,), arm.number)
 
 
 def met(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
@@ -110,10 +126,11 @@ def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     with it what the goal asks for, and carry it to its goal by every route."""
     pick = taking(player, arm, body)
     for skew in (0.0, QUARTER):
-        take = Macro("take", body, (skew, 0.0), arm.number)
+        take = turned(player, arm, body, skew, 0.0)
         yield Attempt(SERVO, (take, Macro("along", body, (skew, RAISE), arm.number)))
     asked = asked_of(player, body)
-    for drop, route in product(DROPS, ROUTES):
+    every = product(range(len(DROPS)), range(len(CARRIED)))
+    for drop, route in ((DROPS[i], CARRIED[k]) for i, k in sorted(every, key=sum)):
         goal = bring(player, arm, body, route, drop)
         yield Attempt(SERVO, (pick, goal))
         if asked:
@@ -125,11 +142,11 @@ def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Att
     """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
     asked = {body: asked_of(player, body) for body in bodies}
     touches = (touched_there, touched_straight, untouched) if any(asked.values()) else (untouched,)
-    for route, skew, drop, touch in product(dict.fromkeys((HIGH, *ROUTES)), (0.0, QUARTER), DROPS, touches):
+    for route, skew, drop, touch in product(CARRIED, (0.0, QUARTER), DROPS, touches):
         moves: list[Macro] = []
         for body in bodies:
-            taken = [Macro("take", body, (skew, 0.2), arm.number) if skew else taking(player, arm, body)]
-            moves += [*taken, *touch(player, arm, body, asked[body]), bring(player, arm, body, route, drop)]
+            taken = turned(player, arm, body, skew, 0.2) if skew else taking(player, arm, body)
+            moves += [taken, *touch(player, arm, body, asked[body]), bring(player, arm, body, route, drop)]
         yield Attempt(SERVO, tuple(moves))
 
 
@@ -180,8 +197,22 @@ def cradled(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 def taking(player: Player, arm: Arm, body: str) -> Macro:
     """A macro that picks a body across the side with the most clearance, or else across its narrowest side."""
-    found = picks(player, arm, player.solids[body])
+    grips = [one for one in handles(player.solids, arm.suction) if one.body == body] if arm.suction else []
+    found = picks(player, arm, (*grips, player.solids[body])[0])
     return replace(found[0], arm=arm.number) if found else Macro("take", body, (0.0, 0.12), arm.number)
+
+
+def turned(player: Player, arm: Arm, body: str, skew: float, lift: float) -> Macro:
+    """A macro that picks a body with a hand that is turned from the body's narrow side, or from where a cup is.
+
+    Args:
+        skew: angle of the turn [rad].
+        lift: height by which a jaw lifts the body [m].
+    """
+    if not arm.suction:
+        return Macro("take", body, (skew, lift), arm.number)
+    pick = taking(player, arm, body)
+    return replace(pick, numbers=(pick.numbers[0], skew, *pick.numbers[2:]))
 
 
 def bring(player: Player, arm: Arm, body: str, route: tuple[float, float, float], drop: float) -> Macro:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from opened import Opened
 from test_hands import HANDS
 
 from scengen.attack.adversary import CLOCK, MEMORY, PRIOR, RANDOM, SEARCH, SERVO, SHORTCUT, TIERS
@@ -30,20 +31,6 @@ UNAIDED = (SHORTCUT, PRIOR, MEMORY, CLOCK, SERVO, RANDOM, SEARCH)
 """Tiers that do not continue the witness of the scenario, which of course reaches the goal. They alone attack a task
 whose mend changes the physics or the events."""
 SEED = 21
-
-
-class Opened:
-    """A task whose draws lack a mend."""
-
-    def __init__(self, task, unmended):
-        self._task, self._unmended = task, unmended
-
-    def __getattr__(self, name):
-        return getattr(self._task, name)
-
-    def draw(self, *where):
-        draw = self._task.draw(*where)
-        return replace(draw, scenario=self._unmended(draw.scenario))
 
 
 def job(task, n, budget, tiers):
