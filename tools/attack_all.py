@@ -57,7 +57,7 @@ witness, and the kind of answer that the family declares; it knows nothing else 
 
 The adversary knows the positions of the bodies, which no policy knows in `mirror_pick_place`. There a random pick at
 the right place is all that the task requires, so its rate says nothing about a policy that sees a mirrored picture.
-Servo plans are for jaws: a task for suction alone has none.
+An arm with a suction cup has no servo plans but those that carry.
 
 """
 OBSERVED = """

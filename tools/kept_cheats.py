@@ -47,13 +47,13 @@ physics, the tiers that succeed more than twice as often as in the closed task.
 CLAUSES = """
 ## Rules and parts of goals, left out one at a time
 
-Made by `python tools/mutation_score.py`. Each clause of a rule or of a goal is left out, and every cheat that somebody
-wrote for the task is played, declared shortcuts included. If one succeeds, the adversary attacks without them on two
-scenarios until it finds a way that the whole task refuses, with at most 200 rollouts. "Random" is what random macros
-find with as many. The last column counts runs of the oracle with 1.5 times a certificate's jitter, in the whole task,
-that would be taken for a way around it.
+Made by `python tools/mutation_score.py`. Clauses of rules and of goals are left out, and some values leave their
+constraints. Then every cheat that somebody wrote for the task is played, declared shortcuts included. If one succeeds
+because of it, the adversary attacks without shortcuts on ten scenarios until it finds such a way as well, with at most
+500 rollouts, the default of `scengen attack`. "Random" is what random macros find with as many. The last column counts
+runs of the oracle with 1.5 times a certificate's jitter, in the whole task, that would be taken for a way around it.
 
-| task | clauses | exploited by a written cheat | found by the adversary | random | varied runs flagged |
+| task | left out | exploited by a written cheat | found by the adversary | random | varied runs flagged |
 |---|---|---|---|---|---|
 """
 

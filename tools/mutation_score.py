@@ -3,7 +3,8 @@
 Every mutant of tests/attack/mutants.py that a written cheat exploits is attacked, without the declared shortcuts, until
 an attempt succeeds that the sound family refuses. For comparison: the hits of random macros with the same number of
 rollouts, and the number of varied runs of the oracle that would be taken for a way around the task. Results are stored
-in records/mutation_score.jsonl, and a repeated call continues there.
+in records/mutation_score.jsonl, and a repeated call continues there: first the varied runs, then a mutant of each task,
+then the next ones, so that an interrupted call has measured all tasks alike.
 
 `python tools/mutation_score.py hits [budget] [task ...]` counts, for each mutant that a written cheat exploits, all
 successes that the sound family refuses, of the adversary and of random macros with the same number of rollouts.
@@ -58,13 +59,13 @@ def main(budget: str = "500", *tasks: str) -> None:
     records = stored()
     done = {(record["task"], record["mutant"]) for record in records}
     with open(RESULTS, "a") as page:
+        for task in tasks or TASKS:
+            if (task, "") not in done:
+                records.append(_keep(page, flagged(task)))
         for mutant in mutants():
             if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
                 continue
             records.append(_keep(page, scored(mutant, int(budget))))
-        for task in tasks or TASKS:
-            if (task, "") not in done:
-                records.append(_keep(page, flagged(task)))
     print(_summary(records))
 
 
@@ -114,14 +115,13 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
     if mutant.narrow:
         return guessed(mutant)
     with mutant.weakened():
-        subjects = mutant.subjects(SCENARIOS)
-        cheats = exploits(mutant, subjects[:CHEATED])
+        cheats = exploits(mutant, mutant.subjects(CHEATED))
+        subjects = mutant.subjects(SCENARIOS) if cheats else []
         used, found = hunted(mutant, subjects, budget, PLAYED) if cheats else (0, None)
         luck = hunted(mutant, subjects, used, [RANDOM])[1] if found else None
     return {
         "task": mutant.task,
         "mutant": mutant.name,
-        "subjects": len(subjects),
         "cheats": cheats,
         "rollouts": used,
         "found": _told(found),
