@@ -9,6 +9,7 @@ from hands.linear_intercept import unmended
 
 from scengen.attack.adversary import Attack
 from scengen.attack.player import Player
+from scengen.attack.retries import retries
 from scengen.attack.servo import SERVO, asked_of, moving, servo
 from scengen.compose import load_task
 from scengen.sim.world import World
@@ -86,3 +87,30 @@ def test_each_kind_of_plan_for_one_arm_is_played_where_there_are_two():
     assert {"along", "bring", "move"} <= first.keys()
     for attempt in first.values():
         assert player.play(attempt.macros, raw=False).actions.shape[1] == 14
+
+
+def test_a_suction_cup_carries_a_body_to_where_the_witness_leaves_it():
+    player = player_of("cracker_box_suction")
+    attempts = list(servo(player))
+    assert {macro.kind for attempt in attempts for macro in attempt.macros} == {"pick", "along", "bring", "touch"} - (
+        set() if asked_of(player, "box") else {"touch"}
+    )
+    attempt = next(one for one in attempts if [macro.kind for macro in one.macros] == ["pick", "bring"])
+    player.play(attempt.macros, raw=False)
+    start, goal, there = player.start_place("box"), player.goal_place("box"), player.world.com("box")
+    assert np.linalg.norm((there - goal)[:2]) < 0.3 * np.linalg.norm((start - goal)[:2])
+
+
+def test_a_hinged_body_that_swings_is_met_and_stopped():
+    player = player_of("pendulum_grasp")
+    kinds = {macro.kind for attempt in servo(player) for macro in attempt.macros if macro.target == "pendulum/bob"}
+    assert kinds == {"meet", "pursue", "pin", "block"}
+
+
+def test_a_body_is_put_down_on_a_face_from_each_of_its_ends():
+    first = {
+        attempt.macros[1].numbers[:2]
+        for attempt in retries(player_of("shape_stack"))
+        if [macro.kind for macro in attempt.macros] == ["pick", "place", "wait"] * 5
+    }
+    assert first == {(0.0, 0.9), (0.9, 0.0), (-0.9, 0.0), (0.0, -0.9)}
