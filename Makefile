@@ -112,9 +112,8 @@ stack-sample: setup
 readers: setup
 	$(BIN)/python tools/check_readers.py
 
-# Plays the packages of integrations/ in LeRobot, vla-eval and inspect-robots, in environments of their own, and compares verdicts; with
-# robomimic, actions.
-# INTEGRATIONS=vla_eval_scengen selects packages. LeRobot needs Python 3.12 and gigabytes.
+# Plays the packages of integrations/ in LeRobot, robomimic, vla-eval and inspect-robots, in environments of their own, and compares verdicts
+# or actions. INTEGRATIONS=vla_eval_scengen selects packages. LeRobot needs Python 3.12 and gigabytes.
 INTEGRATIONS ?=
 integrations: setup
 	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)

@@ -2,7 +2,8 @@
 
 Each gets an environment of its own below build/integrations, from the package index, and its `check.py` plays the
 policy `replay` on a pool in distribution and on one out of it. The verdicts of all scenarios must be those of `scengen
-evaluate`; that of robomimic compares the actions of a checkpoint. A package whose Python is missing is told as not tried. Exit status 1 if one fails.
+evaluate`; that of robomimic compares the actions of a checkpoint. A package whose Python is missing is told as not
+tried. Exit status 1 if one fails.
 """
 
 import shutil
