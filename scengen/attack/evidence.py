@@ -37,6 +37,7 @@ from ..work.machine import memory_bounded
 from ..work.targets import write
 from .player import SETTLE_TIME, Attempt, Node, Played, Player
 from .signature import ContactPair, pairs
+from .variations import at_another_pace
 
 VARIED_RUNS = 40
 """Number of varied runs of the oracle in which a causal contact has to occur. A contact that is missing in 5 % of runs
@@ -206,6 +207,10 @@ class CausalContacts:
                 break
         return self._pairs - touched
 
+    def spare(self, touched: frozenset[ContactPair]) -> None:
+        """Note the contacts of a success by the oracle's own moves: what it lacks is not causal."""
+        self._pairs &= touched
+
     def _varied(self, k: int) -> frozenset[ContactPair]:
         """The contacts of a jittered run; all contacts known so far if it fails, or if there is no oracle."""
         player = self._player
@@ -232,6 +237,8 @@ def hit(
     if not again.solved or again.digest != played.digest:
         return None
     left = played.signature
+    if at_another_pace(player, attempt):  # a body that lies beside another one by chance need not touch it
+        causal.spare(left.pairs)
     return Hit(
         scenario=player.scenario.id,
         tier=attempt.tier,

@@ -31,6 +31,16 @@ def perturbed(player: Player) -> Iterator[Attempt]:
         yield Attempt(WITNESS, tuple(phase(player, k, pace) for k in range(len(player.trace.phases))))
 
 
+def at_another_pace(player: Player, attempt: Attempt) -> bool:
+    """Whether an attempt makes all moves of the witness in their order, at any pace, and nothing else."""
+    first, last = player.trace.phases[attempt.stage or 0][0], player.trace.phases[-1][1]
+    for macro in attempt.macros:
+        if macro.kind != "follow" or any(macro.numbers[3:]) or macro.numbers[0] != first:
+            return False
+        first = macro.numbers[1]
+    return first == last
+
+
 def foreign(player: Player) -> Iterator[Attempt]:
     """The unchanged witnesses of other scenarios: pure memory."""
     for name in player.foreign:

@@ -16,7 +16,7 @@ from scengen.attack.macros import Macro
 from scengen.attack.player import Attempt, Player
 from scengen.attack.priors import fit
 from scengen.attack.solids import handles, sides
-from scengen.attack.variations import perturbed, rest
+from scengen.attack.variations import at_another_pace, perturbed, phase, rest
 from scengen.cli.program import run
 from scengen.control.teleop import Filter
 from scengen.predicates import touched_only
@@ -110,6 +110,28 @@ def test_recorded_actions_come_through_the_filter(player):
     assert np.allclose(filtered, player.trace.actions, atol=1e-5)
     assert player.play((Macro("replay", "own"),), raw=True).solved
     player.foreign = {}
+
+
+def test_the_oracles_own_moves_at_another_pace_are_told_from_other_ones(player):
+    paced = [attempt for attempt in perturbed(player) if at_another_pace(player, attempt)]
+    assert len(paced) == 2 * (player.phases + 1), "each phase, and all of them, slower and faster"
+    dropped, mirrored = (
+        Attempt("", rest(player, 1), 0),
+        Attempt("", (phase(player, 0, mirrored=True), *rest(player, 1))),
+    )
+    shifted = Attempt("", (phase(player, 0, shift=(0.01, 0.0, 0.0)), *rest(player, 1)))
+    assert not any(
+        at_another_pace(player, one) for one in (dropped, mirrored, shifted, Attempt("", ()), Attempt("", (PICK,)))
+    )
+
+
+def test_what_the_oracles_own_moves_lack_is_not_causal(player):
+    causal = CausalContacts(player, varied=0)
+    every = player.trace.signature.pairs
+    one = next(iter(sorted(every)))
+    assert causal.lacking(every - {one}) == {one}
+    causal.spare(every - {one})
+    assert not causal.lacking(every - {one})
 
 
 def test_perturbed_witnesses_begin_where_a_phase_does(player):
