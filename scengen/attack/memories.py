@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import GaveUp, UnknownName
 from ..geometry import Mat3, Vec3, about_z, polar
 from ..robots import panda
 from ..samplers.task import Task
@@ -59,17 +60,27 @@ class Memory:
     """Orientation of the body at the start of the solution."""
 
     def follow(self, world: World) -> Plan:
-        """The solution carried to a world, in which nothing has happened or some memories have failed."""
+        """The solution carried to a world, in which nothing has happened or some memories have failed.
+
+        Raises:
+            GaveUp: the scene lacks a body of the solution: some tasks have more bodies in one scenario than in another.
+        """
+        try:
+            yield from self._carried(world).follow(world)
+        except UnknownName as error:
+            raise GaveUp(f"the solution is one for another scene: {error}") from None
+
+    def _carried(self, world: World) -> SolutionMemory:
         if self.way == PARTS:
-            return self.solution.follow(world)
+            return self.solution
         here = world.pos(self.body)
         if self.way == BEARING:
             turn = about_z(polar(here - panda.BASE)[0] - polar(self.pos - panda.BASE)[0])
-            return carried(self.solution, turn, panda.BASE, panda.BASE).follow(world)
+            return carried(self.solution, turn, panda.BASE, panda.BASE)
         turn = np.eye(3)
         if self.way == POSE:
             turn = upright(world.rot(self.body) @ self.rot.T)
-        return carried(self.solution, turn, self.pos, here).follow(world)
+        return carried(self.solution, turn, self.pos, here)
 
 
 def carried(solution: SolutionMemory, turn: Mat3, before: Vec3, here: Vec3) -> SolutionMemory:

@@ -47,6 +47,12 @@ def test_a_memory_solves_its_own_scenario_in_each_way(subjects, memories, way):
     assert solved(subjects[0], memories[way])
 
 
+@pytest.mark.parametrize("way", [POSE, PLACE, BEARING])
+def test_a_memory_of_a_body_that_another_scene_lacks_solves_nothing(subjects, memories, way):
+    """Some tasks have more bodies in one scenario than in another."""
+    assert not solved(subjects[0], replace(memories[way], body="shape_3"))
+
+
 def test_a_path_is_turned_about_a_point_and_moved_with_it(memories):
     solution, turn, here = memories[POSE].solution, about_z(math.pi / 2), np.array([0.1, 0.2, 0.3])
     (before,), (after,) = solution.paths, carried(solution, turn, panda.BASE, panda.BASE + here).paths
