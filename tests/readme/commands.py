@@ -32,7 +32,7 @@ APART = {
     "scengen attack": "200 rollouts: 2 minutes",
     "scengen film hit=": "the name is that of a hit, which differs from machine to machine",
     "scengen verify hits=": "the hits are those of scengen attack",
-    "scengen record pool=generated/id to=recordings/id ": "scenarios before four cameras: a quarter of an hour without a graphics card",
+    "scengen record pool=generated/id to=recordings/id ": "four cameras: a quarter of an hour without a graphics card",
     "scengen record pool=generated/domino_single-id-demos": "the demonstrations are not made",
     "scengen crosscheck": "10 episodes under robosuite's own controller: 2 minutes",
     "pytest --scengen-task": "wants the package of scengen new to be installed",
