@@ -22,6 +22,7 @@ from hand import Hand
 from test_hands import HANDS, outcome
 
 from scengen import load_task
+from scengen.attack.campaign import GRAMMAR
 from scengen.validate.identity import source_sha256
 
 ROOT = Path(__file__).parents[1]
@@ -137,7 +138,7 @@ def found_by(recalled: list[dict[str, Any]], task: str, hand: Hand) -> str:
     mended = {cheat for (name, cheat), other in HANDS.items() if name == task and other.unmended == hand.unmended}
     code = source_sha256(load_task(task).family)
     of = [record for record in recalled if record["task"] == task and record["cheat"] in mended]
-    record = newest(of, {"source_sha256": code})
+    record = newest(of, {"source_sha256": code, "grammar": GRAMMAR})
     return "not tried yet" if record is None else record["found"].partition(":")[0] or "nothing"
 
 
