@@ -18,6 +18,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
 import mutation_score
+from axis_records import lines
 from hand import Hand
 from test_hands import HANDS, outcome
 
@@ -73,11 +74,6 @@ def main(*names: str) -> None:
             print(f"{task} {cheat}: {record['closed']} of {DRAWS}, {record['open']} without its mend", flush=True)
     PAGE.write_text(page())
     print(f"wrote {PAGE.relative_to(ROOT)}")
-
-
-def lines(path: Path) -> list[dict[str, Any]]:
-    """The records of a file; none if there is no file."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 def identity(task: str, cheat: str) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
+from axis_records import lines
 from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 from opened import Opened
@@ -71,8 +72,7 @@ def main(budget: str = "500", *tasks: str) -> None:
 
 def stored() -> list[dict[str, Any]]:
     """The records that count: the code of their family is the same, and so are the adversary's plans."""
-    found = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
-    return [record for record in found if identity(record["task"]).items() <= record.items()]
+    return [record for record in lines(RESULTS) if identity(record["task"]).items() <= record.items()]
 
 
 def identity(task: str) -> dict[str, Any]:

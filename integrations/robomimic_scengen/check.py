@@ -27,8 +27,6 @@ from scengen.pool import Pool
 
 EPISODES = 3
 """Number of recorded witnesses."""
-KEYS = ("object", "robot0_eef_pos", "robot0_eef_quat_site", "robot0_gripper_qpos")
-"""Keys that the recipe's policy sees."""
 WITHIN = 1e-5
 """Largest difference between two actions: the streams of the environment are rounded to single precision."""
 
@@ -46,8 +44,8 @@ def checkpoint(pool: str, folder: Path) -> Path:
 
 def largest_difference(env: PoolEnv, file: Path, recorded: Path) -> float:
     """The largest difference between an action in the environment and one in robomimic, in all recorded rows."""
-    ours, (theirs, _) = policy(env), policy_from_checkpoint(ckpt_path=str(file))
-    differences = []
+    ours, (theirs, stored) = policy(env), policy_from_checkpoint(ckpt_path=str(file))
+    keys, differences = stored["shape_metadata"]["all_obs_keys"], []
     with h5py.File(recorded) as data:
         for number in range(EPISODES):
             demo = data[f"data/demo_{number}"]
@@ -55,7 +53,7 @@ def largest_difference(env: PoolEnv, file: Path, recorded: Path) -> float:
             ours.reset(observation, info, 0)
             theirs.start_episode()
             for row, action in enumerate(demo["actions"][()]):
-                seen = {key: process_obs(demo[f"obs/{key}"][row], obs_key=key) for key in KEYS}
+                seen = {key: process_obs(demo[f"obs/{key}"][row], obs_key=key) for key in keys}
                 torch.manual_seed(row)
                 expected = theirs(ob=seen)
                 torch.manual_seed(row)

@@ -20,11 +20,11 @@ POSES = {"object": 30, "robot0_eef_pos": 3, "robot0_eef_quat": 4, "robot0_eef_qu
 SEEN = ["robot0_eef_pos", "robot0_eef_quat_site", "robot0_gripper_qpos"]
 
 
-def recorded(path, pictures=(), **extra):
+def recorded(path, pictures=()):
     """What the recipe reads of a recording: the columns of its first episode, and its task."""
     with h5py.File(path, "w") as file:
         demo = file.create_group("data/demo_0")
-        demo.attrs["ep_meta"] = json.dumps({"task": "domino_single", **extra})
+        demo.attrs["ep_meta"] = json.dumps({"task": "domino_single"})
         for name, length in POSES.items():
             demo[f"obs/{name}"] = np.zeros((5, length))
         for name in pictures:
@@ -114,7 +114,7 @@ def test_scripts_run_the_training_and_evaluate_its_newest_checkpoint(tmp_path):
 
 def test_what_cannot_be_trained_is_refused_before_anything_is_written(tmp_path):
     (tmp_path / "text.hdf5").write_text("no HDF5")
-    for name in ("no_json", "no_demo", "blind"):
+    for name in ("no_json", "no_demo", "blind", "flat"):
         recorded(tmp_path / f"{name}.hdf5")
     with h5py.File(tmp_path / "no_json.hdf5", "a") as file:
         file["data/demo_0"].attrs["ep_meta"] = "{"
@@ -122,7 +122,10 @@ def test_what_cannot_be_trained_is_refused_before_anything_is_written(tmp_path):
         del file["data/demo_0"]
     with h5py.File(tmp_path / "blind.hdf5", "a") as file:
         del file["data/demo_0/obs/object"]
+    with h5py.File(tmp_path / "flat.hdf5", "a") as file:
+        file["data/demo_0/obs/agentview_image"] = np.zeros(5, np.uint8)
     for name, error, says in (
+        ("flat.hdf5", PoolError, "is not a recording of scengen"),
         ("folder", BadConfig, "robomimic's format is one file"),
         ("none.hdf5", PoolError, "no recording at"),
         ("text.hdf5", PoolError, "is not a recording of scengen"),

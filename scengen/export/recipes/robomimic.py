@@ -95,19 +95,19 @@ def _read(path: str) -> Data:
             demo: Any = file["data/demo_0"]
             task = load_task(str(json.loads(demo.attrs["ep_meta"])["task"]))
             shapes = {name: column.shape[1:] for name, column in demo["obs"].items()}
+        names = {key: name for key, name in keys.names(task.embodiment).items() if key in shapes}
+        pictures = tuple(key for key in names if key.endswith(keys.IMAGE))
+        height, width, _ = shapes[pictures[0]] if pictures else (0, 0, 3)
     except FileNotFoundError:
         raise PoolError(f"no recording at {path}; see scengen record format=robomimic") from None
     except ScengenError:
         raise
     except (OSError, KeyError, AttributeError, TypeError, ValueError):
         raise PoolError(wrong) from None
-    names = {key: name for key, name in keys.names(task.embodiment).items() if key in shapes}
-    pictures = tuple(key for key in names if key.endswith(keys.IMAGE))
     poses = ("eef_pos", f"eef_quat{keys.SITE}", "gripper_qpos")
     low = tuple(key for key in names if key.endswith(poses) or (key == keys.OBJECT and not pictures))
     if not pictures and keys.OBJECT not in low:
         raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one of them, so record it anew")
-    height, width = shapes[pictures[0]][:2] if pictures else (0, 0)
     return Data(low, pictures, (width, height), names)
 
 
