@@ -16,15 +16,20 @@ class NoHdf5(ScengenError):
     """h5py is missing on this machine."""
 
 
-def check_target(to: str) -> None:
+def check_target(path: str, setting: str = "to") -> None:
     """Check the name of an HDF5 file, and that h5py is installed.
+
+    Args:
+        setting: name of the setting that names the file.
 
     Raises:
         BadConfig: the name of the file has another ending.
         NoHdf5: h5py is missing.
     """
-    if Path(to).suffix not in SUFFIXES:
-        raise BadConfig(f"to = {to}; robomimic's format is one file: name one that ends in {' or '.join(SUFFIXES)}")
+    if Path(path).suffix not in SUFFIXES:
+        raise BadConfig(
+            f"{setting} = {path}; robomimic's format is one file: name one that ends in {' or '.join(SUFFIXES)}"
+        )
     if find_spec("h5py") is None:
         raise NoHdf5("no h5py for HDF5 files; run pip install 'scengen[record]'")
 

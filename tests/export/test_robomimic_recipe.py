@@ -126,7 +126,7 @@ def test_what_cannot_be_trained_is_refused_before_anything_is_written(tmp_path):
         file["data/demo_0/obs/agentview_image"] = np.zeros(5, np.uint8)
     for name, error, says in (
         ("flat.hdf5", PoolError, "is not a recording of scengen"),
-        ("folder", BadConfig, "robomimic's format is one file"),
+        ("folder", BadConfig, "data = .*; robomimic's format is one file"),
         ("none.hdf5", PoolError, "no recording at"),
         ("text.hdf5", PoolError, "is not a recording of scengen"),
         ("no_json.hdf5", PoolError, "is not a recording of scengen"),

@@ -86,7 +86,7 @@ def _read(path: str) -> Data:
         BadConfig: it has nothing that a policy could see.
         PoolError: it is no recording of scengen in robomimic's format.
     """
-    check_target(path)
+    check_target(path, "data")
     import h5py
 
     wrong = f"{path} is not a recording of scengen in robomimic's format; make one with scengen record format=robomimic"
