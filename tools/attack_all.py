@@ -49,8 +49,9 @@ witness, and the kind of answer that the family declares; it knows nothing else 
   after the other without looking at the scene: share of fresh draws that they solve, and its bound. "-" if the answer
   is not a number, or if a wrong answer ends the episode.
 * **retries**: one move is repeated while a height, a tilt, a place or a direction is swept, often from a state of the
-  scenario's own witness. **own**: that witness with a phase dropped, repeated, mirrored, slowed or accelerated, and a
-  search that continues from its states. Starting from the witness, partial success is expected: these two columns
+  scenario's own witness. **own**: that witness with a phase dropped, repeated, mirrored, slowed or accelerated, with a
+  detour (a move beside its place, a held body pressed on another one, a body pushed aside before it is taken, a slip),
+  and a search that continues from its states. Starting from the witness, partial success is expected: these two columns
   search for ways around the task, and their rates are no bounds.
 * **refuting**: hits without a contact that the oracle makes in its witness and in forty varied runs, which bypass the
   task. There should be none; if you find one, please report it.
@@ -158,7 +159,7 @@ def line(report: Mapping[str, Any]) -> str:
         *(_counted(report, tier) for tier in ("random", "foreign", "shortcut", "servo", "clock")),
         *(_counted(report, tier) for tier in ("memory_1", "memory_3")),
         *(fixed.get(count, "-") for count in (1, 2, 3)),
-        *(_counted(report, *tiers) for tiers in (("retry",), ("witness", "search"))),
+        *(_counted(report, *tiers) for tiers in (("retry",), ("detour", "witness", "search"))),
         str(report["rollouts"]),
         str(len(report["hits"])),
     ]

@@ -9,6 +9,7 @@ from itertools import islice
 from ..samplers.keyed import unit
 from . import draws
 from .clock import CLOCK, timed
+from .detours import DETOUR, detours
 from .evidence import CausalContacts, Hit, TierRate, hit, rates
 from .macros import Macro
 from .memories import MEMORY, remembered
@@ -34,6 +35,7 @@ TIER_SHARES = {
     CLOCK: 0.04,
     SERVO: 0.20,
     RETRY: 0.30,
+    DETOUR: 0.14,
     FOREIGN: 0.08,
     WITNESS: 0.14,
     RANDOM: 0.14,
@@ -222,7 +224,15 @@ class Attack:
         if tier == MEMORY:
             yield from remembered(player)
             return
-        lists = {SHORTCUT: shortcuts, CLOCK: timed, SERVO: servo, RETRY: retries, WITNESS: perturbed, FOREIGN: foreign}
+        lists = {
+            SHORTCUT: shortcuts,
+            CLOCK: timed,
+            SERVO: servo,
+            RETRY: retries,
+            DETOUR: detours,
+            FOREIGN: foreign,
+            WITNESS: perturbed,
+        }
         whole = list(lists[tier](player))
         for k in range(self.of):  # its own part first, then those of the others
             yield from islice(whole, (self.number + k) % self.of, None, self.of)

@@ -28,7 +28,7 @@ from .experience import Experience, experience, feasible
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
-GRAMMAR = 5
+GRAMMAR = 6
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""

@@ -21,6 +21,7 @@
 | touch   | body     | place of the body in the hand, from above [m]; none: straight from its place |
 | await   | body     | none: hold the open hand until the body changes its course                   |
 | meet    | body     | place of the hand [m], its orientation as a rotation vector, periods open    |
+| stop    | body     | place where it is stopped [m], where it is brought [m], rotation, pitch [rad] |
 | ease    |          | displacement [m]; the hand stops while the jaw opens by itself               |
 | roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
@@ -288,6 +289,11 @@ def _meet(field: MacroContext, macro: Macro) -> Plan:
     return plans.meet(field.arm, macro.target, [x, y, z], rotation(np.array([a, b, c])), round(periods))
 
 
+def _stop(field: MacroContext, macro: Macro) -> Plan:
+    at, to, turn, (pitch,) = macro.numbers[:3], macro.numbers[3:6], macro.numbers[6:9], macro.numbers[9:]
+    return plans.stop_and_bring(field.arm, macro.target, np.array(at), to, rotation(np.array(turn)), pitch)
+
+
 def _ease(field: MacroContext, macro: Macro) -> Plan:
     return plans.carry_steadily(field.arm, macro.numbers)
 
@@ -326,6 +332,7 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "touch": _touch,
     "await": _await,
     "meet": _meet,
+    "stop": _stop,
     "ease": _ease,
     "roll": _roll,
     "bring": _bring,

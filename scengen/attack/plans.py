@@ -57,6 +57,8 @@ STEP_BACK = Pace(0.15, 0.01, 2.0)
 """Pace away from a body."""
 WAY = Pace(0.30, 0.02, 1.5)
 """Pace through way points with a body in the hand."""
+HAUL = Pace(0.15, 0.02, 0.5)
+"""Pace of a hinged body that is pulled along in short steps."""
 LOWER = Pace(0.15, 0.006, 2.0)
 """Pace down to the place where a body is let go."""
 LEG = Pace(0.12, 0.003, 6.0)
@@ -226,6 +228,42 @@ def meet(arm: Arm, body: str, at: ArrayLike, rot: Mat3, periods: int = 2, second
     yield from until(hold(arm, seconds, grip), lambda: near() and speed() < TURNING_SPEED)
     yield from grasp(arm)
     yield from hold(arm, 1.0)
+
+
+def stop_and_bring(
+    arm: Arm, body: str, at: ArrayLike, to: ArrayLike, rot: Mat3, pitch: float = 0.0, seconds: float = 5.0
+) -> Plan:
+    """Stand in the way of a swinging body with an open hand until it has stopped, take it, and bring it to a place.
+
+    Args:
+        arm: the arm.
+        body: name of the body.
+        at: place where it is stopped [m].
+        to: position of the grip site to which it is brought [m].
+        rot: orientation of the hand at that position.
+        pitch: angle by which the hand looks higher where it stops the body [rad].
+        seconds: time limit of the wait [s].
+    """
+    world, goal = arm.world, np.asarray(to, float)
+    level = np.cross(rot[:, 2], UP)
+    before = rotation(pitch * level / max(float(np.linalg.norm(level)), 1e-9)) @ rot
+    with suppress(GaveUp):  # the body may be in the way
+        yield from go_to(arm, np.asarray(at, float) - 0.10 * before[:, 2], before, WAY, OPEN)
+        yield from go_to(arm, at, before, WAY, OPEN)
+
+    def stopped() -> bool:
+        return world.touching(arm.label, body) and float(np.linalg.norm(velocity_of(arm, body))) < SLOW
+
+    yield from until(hold(arm, seconds, OPEN), stopped)
+    with suppress(GaveUp):
+        yield from go_to(arm, world.com(body), before, STEP_BACK, OPEN)
+    yield from grasp(arm)
+    start, turn = arm.hand, between(arm.hand_rot, rot)
+    aim = arm.hand_rot
+    for share in np.linspace(0.1, 1.1, 11):  # a straight way, in short steps: what is hinged goes along its arc
+        with suppress(GaveUp):
+            yield from go_to(arm, start + share * (goal - start), rotation(share * turn) @ aim, HAUL, CLOSED)
+    yield from hold(arm, 1.0, CLOSED)
 
 
 def turn_about(arm: Arm, body: str, rot: Mat3, rate: float = 1.8) -> Plan:

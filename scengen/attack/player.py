@@ -1,6 +1,6 @@
 """Play an attempt of the adversary: from the start or from a saved state, through the teleoperation filter or raw."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from unittest import mock
@@ -134,6 +134,10 @@ class Player:
         match macro.kind:
             case "follow":
                 return follow(self.world, self.trace, macro)
+            case "resume":
+                first, last = macro.numbers
+                shift = self.world.com(macro.target) - self.trace.ways[macro.target][round(first)]
+                return follow(self.world, self.trace, Macro("follow", "", (first, last, 1.0, 0.0, *map(float, shift))))
             case "replay":
                 return repeat(self.foreign[macro.target], raw)
             case "memory":
@@ -199,13 +203,14 @@ class Player:
         self.rewind(len(self.trace.stages) - 1)
         return self.world.com(body)
 
-    def idle(self, seconds: float) -> None:
-        """Put the world where a time without action leaves it, from the start."""
+    def idle(self, seconds: float) -> Iterator[None]:
+        """Let the world go on without action, from the start: one control period after the other."""
         world = self.world
         world.restore(self.start.state)
         episode = Episode(self.scenario, world, self.horizon)
         for _ in range(round(seconds / Loop.PERIOD)):
             episode.step(world.filter(world.idle))
+            yield
 
     def signature(self) -> Signature:
         """The signature of the episode so far."""

@@ -33,6 +33,8 @@ ROLLS = (math.radians(135.0), math.radians(-135.0), math.radians(90.0), math.rad
 """Directions in which a hand on its side looks [rad]: 0 is away from the robot."""
 ELEVATIONS = (math.radians(30.0), math.radians(10.0))
 """Angles by which a hand on its side looks above the horizontal [rad]."""
+STOP_PITCHES = (math.radians(30.0), 0.0)
+"""Angles by which a hand that stops a swinging body looks higher than where the witness takes it [rad]."""
 QUARTER = math.pi / 2
 """Turn of the hand that puts its narrow side across the way [rad]."""
 HIGH = (0.2, 0.0, 0.0)
@@ -99,7 +101,14 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 
 def stopped(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Pursue, press down and block a hinged body that moves by itself, wherever it is."""
+    """Stop a hinged body that moves by itself where it is fastest, and bring it to where the witness takes it.
+
+    Or pursue, press down and block it wherever it is.
+    """
+    if place := player.trace.hand_at(arm.number, body):
+        lowest = tuple(map(float, fastest_place(player, body)))
+        for pitch in STOP_PITCHES:
+            yield Attempt(SERVO, (Macro("stop", body, (*lowest, *place, pitch), arm.number),))
     for chase in chases(arm, body):
         yield Attempt(SERVO, (chase,))
 
@@ -232,11 +241,19 @@ def asked_of(player: Player, body: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(other for pair in pairs for other in pair if other in asked and other in player.solids))
 
 
+def fastest_place(player: Player, body: str) -> Vec3:
+    """Where a body that nobody touches is fastest in the first seconds [m]: the lowest place of a pendulum."""
+    world = player.world
+    seen = [(float(np.linalg.norm(world.velocity(body)[3:])), *world.com(body)) for _ in player.idle(IDLE_TIME)]
+    return np.array(max(seen)[1:])
+
+
 def moving(player: Player) -> frozenset[str]:
     """Bodies that move by themselves at the beginning of an episode: free ones, and others that the witness touches."""
     world = player.world
     bodies = {*world.free_bodies, *player.trace.handled}
     player.rewind()
     before: dict[str, Vec3] = {body: world.com(body) for body in bodies}
-    player.idle(IDLE_TIME)
+    for _ in player.idle(IDLE_TIME):
+        pass
     return frozenset(body for body in bodies if np.linalg.norm(world.com(body) - before[body]) > MIN_MOTION)

@@ -66,4 +66,9 @@ def rest(player: Player, k: int) -> tuple[Macro, ...]:
     phases = player.trace.phases
     if k >= len(phases):
         return ()
-    return (Macro("follow", "", (float(phases[k][0]), float(phases[-1][1]), 1.0, 0.0, 0.0, 0.0, 0.0)),)
+    return (stretch(phases[k][0], phases[-1][1]),)
+
+
+def stretch(first: int, last: int) -> Macro:
+    """A macro that repeats the witness from one row to another."""
+    return Macro("follow", "", (float(first), float(last), 1.0, 0.0, *NO_SHIFT))

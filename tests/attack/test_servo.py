@@ -104,7 +104,7 @@ def test_a_suction_cup_carries_a_body_to_where_the_witness_leaves_it():
 def test_a_hinged_body_that_swings_is_met_and_stopped():
     player = player_of("pendulum_grasp")
     kinds = {macro.kind for attempt in servo(player) for macro in attempt.macros if macro.target == "pendulum/bob"}
-    assert kinds == {"meet", "pursue", "pin", "block"}
+    assert kinds == {"meet", "stop", "pursue", "pin", "block"}
 
 
 def test_a_body_is_put_down_on_a_face_from_each_of_its_ends():

@@ -1,0 +1,128 @@
+"""Tier of detours: on the way, something is done that the oracle does not do, and its solution goes on from there.
+
+A rule that nobody can break without losing is no rule. An attempt makes a move beside its place, presses what it holds
+on another body, pushes a body before it is taken, or opens the jaw a little. What has moved is taken where it is now.
+"""
+
+from collections.abc import Iterator
+from itertools import product, zip_longest
+
+import numpy as np
+
+from ..geometry import between
+from ..skills.motion import CLOSED, OPEN
+from .macros import Macro
+from .player import Attempt, Player
+from .solids import TABLE
+from .variations import phase, rest, stretch
+
+DETOUR = "detour"
+"""Tier of detours."""
+
+MISSES = (0.06, 0.03)
+"""Distances by which a move misses its place [m]: at 6 cm a body meets the outer side of a finger."""
+WAYS = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+"""Directions in which a move misses."""
+CLEAR_WAY = 0.10
+"""Length of the straight way on which a hand comes to a body that it pushes aside, and leaves it [m]."""
+BESIDE = 0.07
+"""Distance beside its grasp at which a hand comes down beside a body [m]."""
+INTO = 0.015
+"""Distance beside its grasp to which closed fingers then move [m]: they push a cube of 4 cm by some 2 cm."""
+PRESSED = 0.1
+"""Time for which a held body is pressed on another one [s]."""
+SLIPS = (0.04, 0.10)
+"""Times for which a jaw opens that holds a body [s]."""
+
+
+def detours(player: Player) -> Iterator[Attempt]:
+    """All kinds of detours in turn, the most promising ones of each kind first."""
+    for round_ in zip_longest(pressed(player), missed(player), moved(player), loosened(player)):
+        yield from (attempt for attempt in round_ if attempt)
+
+
+def missed(player: Player) -> Iterator[Attempt]:
+    """A phase of the witness is made beside its place, then from its beginning as it should be.
+
+    Phases that end in a grasp come first, then those before them.
+    """
+    taken = [k for k, _ in takings(player)]
+    order = sorted(range(player.phases), key=lambda k: min((h - 1 - k for h in taken if h > k), default=player.phases))
+    for miss, way in product(MISSES, WAYS):
+        shift = tuple(miss * share for share in way)
+        for k in order:
+            yield Attempt(DETOUR, (phase(player, k, shift=shift), *resumed(player, k)), k)
+
+
+def pressed(player: Player) -> Iterator[Attempt]:
+    """A body in the hand of the witness is pressed on every other body, the last ones of the witness first."""
+    bodies = [body for body in player.trace.concerned if body in player.solids and body != TABLE]
+    held = [(k, body) for k, body in takings(player) if k < player.phases]
+    for other, (k, body) in product(bodies, held):
+        if other != body:
+            press = Macro("press", other, (0.0, 0.0, PRESSED, 0.08), _arm(player, k))
+            yield Attempt(DETOUR, (press, *rest(player, k)), k)
+
+
+def moved(player: Player) -> Iterator[Attempt]:
+    """A body is pushed aside with closed fingers before it is taken: from one of four sides, along the hand's way."""
+    stages, hands = player.trace.stages, player.trace.hands
+    for turn in range(4):
+        for stage, body in takings(player):
+            number, taken = _arm(player, stage), stages[stage].row
+            away = np.linalg.norm(hands[:taken, number] - hands[taken, number], axis=1) > CLEAR_WAY
+            if stage <= player.phases and away.any():
+                row = int(np.flatnonzero(away)[-1])
+                begin = max(k for k in range(stage) if stages[k].row <= row)
+                there = (stretch(stages[begin].row, row),) if stages[begin].row < row else ()
+                again = Macro("resume", body, (float(row), float(taken)))
+                aside = _aside(player, number, taken, turn)
+                yield Attempt(DETOUR, (*there, *aside, again, *rest(player, stage)), begin)
+
+
+def _aside(player: Player, number: int, row: int, turn: int) -> Iterator[Macro]:
+    """Macros that push what an arm takes at a row of the witness aside.
+
+    Args:
+        number: number of the arm.
+        turn: number of quarter turns from the closing direction of the hand to the side from which it pushes.
+    """
+    hand, rot = player.trace.hands[row, number], player.trace.rots[row, number]
+    side, back = (1.0, 1.0, -1.0, -1.0)[turn] * rot[:, turn % 2], CLEAR_WAY * rot[:, 2]
+    numbers, grip = between(np.eye(3), rot), OPEN if player.world.arms[number].suction else CLOSED
+    for place in (hand - back + BESIDE * side, hand + BESIDE * side, hand + INTO * side, hand - back + INTO * side):
+        yield Macro("go", "", (*map(float, (*place, *numbers)), grip), number)
+
+
+def loosened(player: Player) -> Iterator[Attempt]:
+    """The jaw opens a little with a body in it, and closes again."""
+    for seconds, (k, _) in product(SLIPS, takings(player)):
+        if k < player.phases:
+            slip = Macro("release", "", (seconds, 0.0), _arm(player, k))
+            yield Attempt(DETOUR, (slip, Macro("wait", "", (0.3,)), *rest(player, k)), k)
+
+
+def takings(player: Player) -> list[tuple[int, str]]:
+    """Stages of the witness at which a hand has taken a body, and the bodies."""
+    holds = [stage.holds for stage in player.trace.stages]
+    return [
+        (k, body)
+        for k in range(1, len(holds))
+        for body, before in zip(holds[k], holds[k - 1], strict=True)
+        if body is not None and body != before
+    ]
+
+
+def resumed(player: Player, k: int) -> tuple[Macro, ...]:
+    """The witness from phase `k` on. Until the next body is taken, the hands follow it as far as it has moved."""
+    for stage, body in takings(player):
+        if stage > k:
+            first, last = (float(player.trace.stages[one].row) for one in (k, stage))
+            return Macro("resume", body, (first, last)), *rest(player, stage)
+    return rest(player, k)
+
+
+def _arm(player: Player, k: int) -> int:
+    """Number of the arm that has taken a body at a stage."""
+    before, now = player.trace.stages[k - 1].holds, player.trace.stages[k].holds
+    return next(i for i, body in enumerate(now) if body is not None and body != before[i])
