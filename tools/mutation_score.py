@@ -10,6 +10,7 @@ then the next ones, so that an interrupted call has measured all tasks alike.
 successes that the sound family refuses, of the adversary and of random macros with the same number of rollouts.
 """
 
+import inspect
 import json
 import sys
 import time
@@ -35,6 +36,7 @@ from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
 from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
+from scengen.pool.files import sha256
 from scengen.samplers.task import Task
 from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import Jitter, run
@@ -71,13 +73,19 @@ def main(budget: str = "500", *tasks: str) -> None:
 
 
 def stored() -> list[dict[str, Any]]:
-    """The records that count: the code of their family is the same, and so are the adversary's plans."""
-    return [record for record in lines(RESULTS) if identity(record["task"]).items() <= record.items()]
+    """The records that count: what they are about is the same today."""
+    return [record for record in lines(RESULTS) if identity(record).items() <= record.items()]
 
 
-def identity(task: str) -> dict[str, Any]:
-    """What a record is about, beside its mutant."""
-    return {"task": task, "grammar": GRAMMAR, "source_sha256": source_sha256(load_task(task).family)}
+def identity(record: dict[str, Any]) -> dict[str, Any]:
+    """What a record is about, beside its mutant: the code of its family, and what has judged or attacked it.
+
+    Varied runs are judged by their contacts. Where no written cheat succeeds, no plan of the adversary is played.
+    """
+    code = {"task": record["task"], "source_sha256": source_sha256(load_task(record["task"]).family)}
+    if not record["mutant"]:
+        return {**code, "contacts_sha256": sha256(inspect.getsource(CausalContacts))}
+    return {**code, "grammar": GRAMMAR} if record["cheats"] else code
 
 
 def compare(budget: str = "60", *tasks: str) -> None:
@@ -238,7 +246,7 @@ def _told(hit: Hit | None) -> str:
 
 def _keep(page: Any, found: dict[str, Any]) -> dict[str, Any]:
     """Store a record and return it."""
-    record = identity(found["task"]) | found
+    record = identity(found) | found
     page.write(json.dumps(record) + "\n")
     page.flush()
     print(json.dumps(record), flush=True)
