@@ -57,7 +57,8 @@ class Signals:
         self.status = INTERRUPTED
         self.working = False
         """Whether the command has begun. Before that, while modules are imported, nothing has to be cleaned up."""
-        self._received = False
+        self.received = False
+        """Whether the command has been interrupted."""
         self._finished = False
         """Whether the command has ended, and Python and Ray take themselves apart."""
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -67,9 +68,9 @@ class Signals:
         if self._finished:
             self.end()
         self.status = 128 + number
-        if self._received or not self.working:
+        if self.received or not self.working:
             self.end()
-        self._received = True
+        self.received = True
         timer = threading.Timer(GRACE, self.end)
         timer.daemon = True
         timer.start()
@@ -109,28 +110,36 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     """
     try:
         return _run(argv, signals)
-    except ScengenError as error:
-        return _failed(str(error), _write_traceback(error) if isinstance(error, ForeignCode) else "")
     except KeyboardInterrupt:
-        continues = RENAMED.get(argv[0], argv[0]) in CONTINUING
-        remedy = "finished work is kept; repeat the command to continue" if continues else "repeat it to start over"
-        _print_error(f"scengen: interrupted; {remedy}")
-        return INTERRUPTED
-    except BrokenPipeError:
+        return _interrupted(argv)
+    except Exception as error:
+        if signals and signals.received:  # OmegaConf for one raises an error of its own when it cleans up after Ctrl-C
+            return _interrupted(argv)
+        return _status_of(error)
+
+
+def _interrupted(argv: Sequence[str]) -> int:
+    continues = RENAMED.get(argv[0], argv[0]) in CONTINUING
+    remedy = "finished work is kept; repeat the command to continue" if continues else "repeat it to start over"
+    _print_error(f"scengen: interrupted; {remedy}")
+    return INTERRUPTED
+
+
+def _status_of(error: Exception) -> int:
+    """Tell an error in one line. Returns the exit status."""
+    if isinstance(error, ScengenError):
+        return _failed(str(error), _write_traceback(error) if isinstance(error, ForeignCode) else "")
+    if isinstance(error, BrokenPipeError):
         sys.stderr.close()
         return OK
-    except MemoryError as error:
+    if isinstance(error, MemoryError) or NO_MEMORY in str(error):
         return _failed(OUT_OF_MEMORY, _write_traceback(error))
-    except OSError as error:
+    if isinstance(error, OSError):
         from ..work.targets import remedy as disk_remedy
 
         if what := disk_remedy(error):
             return _failed(f"{cut(str(error.filename or 'a file'))}: {what}")
-        return _unforeseen(error)
-    except Exception as error:
-        if NO_MEMORY in str(error):
-            return _failed(OUT_OF_MEMORY, _write_traceback(error))
-        return _unforeseen(error)
+    return _unforeseen(error)
 
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:

@@ -14,11 +14,13 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from pools import QUICKLY, make
 
 from scengen import cli
+from scengen.cli import program
 from scengen.errors import ScengenError
 from scengen.pool import Pool
 from scengen.runs import attempts, generate
@@ -284,6 +286,16 @@ def test_an_interrupt_during_the_imports_is_no_traceback(tmp_path, after):
         time.sleep(0.5)
     _, err = process.communicate(timeout=30)
     assert process.returncode in (130, -signal.SIGINT) and err.count("Traceback") <= (process.returncode < 0)
+
+
+def test_an_error_in_the_cleaning_up_after_an_interrupt_is_told_as_the_interrupt(monkeypatch, capsys):
+    def broken(*_):
+        raise AttributeError("'NoneType' object has no attribute '_invalidate_flags_cache'")
+
+    monkeypatch.setattr(program, "_run", broken)
+    told = [cli.run(["generate"], SimpleNamespace(received=received)) for received in (True, False)]
+    lines = capsys.readouterr().err.splitlines()
+    assert told == [130, 2] and "interrupted; finished work is kept" in lines[0] and "unforeseen" in lines[1]
 
 
 @pytest.mark.slow
