@@ -1,8 +1,8 @@
 """Epochs of a training, each of which is kept on disk: a training that was interrupted continues after the last one.
 
-The networks are scikit-learn's `MLPRegressor`. Each epoch is one `fit` that continues from the weights of the one
-before, with fresh noise and a learning rate of its own. All random numbers depend on the seed and the epoch, and the
-arithmetic runs on one core: the same data give the same weights, with or without interruptions.
+The perceptrons are scikit-learn's `MLPRegressor`. An epoch is one `fit` of each that continues from the weights of the
+epoch before, with fresh noise and a learning rate of its own. All random numbers depend on the seed, the member and the
+epoch, and the arithmetic runs on one core: the same data give the same weights, with or without interruptions.
 """
 
 import math
@@ -39,6 +39,7 @@ class Training:
         path: Path,
         kind: str,
         hidden: tuple[int, ...],
+        members: int,
         learned: Samples,
         held_out: Samples,
         epochs: int,
@@ -51,6 +52,7 @@ class Training:
             path: file of the weights after the last epoch; its name tells trainings apart.
             kind: name of the policy.
             hidden: units of the hidden layers.
+            members: number of perceptrons.
             learned: what is learned.
             held_out: what the held-out losses are measured on.
             epochs: number of epochs.
@@ -61,6 +63,7 @@ class Training:
             Broken: the file is damaged.
         """
         self.path, self.kind, self.hidden, self.learned = path, kind, hidden, learned
+        self.members = members
         self._measured = learned.some(), held_out.some()
         self.epochs, self._limit, self._seed = epochs, limit, seed
         self.arrays: dict[str, NDArray[np.float32]] = {}
@@ -83,7 +86,8 @@ class Training:
         if self.kind == KNN:
             self.arrays = {"inputs": self.learned.inputs, "chunks": self.learned.chunks}
         else:
-            self.arrays = self._fitted()
+            found = [self._fitted(member) for member in range(self.members)]
+            self.arrays = {name: np.stack([one[name] for one in found]) for name in found[0]}
         learned, held_out = (samples.error(self.kind, self.arrays) for samples in self._measured)
         self.losses.append((learned, held_out))
         self.seconds += time.process_time() - started
@@ -98,20 +102,22 @@ class Training:
         return found
 
     def _continue(self) -> None:
-        shapes = network_shapes(self.kind, self.learned.inputs.shape[1], self.hidden, self.learned.chunks.shape[1])
+        shapes = network_shapes(
+            self.kind, self.learned.inputs.shape[1], self.hidden, self.learned.chunks.shape[1], self.members
+        )
         arrays = read_arrays(self.path, {**shapes, "losses": (self.epochs, 2), "seconds": (1,)})
         self.losses = [(float(a), float(b)) for a, b in arrays.pop("losses") if b >= 0.0]
         self.seconds = float(arrays.pop("seconds")[0])
         self.arrays = arrays
 
-    def _fitted(self) -> dict[str, NDArray[np.float32]]:
-        """Weights after one more epoch."""
+    def _fitted(self, member: int) -> dict[str, NDArray[np.float32]]:
+        """Weights of one perceptron after one more epoch."""
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
         from threadpoolctl import threadpool_limits
 
         number = len(self.losses)
-        random = np.random.default_rng(int(2**31 * unit("noise", self._seed, number)))
+        random = np.random.default_rng(int(2**31 * unit("noise", self._seed, member, number)))
         inputs, chunks = _augmented(self.kind, self.learned, random)
         options: dict[str, Any] = {
             "hidden_layer_sizes": self.hidden,
@@ -120,15 +126,15 @@ class Training:
             "learning_rate_init": FIRST_RATE * 0.5 * (1.0 + math.cos(math.pi * self.share)),
             "max_iter": 1,
             "warm_start": True,
-            "random_state": int(2**31 * unit("epoch", self._seed, number)),
+            "random_state": int(2**31 * unit("epoch", self._seed, member, number)),
         }
         network = MLPRegressor(**options)
         with threadpool_limits(1), warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was asked for
             if self.arrays:
                 network.partial_fit(inputs[:BATCH], chunks[:BATCH])  # makes the arrays that are replaced now
-                network.coefs_ = [self.arrays[f"weights{i}"].copy() for i in range(len(self.hidden) + 1)]
-                network.intercepts_ = [self.arrays[f"biases{i}"].copy() for i in range(len(self.hidden) + 1)]
+                network.coefs_ = [self.arrays[f"weights{i}"][member].copy() for i in range(len(self.hidden) + 1)]
+                network.intercepts_ = [self.arrays[f"biases{i}"][member].copy() for i in range(len(self.hidden) + 1)]
             network.fit(inputs, chunks)
         weights = {f"weights{i}": values for i, values in enumerate(network.coefs_)}
         return weights | {f"biases{i}": values for i, values in enumerate(network.intercepts_)}

@@ -6,6 +6,9 @@
            Trained on |p(o, 0, 0) - a|^2 + |p(o, t* a + (1 - t*) z, t*) - a|^2 with z ~ N(0, 1) and t* = 0.9;
            played as p(o, t* p(o, 0, 0), t*).
 
+Both are ensembles: several perceptrons of different initial weights, whose outputs are averaged. A single one is seldom
+worse on held-out rows, but what it does in a few rare states decides episodes, and differs from training to training.
+
 Chunks are standardised: each number of an action is shifted by its mean and divided by its spread.
 """
 
@@ -37,7 +40,7 @@ def predict(kind: str, arrays: Arrays, inputs: NDArray[np.float32]) -> NDArray[n
         return np.stack([_neighbours(arrays["inputs"], arrays["chunks"], one) for one in inputs])
     if kind == BC:
         return perceptron(arrays, inputs)
-    outputs = len(arrays[f"biases{layers(arrays) - 1}"])
+    outputs = arrays[f"biases{layers(arrays) - 1}"].shape[-1]
     first = perceptron(arrays, first_pass(inputs, outputs))
     return perceptron(arrays, second_pass(inputs, REFINED_AT * first))
 
@@ -53,13 +56,18 @@ def second_pass(inputs: NDArray[np.float32], blurred: NDArray[np.float32]) -> ND
 
 
 def perceptron(arrays: Arrays, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Outputs of a perceptron with rectified hidden layers: `weights0`, `biases0`, `weights1` and so on."""
+    """Mean output of perceptrons with rectified hidden layers, shape (n, outputs).
+
+    Args:
+        arrays: `weights0`, shape (members, size, units), `biases0`, shape (members, units), `weights1` and so on.
+        inputs: shape (n, size).
+    """
     found, last = inputs, layers(arrays) - 1
     for i in range(last + 1):
-        found = found @ arrays[f"weights{i}"] + arrays[f"biases{i}"]
+        found = found @ arrays[f"weights{i}"] + arrays[f"biases{i}"][:, None]
         if i < last:
             np.maximum(found, 0.0, out=found)
-    return found
+    return found.mean(axis=0)
 
 
 def layers(arrays: Mapping[str, Any]) -> int:

@@ -34,7 +34,7 @@ WEIGHTS = "weights.npz"
 """File with the arrays of a policy."""
 LOSS = "loss.svg"
 """File with a plot of the losses."""
-FORMAT = 1
+FORMAT = 2
 """Version of the format."""
 MAX_ENTRIES = 100_000
 """Largest number of entries of an observation."""
@@ -44,6 +44,8 @@ MAX_STEPS = 100
 """Largest number of observations that a policy sees at once."""
 MAX_LAYERS = 100
 """Largest number of hidden layers."""
+MAX_MEMBERS = 1000
+"""Largest number of perceptrons."""
 MAX_WIDTH = 100_000
 """Largest number of units of a hidden layer."""
 MAX_WEIGHTS = 2_000_000_000
@@ -78,6 +80,8 @@ class PolicySettings:
     """Number of actions that are played before the next prediction."""
     hidden: tuple[int, ...]
     """Units of each hidden layer; empty for `knn`."""
+    members: int
+    """Number of perceptrons whose outputs are averaged; 1 for `knn`."""
     inputs: int
     """Number of inputs."""
     epochs: int
@@ -109,7 +113,7 @@ class PolicySettings:
         found |= dict.fromkeys(("output_mean", "output_scale"), (outputs,))
         if self.kind == KNN:
             return {**found, "inputs": (self.rows, self.inputs), "chunks": (self.rows, outputs)}
-        return found | network_shapes(self.kind, self.inputs, self.hidden, outputs)
+        return found | network_shapes(self.kind, self.inputs, self.hidden, outputs, self.members)
 
     def check(self) -> None:
         """Raise an error unless every value is possible."""
@@ -124,7 +128,7 @@ class PolicySettings:
         demand(0 < len(self.streams) <= len(self.entries), f"{len(self.streams)} streams")
         for name in (*self.streams, *self.entries):
             check_text("a name of an observation", name, 200)
-        for name, most in (("steps", MAX_STEPS), ("chunk", MAX_CHUNK), ("rows", MAX_ROWS)):
+        for name, most in (("steps", MAX_STEPS), ("chunk", MAX_CHUNK), ("rows", MAX_ROWS), ("members", MAX_MEMBERS)):
             check_whole(name, getattr(self, name), most)
             demand(getattr(self, name) > 0, f"{name} is 0")
         demand(self.played in range(1, self.chunk + 1), f"played = {self.played}; it must lie in [1, chunk]")
@@ -216,14 +220,16 @@ def arrays_as_bytes(arrays: Mapping[str, NDArray[np.float32]]) -> bytes:
     return file.getvalue()
 
 
-def network_shapes(kind: str, inputs: int, hidden: Sequence[int], outputs: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of the weights of a perceptron, by name; none for `knn`."""
+def network_shapes(
+    kind: str, inputs: int, hidden: Sequence[int], outputs: int, members: int
+) -> dict[str, tuple[int, ...]]:
+    """Shapes of the weights of some perceptrons, by name; none for `knn`."""
     if kind == KNN:
         return {}
     found: dict[str, tuple[int, ...]] = {}
     sizes = (inputs + (outputs + 1 if kind == MIP else 0), *hidden, outputs)
     for i, (before, after) in enumerate(pairwise(sizes)):
-        found |= {f"weights{i}": (before, after), f"biases{i}": (after,)}
+        found |= {f"weights{i}": (members, before, after), f"biases{i}": (members, after)}
     return found
 
 

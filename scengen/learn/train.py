@@ -21,7 +21,7 @@ from .epochs import Training
 from .features import Features
 from .models import BC, KINDS, KNN
 from .samples import parted, samples_of, scaling_of
-from .store import LOSS, Broken, PolicySettings, StoredPolicy, is_policy
+from .store import LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPolicy, is_policy
 
 GIVEN_BY_DATA = ("data", "to", "demonstrations")
 """Settings that change no weights, or only by the data, which have a hash of their own."""
@@ -42,6 +42,7 @@ class TrainSettings:
     chunk: int = 8
     played: int = 4
     hidden: list[int] = field(default_factory=lambda: [256, 256])
+    members: int = 5
     epochs: int = 20
     minutes: float | None = None
     seed: int = 0
@@ -55,6 +56,8 @@ class TrainSettings:
         at_least(self, steps=1, chunk=1, played=1, epochs=1, minutes=0.01, seed=0)
         if self.played > self.chunk:
             raise BadConfig(f"played = {self.played}; it must be at most chunk = {self.chunk}")
+        if not 1 <= self.members <= MAX_MEMBERS:
+            raise BadConfig(f"members = {self.members}; it must lie in [1, {MAX_MEMBERS}]")
         if not 1 <= len(self.hidden) <= 20 or any(not 0 < size <= 10_000 for size in self.hidden):
             raise BadConfig(f"hidden = {cut(str(self.hidden))}; give the units of 1 to 20 layers, each 1 to 10000")
         if self.policy != KNN and find_spec("sklearn") is None:
@@ -101,11 +104,11 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         features = Features(data.entries, settings.steps, scaling["input_mean"], scaling["input_scale"])
         samples = samples_of(features, settings.chunk, scaling, learned)
         validation = samples_of(features, settings.chunk, scaling, held_out)
-        hidden = () if settings.policy == KNN else tuple(settings.hidden)
+        hidden, members = ((), 1) if settings.policy == KNN else (tuple(settings.hidden), settings.members)
         limit = None if settings.minutes is None else 60.0 * settings.minutes
         epochs = 1 if settings.policy == KNN else settings.epochs
         try:
-            run = Training(path, settings.policy, hidden, samples, validation, epochs, limit, settings.seed)
+            run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
         except (Broken, ValueError, OSError) as error:
             raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to begin anew") from None
         earlier = len(run.losses)
@@ -123,6 +126,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
             chunk=settings.chunk,
             played=settings.played,
             hidden=hidden,
+            members=members,
             inputs=samples.inputs.shape[1],
             epochs=len(run.losses),
             seed=settings.seed,

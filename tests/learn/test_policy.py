@@ -78,11 +78,12 @@ def change(folder, **values):
         ({"chunk": 0}, "chunk is 0"),
         ({"rate": 30}, "rate = 30 does not divide 100"),
         ({"hidden": [10**9]}, "hidden layers too large"),
+        ({"members": 0}, "members is 0"),
         ({"rows": 10**7}, "bytes of weights"),
         ({"inputs": 10**6}, "inputs = 1000000"),
         ({"surprise": 1}, "no key named 'surprise'"),
         ({"weights_sha256": "0" * 64}, "its sha256 is not that in policy.json"),
-        ({"format": 99}, "has format 99, this scengen reads 1"),
+        ({"format": 99}, "has format 99, this scengen reads 2"),
     ],
 )
 def test_settings_of_a_stranger_are_refused(mine, values, said):

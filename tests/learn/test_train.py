@@ -117,6 +117,17 @@ def test_mip_refines_its_own_first_prediction(tmp_path):
     assert np.array_equal(predict(MIP, arrays, here), second) and not np.allclose(first, second)
 
 
+def test_an_ensemble_is_the_mean_of_its_members(tmp_path):
+    assert trained(tmp_path, members=3, hidden=[16, 8]).settings.members == 3
+    arrays = {
+        name: one for name, one in StoredPolicy.open(tmp_path).arrays.items() if name[:-1] in ("weights", "biases")
+    }
+    here = np.array([[0.5, -1.0, 0.25], [0.0, 0.1, 0.2]], np.float32)
+    each = [perceptron({name: one[k : k + 1] for name, one in arrays.items()}, here) for k in range(3)]
+    assert perceptron(arrays, here) == pytest.approx(np.mean(each, axis=0), abs=1e-6)
+    assert not np.allclose(each[0], each[1]), "members begin with weights of their own"
+
+
 def test_a_limit_of_time_ends_the_training(tmp_path):
     assert trained(tmp_path, epochs=100_000, minutes=0.01).settings.epochs < 100_000
 
@@ -128,6 +139,7 @@ def test_a_limit_of_time_ends_the_training(tmp_path):
         ({"played": 9}, "played = 9; it must be at most chunk = 1"),
         ({"epochs": 0}, "epochs = 0; it must be at least 1"),
         ({"demonstrations": 1}, "demonstrations = 1; it must be at least 2"),
+        ({"members": 0}, "members = 0; it must lie in [1, 1000]"),
         ({"hidden": []}, "hidden = []; give the units"),
     ],
 )
