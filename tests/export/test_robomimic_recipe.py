@@ -135,6 +135,9 @@ def test_what_cannot_be_trained_is_refused_before_anything_is_written(tmp_path):
     ):
         with pytest.raises(error, match=says):
             write_recipe(RecipeSettings(NAME, str(tmp_path / name), str(tmp_path / "to")))
+    data = recorded(tmp_path / "data.hdf5")
+    with pytest.raises(BadConfig, match="'mps'; robomimic trains on cuda or cpu"):
+        write_recipe(RecipeSettings(NAME, str(data), str(tmp_path / "to"), device="mps"))
     assert not (tmp_path / "to").exists()
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...compose import load_task
 from ...envs import robomimic as keys
-from ...errors import BadConfig, PoolError, ScengenError
+from ...errors import BadConfig, PoolError, ScengenError, cut
 from ..hdf5 import check_target
 from .settings import EPISODES, SMOKE_BATCHES, RecipeSettings, Scripts, script
 
@@ -27,6 +27,8 @@ ORIGIN = (
 )
 HORIZON = 10
 """Number of rows of a training sequence, after which the network's state is also reset when it plays."""
+DEVICES = ("cuda", "cpu")
+"""Devices that robomimic's settings can name."""
 CROP = 76 / 84
 """Share of the height and of the width of a picture that a random crop keeps."""
 POLICY = "robomimic_scengen.checkpoint:policy"
@@ -56,8 +58,11 @@ def scripts(settings: RecipeSettings) -> Scripts:
     """The scripts of the recipe for a recording.
 
     Raises:
-        ScengenError: there is no such recording, or it has nothing that a policy could see.
+        ScengenError: there is no such device or recording, or it has nothing that a policy could see.
     """
+    if settings.device not in DEVICES:
+        told = f"robomimic trains on {' or '.join(DEVICES)}; CUDA_VISIBLE_DEVICES chooses a card"
+        raise BadConfig(f"device = {cut(repr(settings.device))}; {told}")
     data = _read(settings.data)
     requirements = Path(settings.to, "requirements.txt")
     install = f"in an environment of its own: pip install -r {requirements} (robomimic {ROBOMIMIC})"
@@ -136,7 +141,7 @@ def _config(settings: RecipeSettings, data: Data, name: str) -> dict[str, Any]:
             "seq_length": HORIZON,
             "pad_seq_length": True,
             "frame_stack": 1,
-            "cuda": settings.device.startswith("cuda"),
+            "cuda": settings.device == "cuda",
             "batch_size": 16 if seen else 100,
             "num_epochs": 600 if seen else 2000,
             "seed": settings.seed,
