@@ -55,13 +55,14 @@ def missed(player: Player) -> Iterator[Attempt]:
 
 
 def pressed(player: Player) -> Iterator[Attempt]:
-    """A body in the hand of the witness is pressed on every other body, the last ones of the witness first."""
+    """A body in the hand of the witness is pressed on all other bodies in turn, or on one; the last ones first."""
     bodies = [body for body in player.trace.concerned if body in player.solids and body != TABLE]
     held = [(k, body) for k, body in takings(player) if k < player.phases]
-    for other, (k, body) in product(bodies, held):
-        if other != body:
-            press = Macro("press", other, (0.0, 0.0, PRESSED, 0.08), _arm(player, k))
-            yield Attempt(DETOUR, (press, *rest(player, k)), k)
+    for some, (k, body) in product((bodies, *([body] for body in bodies)), held):
+        if others := [other for other in some if other != body]:
+            arm = _arm(player, k)
+            presses = [Macro("press", other, (0.0, 0.0, PRESSED, 0.08), arm) for other in others]
+            yield Attempt(DETOUR, (*presses, *rest(player, k)), k)
 
 
 def moved(player: Player) -> Iterator[Attempt]:
