@@ -300,6 +300,13 @@ def test_it_runs_from_any_folder_as_a_module(tmp_path):
     assert done.returncode == 0 and f"mujoco {mujoco.__version__}" in done.stdout
 
 
+def test_a_back_end_that_mujoco_does_not_have_is_told_by_name():
+    env = {**os.environ, "MUJOCO_GL": "vulkan"}
+    done = subprocess.run([sys.executable, "-m", "scengen", "tasks"], capture_output=True, text=True, env=env)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2 and "MUJOCO_GL=vulkan" in line and "unset MUJOCO_GL" in line
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
