@@ -6,6 +6,7 @@ on another body, pushes a body before it is taken, or opens the jaw a little. Wh
 
 from collections.abc import Iterator
 from itertools import product, zip_longest
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def missed(player: Player) -> Iterator[Attempt]:
 
     Phases that end in a grasp come first, then those before them.
     """
-    taken = [k for k, _ in takings(player)]
+    taken = [one.stage for one in takings(player)]
     order = sorted(range(player.phases), key=lambda k: min((h - 1 - k for h in taken if h > k), default=player.phases))
     for miss, way in product(MISSES, WAYS):
         shift = tuple(miss * share for share in way)
@@ -57,28 +58,27 @@ def missed(player: Player) -> Iterator[Attempt]:
 def pressed(player: Player) -> Iterator[Attempt]:
     """A body in the hand of the witness is pressed on all other bodies in turn, or on one; the last ones first."""
     bodies = [body for body in player.trace.concerned if body in player.solids and body != TABLE]
-    held = [(k, body) for k, body in takings(player) if k < player.phases]
-    for some, (k, body) in product((bodies, *([body] for body in bodies)), held):
-        if others := [other for other in some if other != body]:
-            arm = _arm(player, k)
-            presses = [Macro("press", other, (0.0, 0.0, PRESSED, 0.08), arm) for other in others]
-            yield Attempt(DETOUR, (*presses, *rest(player, k)), k)
+    held = [one for one in takings(player) if one.stage < player.phases]
+    for some, one in product((bodies, *([body] for body in bodies)), held):
+        if others := [other for other in some if other != one.body]:
+            presses = [Macro("press", other, (0.0, 0.0, PRESSED, 0.08), one.arm) for other in others]
+            yield Attempt(DETOUR, (*presses, *rest(player, one.stage)), one.stage)
 
 
 def moved(player: Player) -> Iterator[Attempt]:
     """A body is pushed aside with closed fingers before it is taken: from one of four sides, along the hand's way."""
     stages, hands = player.trace.stages, player.trace.hands
     for turn in range(4):
-        for stage, body in takings(player):
-            number, taken = _arm(player, stage), stages[stage].row
-            away = np.linalg.norm(hands[:taken, number] - hands[taken, number], axis=1) > CLEAR_WAY
-            if stage <= player.phases and away.any():
+        for one in takings(player):
+            taken = stages[one.stage].row
+            away = np.linalg.norm(hands[:taken, one.arm] - hands[taken, one.arm], axis=1) > CLEAR_WAY
+            if one.stage <= player.phases and away.any():
                 row = int(np.flatnonzero(away)[-1])
-                begin = max(k for k in range(stage) if stages[k].row <= row)
+                begin = max(k for k in range(one.stage) if stages[k].row <= row)
                 there = (stretch(stages[begin].row, row),) if stages[begin].row < row else ()
-                again = Macro("resume", body, (float(row), float(taken)))
-                aside = _aside(player, number, taken, turn)
-                yield Attempt(DETOUR, (*there, *aside, again, *rest(player, stage)), begin)
+                again = Macro("resume", one.body, (float(row), float(taken)))
+                aside = _aside(player, one.arm, taken, turn)
+                yield Attempt(DETOUR, (*there, *aside, again, *rest(player, one.stage)), begin)
 
 
 def _aside(player: Player, number: int, row: int, turn: int) -> Iterator[Macro]:
@@ -97,33 +97,37 @@ def _aside(player: Player, number: int, row: int, turn: int) -> Iterator[Macro]:
 
 def loosened(player: Player) -> Iterator[Attempt]:
     """The jaw opens a little with a body in it, and closes again."""
-    for seconds, (k, _) in product(SLIPS, takings(player)):
-        if k < player.phases:
-            slip = Macro("release", "", (seconds, 0.0), _arm(player, k))
-            yield Attempt(DETOUR, (slip, Macro("wait", "", (0.3,)), *rest(player, k)), k)
+    for seconds, one in product(SLIPS, takings(player)):
+        if one.stage < player.phases:
+            slip = Macro("release", "", (seconds, 0.0), one.arm)
+            yield Attempt(DETOUR, (slip, Macro("wait", "", (0.3,)), *rest(player, one.stage)), one.stage)
 
 
-def takings(player: Player) -> list[tuple[int, str]]:
-    """Stages of the witness at which a hand has taken a body, and the bodies."""
+class Taking(NamedTuple):
+    """A hand has taken a body."""
+
+    stage: int
+    """Stage of the witness."""
+    arm: int
+    """Number of the arm."""
+    body: str
+
+
+def takings(player: Player) -> list[Taking]:
+    """All bodies that hands take in the witness, in order."""
     holds = [stage.holds for stage in player.trace.stages]
     return [
-        (k, body)
+        Taking(k, arm, body)
         for k in range(1, len(holds))
-        for body, before in zip(holds[k], holds[k - 1], strict=True)
+        for arm, (body, before) in enumerate(zip(holds[k], holds[k - 1], strict=True))
         if body is not None and body != before
     ]
 
 
 def resumed(player: Player, k: int) -> tuple[Macro, ...]:
     """The witness from phase `k` on. Until the next body is taken, the hands follow it as far as it has moved."""
-    for stage, body in takings(player):
-        if stage > k:
-            first, last = (float(player.trace.stages[one].row) for one in (k, stage))
-            return Macro("resume", body, (first, last)), *rest(player, stage)
+    for one in takings(player):
+        if one.stage > k:
+            first, last = (float(player.trace.stages[stage].row) for stage in (k, one.stage))
+            return Macro("resume", one.body, (first, last)), *rest(player, one.stage)
     return rest(player, k)
-
-
-def _arm(player: Player, k: int) -> int:
-    """Number of the arm that has taken a body at a stage."""
-    before, now = player.trace.stages[k - 1].holds, player.trace.stages[k].holds
-    return next(i for i, body in enumerate(now) if body is not None and body != before[i])

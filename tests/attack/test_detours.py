@@ -43,7 +43,7 @@ def felt():
 
 
 def test_a_body_that_was_pushed_aside_is_taken_where_it_is_then(felt):
-    (stage, body), *_ = takings(felt)
+    (stage, _, body), *_ = takings(felt)
     attempt, played = next(solving(felt, "go"))
     again = next(macro for macro in attempt.macros if macro.kind == "resume")
     before = felt.trace.ways[body][felt.trace.stages[stage].row]
@@ -52,7 +52,7 @@ def test_a_body_that_was_pushed_aside_is_taken_where_it_is_then(felt):
 
 
 def test_where_nothing_has_moved_a_resumed_witness_is_the_witness(felt):
-    (stage, body), *_ = takings(felt)
+    (stage, _, body), *_ = takings(felt)
     row, left = felt.trace.stages[stage].row, rest(felt, stage)
     resumed, plain = (felt.play((one, *left), False) for one in (Macro("resume", body, (0.0, row)), stretch(0, row)))
     assert resumed.solved and resumed.digest == plain.digest
