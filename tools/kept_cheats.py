@@ -52,8 +52,9 @@ CLAUSES = """
 Made by `python tools/mutation_score.py`. Clauses of rules and of goals are left out, and some values leave their
 constraints. Then every cheat that somebody wrote for the task is played, declared shortcuts included. If one succeeds
 because of it, the adversary attacks without shortcuts on ten scenarios until it finds such a way as well, with at most
-500 rollouts, the default of `scengen attack`. "Random" is what random macros find with as many. The last column counts
-runs of the oracle with 1.5 times a certificate's jitter, in the whole task, that would be taken for a way around it.
+500 rollouts, as in [every task, attacked](attacks.md). "Random" is what random macros find with as many. The last
+column counts runs of the oracle with 1.5 times a certificate's jitter, in the whole task, that would be taken for a way
+around it.
 
 | task | left out | exploited by a written cheat | found by the adversary | random | varied runs flagged |
 |---|---|---|---|---|---|

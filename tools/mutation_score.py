@@ -45,7 +45,7 @@ from scengen.validate.settings import Robust
 RESULTS = Path("records/mutation_score.jsonl")
 """File of the results."""
 SCENARIOS = 10
-"""Number of scenarios for each mutant, as for a task in `scengen attack`."""
+"""Number of scenarios for each mutant, as for a task in tools/attack_all.py."""
 CHEATED = 2
 """Number of these scenarios in which written cheats are played."""
 PLAYED = tuple(tier for tier in TIERS if tier != "shortcut")
