@@ -6,8 +6,9 @@
            Trained on |p(o, 0, 0) - a|^2 + |p(o, t* a + (1 - t*) z, t*) - a|^2 with z ~ N(0, 1) and t* = 0.9;
            played as p(o, t* p(o, 0, 0), t*).
 
-Both are ensembles: several perceptrons of different initial weights, whose outputs are averaged. A single one is seldom
-worse on held-out rows, but what it does in a few rare states decides episodes, and differs from training to training.
+Both are ensembles: several perceptrons of different initial weights, whose outputs are averaged. What a single one does
+in a few rare states decides episodes, and differs from training to training: three trainings on 200 demonstrations of
+`edge_slide` solved 9, 14 and 16 of 20 scenarios, the mean of five 17.
 
 Chunks are standardised: each number of an action is shifted by its mean and divided by its spread.
 """
