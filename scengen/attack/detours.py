@@ -5,7 +5,7 @@ on another body, pushes a body before it is taken, or opens the jaw a little. Wh
 """
 
 from collections.abc import Iterator
-from itertools import product, zip_longest
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from ..geometry import between
 from ..skills.motion import CLOSED, OPEN
 from .macros import Macro
-from .player import Attempt, Player
+from .player import Attempt, Player, in_turn
 from .solids import TABLE
 from .variations import phase, rest, stretch
 
@@ -38,8 +38,7 @@ SLIPS = (0.04, 0.10)
 
 def detours(player: Player) -> Iterator[Attempt]:
     """All kinds of detours in turn, the most promising ones of each kind first."""
-    for round_ in zip_longest(pressed(player), missed(player), moved(player), loosened(player)):
-        yield from (attempt for attempt in round_ if attempt)
+    return in_turn([pressed(player), missed(player), moved(player), loosened(player)])
 
 
 def missed(player: Player) -> Iterator[Attempt]:

@@ -21,7 +21,7 @@
 | touch   | body     | place of the body in the hand, from above [m]; none: straight from its place |
 | await   | body     | none: hold the open hand until the body changes its course                   |
 | meet    | body     | place of the hand [m], its orientation as a rotation vector, periods open    |
-| stop    | body     | place where it is stopped [m], where it is brought [m], rotation, pitch [rad] |
+| stop    | body     | place where it is stopped [m], goal of the hand [m], its rotation, pitch     |
 | ease    |          | displacement [m]; the hand stops while the jaw opens by itself               |
 | roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |

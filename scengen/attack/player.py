@@ -1,8 +1,9 @@
 """Play an attempt of the adversary: from the start or from a saved state, through the teleoperation filter or raw."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import zip_longest
 from unittest import mock
 
 import numpy as np
@@ -39,6 +40,12 @@ class Attempt:
 
     def __str__(self) -> str:
         return "; ".join(map(str, self.macros)) or "nothing more"
+
+
+def in_turn(families: Iterable[Iterator[Attempt]]) -> Iterator[Attempt]:
+    """The first attempt of each family, then the second ones, and so on."""
+    for round_ in zip_longest(*families):
+        yield from (attempt for attempt in round_ if attempt)
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ A task in which a failed attempt costs nothing requires patience instead of insi
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import zip_longest
 
 import numpy as np
 
 from ..geometry import UP, Vec3
 from ..sim.world import Arm
 from .macros import Macro
-from .player import Attempt, Player
+from .player import Attempt, Player, in_turn
 from .solids import TABLE, Solid, handles, sides
 from .variations import phase
 
@@ -39,8 +38,7 @@ def retries(player: Player) -> Iterator[Attempt]:
     """All families of attempts in turn, for every arm, each with the most promising attempts first."""
     makers = (carried, tipped, dropped_again, shaken, placed, bare)
     families = [_by(arm, make(player, arm)) for make in makers for arm in player.world.arms]
-    for round_ in zip_longest(*families, shifted(player)):
-        yield from (attempt for attempt in round_ if attempt)
+    return in_turn([*families, shifted(player)])
 
 
 def _by(arm: Arm, attempts: Iterator[Attempt]) -> Iterator[Attempt]:

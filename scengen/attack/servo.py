@@ -14,7 +14,7 @@ import numpy as np
 from ..geometry import Vec3
 from ..sim.world import Arm
 from .macros import Macro
-from .player import Attempt, Player
+from .player import Attempt, Player, in_turn
 from .retries import picks
 from .solids import handles
 
@@ -68,7 +68,7 @@ def servo(player: Player) -> Iterator[Attempt]:
     jaws, cups = ([arm for arm in arms if arm.suction is sucks] for sucks in (False, True))
     bodies = [body for body in player.trace.handled if body in player.solids and player.solids[body].free]
     restless = moving(player)
-    of_one = _in_turn(
+    of_one = in_turn(
         [
             made(player, arm, body)
             for arm, body in product(jaws, bodies)
@@ -78,14 +78,8 @@ def servo(player: Player) -> Iterator[Attempt]:
     )
     swinging = [body for body in player.trace.handled if body not in bodies and body in restless]
     of_hinged = [made(player, arm, body) for arm, body in product(jaws, swinging) for made in (met, stopped)]
-    of_all = _in_turn([all_carried(player, arm, bodies) for arm in arms]) if len(bodies) > 1 else iter(())
-    yield from _in_turn([of_all, of_one, *of_hinged])
-
-
-def _in_turn(families: Sequence[Iterator[Attempt]]) -> Iterator[Attempt]:
-    """The first attempt of each family, then the second ones."""
-    for round_ in zip_longest(*families):
-        yield from (attempt for attempt in round_ if attempt)
+    of_all = in_turn([all_carried(player, arm, bodies) for arm in arms]) if len(bodies) > 1 else iter(())
+    yield from in_turn([of_all, of_one, *of_hinged])
 
 
 def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
