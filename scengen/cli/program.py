@@ -139,7 +139,8 @@ def _status_of(error: Exception) -> int:
 
         if what := disk_remedy(error):
             return _failed(f"{cut(str(error.filename or 'a file'))}: {what}")
-    if "mujoco" not in sys.modules and (chosen := os.environ.get("MUJOCO_GL")):  # its import has failed
+    failed = (frame.f_globals.get("__name__") for frame, _ in traceback.walk_tb(error.__traceback__))
+    if "mujoco" not in sys.modules and "mujoco" in failed and (chosen := os.environ.get("MUJOCO_GL")):
         remedy = "install what it needs (on Debian libegl1 libgl1 libosmesa6), or unset MUJOCO_GL"
         return _failed(f"MuJoCo cannot draw with MUJOCO_GL={cut(chosen)} ({cut(str(error), 80)}); {remedy}")
     return _unforeseen(error)

@@ -17,6 +17,7 @@ from helpers import REFERENCE
 from pools import QUICKLY, make
 
 from scengen import cli, list_tasks, load_task, task_files
+from scengen.cli import program
 from scengen.cli.completion import completions
 from scengen.cli.verbs import RENAMED
 from scengen.commands.settings import read
@@ -305,6 +306,18 @@ def test_a_back_end_that_mujoco_does_not_have_is_told_by_name():
     done = subprocess.run([sys.executable, "-m", "scengen", "tasks"], capture_output=True, text=True, env=env)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2 and "MUJOCO_GL=vulkan" in line and "unset MUJOCO_GL" in line
+
+
+def test_another_error_before_mujoco_is_imported_is_not_its_back_ends(monkeypatch, capsys):
+    def broken(*_):
+        raise AttributeError("of our own")
+
+    monkeypatch.setattr(program, "_run", broken)
+    monkeypatch.setenv("MUJOCO_GL", "egl")  # which scengen itself sets without a display
+    monkeypatch.delitem(sys.modules, "mujoco")
+    assert cli.run(["tasks"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "unforeseen AttributeError: of our own" in line and "MUJOCO_GL" not in line
 
 
 @pytest.mark.parametrize(
