@@ -79,14 +79,24 @@ def test_a_ball_rolls_where_friction_exceeds_two_sevenths_of_the_slope(angle, fa
     assert (abs(run.slip) < 0.1) == rolls == ramp.rolls
 
 
-@given(angle=angles, radius=radii, share=shares, friction=st.sampled_from([SLIPPERY, ROUGH]))
+@given(angle=angles, radius=radii, share=shares)
+@pytest.mark.parametrize(
+    ("friction", "timestep", "loss"), [(SLIPPERY, 0.002, 0.024), (ROUGH, 0.002, 0.065), (ROUGH, 0.001, 0.04)]
+)
 @settings(max_examples=25, deadline=None)
-def test_a_ball_that_only_slides_or_only_rolls_climbs_as_high_as_it_came_from(angle, radius, share, friction):
-    """Galileo's law, less the 2 % (sliding) and 5 % (rolling) that the facets may take; at worst 5.2 % were seen, of a
-    ball of 14 mm radius at 39 deg."""
-    run = Run(Ramp(angle=angle, friction=friction), share, Ball(radius=radius))
+def test_a_ball_that_only_slides_or_only_rolls_climbs_as_high_as_it_came_from(
+    friction, timestep, loss, angle, radius, share
+):
+    """Galileo's law, less what facets and hops take.
+
+    A sliding ball lost at most 2.1 % of its height in 5000 runs, one that rolls 2.1 % in the median, more than 4.8 % in
+    one of 1000, and at most 5.8 % in 20 000. The most is lost by a ball that keeps hopping on the elastic floor, in
+    phase with the time step: it touches the floor 40 % of the time instead of 80 %, and turns back while it still
+    spins. With half the time step it lost at most 3.4 % in 5000 runs.
+    """
+    run = Run(Ramp(angle=angle, friction=friction), share, Ball(radius=radius), timestep)
     start = run.ramp.height(run.start)
-    assert 1 - (0.055 if friction else 0.024) < run.climbed() / start < 1.0
+    assert 1 - loss < run.climbed() / start < 1.0
 
 
 def test_the_weight_of_the_ball_does_not_matter():
