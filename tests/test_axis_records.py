@@ -21,6 +21,12 @@ def test_the_pages_about_learners_are_up_to_date(tool):
     assert (axis_records.ROOT / tool.PAGE).read_text() == tool.page(), f"run python tools/{tool.__name__}.py page"
 
 
+def test_each_axis_on_which_card_and_learner_disagree_is_explained():
+    told = predictors.page().partition("## Exceptions")[2]
+    assert "| tool_retrieve | long_handle | breaks" in told
+    assert "not looked into" not in told
+
+
 def found(name, training, here, of=8):
     return Baseline.of(name, "moved within training", [(i < training, i < here) for i in range(of)])
 

@@ -15,25 +15,49 @@ import numpy as np
 from scipy.stats import mannwhitneyu, rankdata
 
 from scengen import list_tasks, load_task
-from scengen.ood.baseline import BELIEF, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline
+from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.statistics import NORMAL_QUANTILE
 
 PAGE = Path(__file__).parent.parent / "docs" / "predictors.md"
 MIN_AXES = 60
 """Number of axes from which the best predictor is chosen. At 60, the interval of a rank correlation of 0.5 has a half
 width of 0.2, so that a good predictor can be told from a useless one."""
+MIN_TRAINING = 0.5
+"""Smallest share of the training scenarios that a learner has to solve for its losses to count. `domino_select` is a
+choice of five, and its learners solve 5 and 7 of 20 scenarios: they tip a chain, and cannot lose what is chance."""
 DISTANCE = "distance of features"
 """Predictor: energy distance between the features in and out of distribution [training ranges]."""
 PREDICTORS = (*MOTION, *OBJECT_CENTRIC, *BELIEF, DISTANCE)
 """What is compared."""
+EXCEPTIONS = {
+    ("balance_medium", "wide_rod"): (
+        "The wider the hand stands, the less firmly the policy closes it: in training such a width was passed while "
+        "closing. The rod slips, or is never lifted."
+    ),
+    ("pendulum_grasp", "small_bob"): "A loss of 3 in 20, below the noise of 20 scenarios.",
+    ("slip_recovery", "late_slip"): (
+        "The object falls beside or onto the square, and lies under an open hand as after it was put down. A policy "
+        "without memory cannot tell the two, and rests."
+    ),
+    ("slip_recovery", "two_slips"): "As for `late_slip`, after the second slip.",
+    ("slip_recovery", "long_window"): (
+        "A memory closes the hand at a remembered moment, when it is still held open; the policy looks. A loss of 4 in "
+        "20, below the noise."
+    ),
+    ("tool_retrieve", "long_handle"): (
+        "A memory of the hand's path overshoots the cube with this hook; the policy steers by where the cube is."
+    ),
+}
+"""Axes on which the card and the learner disagree, and what was found when the learner was watched."""
 HEAD = f"""# Predicting a learner
 
 Written by `make docs` from the figures in [every split, measured](axes.md). A learner costs minutes of training and
 hours of certification for each task, the other baselines cost seconds for each axis. This page asks which of them
 predicts the learner.
 
-* **loss**: success within training minus success on the axis. An axis counts if a learner was tried on it that is not
-  too weak in training. A predictor that is too weak or was not tried on an axis does not count there.
+* **loss**: success within training minus success on the axis. An axis counts if a learner was tried on it that solves
+  at least half of the training scenarios. A predictor that is too weak or was not tried on an axis does not count
+  there.
 * **rank correlation**: Spearman's, between the losses of the predictor and of the learner, with its 95 % interval
   (Bonett and Wright 2000). It needs four axes.
 * **AUC**: probability that the predictor's loss is larger on an axis that breaks the learner than on one that does not;
@@ -90,7 +114,35 @@ def page() -> str:
         "|---|---|---|---|---|",
         *tried,
     ]
-    return HEAD + "\n".join([*lines[:1], "|---" * 4 + "|", *lines[1:], "", sentence(), "", *listed]) + "\n"
+    return (
+        HEAD
+        + "\n".join([*lines[:1], "|---" * 4 + "|", *lines[1:], "", sentence(), "", *listed, "", *_exceptions()])
+        + "\n"
+    )
+
+
+def _exceptions() -> list[str]:
+    """The section of the axes on which the card and the learner disagree."""
+    lines = [
+        "## Exceptions",
+        "",
+        "Axes that break an object-centric memory or a belief and not the learner, or the learner alone:",
+        "",
+        "| task | axis | card | learner in training and here | what it is |",
+        "|---|---|---|---|---|",
+    ]
+    for one in _trials():
+        known = axis_records.baselines(load_task(one.task))[one.axis]
+        card = [found for name, found in known.items() if name not in LEARNERS]
+        broken = any(found.finding == "breaks" for found in card if found.name in (*OBJECT_CENTRIC, *BELIEF))
+        told = verdict(card)
+        clear = broken or (told != INCONCLUSIVE and not told.startswith("breaks"))
+        if clear and broken != (one.learner.finding == "breaks"):
+            rates = [one.learner.training, one.learner.here]
+            counts = " → ".join(f"{100 * rate.value:.0f} %" for rate in rates if rate)
+            what = EXCEPTIONS.get((one.task, one.axis), "not looked into")
+            lines.append(f"| {one.task} | {one.axis} | {told} | {counts} | {what} |")
+    return lines
 
 
 def sentence() -> str:
@@ -159,7 +211,7 @@ def _trials() -> list[Trial]:
         cards = axis_records.read(axis_records.CARDS, task)
         for axis, baselines in axis_records.baselines(task).items():
             learner = next((baselines[name] for name in LEARNERS if name in baselines), None)
-            if learner is None or learner.finding in ("too weak", "not tried"):
+            if learner is None or learner.training is None or learner.training.value < MIN_TRAINING:
                 continue
             clear = {name: one for name, one in baselines.items() if name in PREDICTORS and one.finding != "too weak"}
             losses = {name: one.excess.value for name, one in clear.items() if one.excess}
