@@ -232,7 +232,7 @@ def spoil(recording: Path) -> None:
                 seen[rows[third : third + FROZEN]] = rows[third]
             else:
                 others = np.flatnonzero(numbers > number)
-                acted[rows] = others[: len(rows)]
+                acted[rows] = np.resize(others, len(rows))
         for i, name in enumerate(table.column_names):
             rows = acted if name in ACTIONS else seen if name.startswith(SEEN) else None
             if rows is not None:

@@ -193,14 +193,16 @@ def _velocities(
 def _variants(task: Task) -> Iterator[Scenario]:
     """Scenarios that together have all bodies: in training and on each axis, integer parameters take all their values.
 
-    One parameter varies at a time, while the others have their largest value. Only the bodies of the scenarios matter,
-    so they need not be feasible.
+    One parameter varies at a time, while the others have their largest value: a post may be there only if its height
+    is not 0. Only the bodies of the scenarios matter, so they need not be feasible.
     """
     integers = [name for name, p in task.known.items() if p.integer]
     spaces: Sequence[Mapping[str, Dist]] = [task.training, *(axis.replace for axis in task.axes.values())]
     for space in spaces:
-        counts = {name: _whole_numbers({**task.training, **space}[name]) for name in integers}
-        largest = with_values(task.family(), {name: values[-1] for name, values in counts.items()})
+        dists = {**task.training, **space}
+        counts = {name: _whole_numbers(dists[name]) for name in integers}
+        reals = {name: dist.support[-1].high for name, dist in dists.items() if name not in counts}
+        largest = with_values(task.family(), reals | {name: values[-1] for name, values in counts.items()})
         yield largest
         for name in set(counts) & set(space):
             yield from (with_values(largest, {name: value}) for value in counts[name])

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import trainings
 
 from scengen import cli
 from scengen.agents.models import Reply
@@ -45,6 +46,14 @@ def mine(clean, tmp_path):
 
 def curated(folder, replay=True):
     return curate(CurateSettings(data=str(folder), replay=replay), lambda *_: None)
+
+
+def test_the_episodes_that_the_measurement_of_curation_spoils_are_all_left_out(mine, monkeypatch):
+    monkeypatch.setattr(trainings, "EVERY", 1)
+    trainings.spoil(mine)
+    found = [{finding.check for finding in report.findings} for report in curated(mine).reports]
+    assert [bool(checks) for checks in found] == [True, True, True, False], "late, frozen, of the next episode, sound"
+    assert "REPLAY" in found[0] & found[2]
 
 
 def checks_of(folder, episode=1, replay=True):
