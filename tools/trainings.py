@@ -1,11 +1,12 @@
 """Train small policies on other demonstrations than tools/baselines.py, into records/trainings.
 
-    python tools/trainings.py curves|styles|curation [workers=N] [TASK ...]
+    python tools/trainings.py curves|styles|curation|wrench [workers=N] [TASK ...]
 
 * `curves`: the first 25, 50, 100 and 200 demonstrations.
 * `styles`: 200 nominal demonstrations, and 200 varied and recovering ones.
 * `curation`: a recording of which every third episode is spoiled, what `scengen curate` keeps of it, and as many of its
   episodes at random.
+* `wrench`: poses alone, and the force and torque at the wrist besides.
 
 Pools, and the recording of default styles, are those of tools/baselines.py, which makes missing ones. Trainings differ
 in their seed, and are evaluated in training and on two axes. A repeated call continues. The results are shown in
@@ -29,9 +30,12 @@ import baselines
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from baselines import ALL, CURATED, MIXED, NOMINAL, RANDOM, VARIED, Question
+from baselines import ALL, BLIND, CURATED, FELT, MIXED, NOMINAL, RANDOM, VARIED, Question
 from filelock import FileLock
 
+from scengen import load_task
+from scengen.envs.object_state import NAME
+from scengen.envs.observations import proprioception
 from scengen.learn.models import BC, KNN, MIP
 from scengen.pool import Pool
 
@@ -39,14 +43,26 @@ TASKS: dict[Question, tuple[str, ...]] = {
     "curves": tuple(baselines.AXES),
     "styles": ("tool_retrieve", "edge_slide", "balance_medium"),
     "curation": ("tool_retrieve", "edge_slide", "balance_medium"),
+    "wrench": ("mass_sort",),
 }
 """Tasks that are measured by default. Styles and curation can only show where not everything is solved anyway."""
 SIZES = (25, 50, 100, 200)
 """Numbers of demonstrations of a learning curve, held-out ones included."""
 SEEDS = {BC: (0, 1, 2), MIP: (0, 1, 2), KNN: (0,)}
 """Seeds of the trainings of a policy; nearest neighbours have none."""
-BASES: dict[Question, tuple[str, ...]] = {"curves": (MIXED,), "styles": (NOMINAL, VARIED), "curation": (MIXED,)}
+BASES: dict[Question, tuple[str, ...]] = {
+    "curves": (MIXED,),
+    "styles": (NOMINAL, VARIED),
+    "curation": (MIXED,),
+    "wrench": (MIXED,),
+}
 """Sets of demonstrations that are recorded."""
+COMPARED: dict[Question, tuple[str, ...]] = {
+    "styles": (NOMINAL, VARIED),
+    "curation": (ALL, CURATED, RANDOM),
+    "wrench": (BLIND, FELT),
+}
+"""Sets of demonstrations that are compared."""
 STYLES = {NOMINAL: "[nominal]", VARIED: "[varied,recover]"}
 """Styles of the demonstrations of a set."""
 EVERY = 3
@@ -76,7 +92,8 @@ class Training:
     @property
     def folder(self) -> Path:
         """Folder of the policy."""
-        return baselines.MADE / self.task / "trainings" / f"{self.data}-{self.policy}-{self.size or 'all'}-{self.seed}"
+        name = self.data.replace(" ", "_")
+        return baselines.MADE / self.task / "trainings" / f"{name}-{self.policy}-{self.size or 'all'}-{self.seed}"
 
 
 def main(*arguments: str) -> None:
@@ -113,8 +130,7 @@ def _of_task(question: Question, task: str) -> Iterator[Training]:
         for policy, seeds in SEEDS.items():
             yield from (Training(task, MIXED, policy, size, seed) for size in SIZES for seed in seeds)
     else:
-        sets = (NOMINAL, VARIED) if question == "styles" else (ALL, CURATED, RANDOM)
-        yield from (Training(task, data, BC, None, seed) for data in sets for seed in SEEDS[BC])
+        yield from (Training(task, data, BC, None, seed) for data in COMPARED[question] for seed in SEEDS[BC])
 
 
 def records(task: str) -> list[dict[str, Any]]:
@@ -149,9 +165,14 @@ def pools(task: str) -> dict[str, Path]:
 def train(training: Training) -> dict[str, Any]:
     """Train and evaluate a policy. Returns the record."""
     data = _recordings(training.task)[training.data]
-    size = () if training.size is None else (f"demonstrations={training.size}",)
     to = training.folder
-    baselines.run("train", f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}", *size)
+    settings = [f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}"]
+    if training.size is not None:
+        settings.append(f"demonstrations={training.size}")
+    if training.data == FELT:
+        robot = load_task(training.task).embodiment
+        settings.append(f"observations=[{','.join((*proprioception(robot), NAME, 'force_torque'))}]")
+    baselines.run("train", *settings)
     evaluated = pools(training.task)
     baselines.play(str(to), [*evaluated.values()], to / "evaluation")
     outcomes = {
@@ -170,7 +191,8 @@ def _recordings(task: str) -> dict[str, Path]:
     """Folders of the recordings of a task, by the name of the set."""
     folder = baselines.MADE / task
     names = (NOMINAL, VARIED, ALL, CURATED, RANDOM)
-    return {MIXED: folder / baselines.RECORDING} | {name: folder / "sets" / name for name in names}
+    own = dict.fromkeys((MIXED, BLIND, FELT), folder / baselines.RECORDING)
+    return own | {name: folder / "sets" / name for name in names}
 
 
 def prepare(task: str, name: str) -> None:
