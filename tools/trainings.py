@@ -30,6 +30,7 @@ import baselines
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from arguments import parted
 from baselines import ALL, BLIND, CURATED, FELT, MIXED, NOMINAL, RANDOM, VARIED, Question
 from filelock import FileLock
 
@@ -98,12 +99,11 @@ class Training:
 
 def main(*arguments: str) -> None:
     """Train and evaluate what is missing to answer a question."""
-    given = arguments[1:]
-    question = next((one for one in get_args(Question) if one in arguments[:1]), None)
+    names, settings = parted(arguments, "workers")
+    question = next((one for one in get_args(Question) if one in names[:1]), None)
     if question is None:
         sys.exit(f"give a question: {', '.join(get_args(Question))}")
-    workers = next((int(one.removeprefix("workers=")) for one in given if one.startswith("workers=")), 1)
-    tasks = [one for one in given if not one.startswith("workers=")] or TASKS[question]
+    tasks, workers = names[1:] or TASKS[question], int(settings.get("workers", 1))
     if unknown := {*tasks} - {*baselines.AXES}:
         sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(baselines.AXES)}")
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
