@@ -34,6 +34,9 @@ EXCEPTIONS = {
         "The wider the hand stands, the less firmly the policy closes it: in training such a width was passed while "
         "closing. The rod slips, or is never lifted."
     ),
+    ("linear_intercept", "fast"): (
+        "The hand waits in the right place and closes when a ball of training would arrive. The planner reads the speed."
+    ),
     ("pendulum_grasp", "small_bob"): "A loss of 3 in 20, below the noise of 20 scenarios.",
     ("slip_recovery", "late_slip"): (
         "The object falls beside or onto the square, and lies under an open hand as after it was put down. A policy "
