@@ -35,7 +35,7 @@ EXCEPTIONS = {
         "closing. The rod slips, or is never lifted."
     ),
     ("linear_intercept", "fast"): (
-        "The hand waits in the right place and closes when a ball of training would arrive. The planner reads the speed."
+        "The hand waits in the right place and closes when a ball of training would arrive. The planner sees the speed."
     ),
     ("pendulum_grasp", "small_bob"): "A loss of 3 in 20, below the noise of 20 scenarios.",
     ("slip_recovery", "late_slip"): (
