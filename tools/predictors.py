@@ -35,8 +35,8 @@ EXCEPTIONS = {
         "closing. The rod slips, or is never lifted."
     ),
     ("cube_toss", "big_cube"): (
-        "The hand that holds a wide cube stands as far open as one that has begun to release it in training: it goes on "
-        "opening early, at half of the swing, and the cube falls short."
+        "A hand around a wide cube stands as far open as one that has begun to release it in training: it opens early, "
+        "at half of the swing, and the cube falls short."
     ),
     ("cube_toss", "farther"): "A loss of 1 in 15, below the noise.",
     ("linear_intercept", "fast"): (
