@@ -285,7 +285,7 @@ def _worth(head: str, *sets: str) -> str:
             outcomes = {name: [*zip(*(one["outcomes"][split] for one in own[name]), strict=True)] for name in sets}
             for name in others:
                 gain = paired(outcomes[last], outcomes[name])
-                cells.append(f"{100 * gain.value:+.0f} [{100 * gain.low:.0f}, {100 * gain.high:.0f}]")
+                cells.append(f"{100 * gain.value:+.1f} [{100 * gain.low:.1f}, {100 * gain.high:.1f}]")
             lines.append(f"| [{task}](tasks/{task}.md) | {split} | {' | '.join(cells)} |")
     columns = ("task", "split", *sets, *(f"{last} - {name}" for name in others))
     return head + _table(columns, lines) if records else ""
