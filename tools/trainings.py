@@ -167,6 +167,7 @@ def train(training: Training) -> dict[str, Any]:
     data = _recordings(training.task)[training.data]
     to = training.folder
     settings = [f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}"]
+    settings.append(f"epochs={baselines.EPOCHS}")
     if training.size is not None:
         settings.append(f"demonstrations={training.size}")
     if training.data == FELT:

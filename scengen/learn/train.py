@@ -43,7 +43,7 @@ class TrainSettings:
     played: int = 4
     hidden: list[int] = field(default_factory=lambda: [256, 256])
     members: int = 5
-    epochs: int = 20
+    epochs: int = 60
     minutes: float | None = None
     seed: int = 0
 
