@@ -103,7 +103,7 @@ COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
 LEARNING_CURVES = """
 ## Learning curves
 
-Scenarios solved of 20 by policies that were trained on the first demonstrations: the mean of three trainings with
+Scenarios solved of 20 by policies that were trained on the first demonstrations: the mean of up to three trainings with
 different seeds, and in brackets the lowest and the highest of them. `knn` has no seed. Made by
 `python tools/trainings.py curves`; empty cells are not measured yet.
 
