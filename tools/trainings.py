@@ -148,7 +148,7 @@ def store(record: dict[str, Any]) -> None:
     """Add a record to those of its task; records of other pools are dropped."""
     path = _path(record["task"])
     path.parent.mkdir(parents=True, exist_ok=True)
-    with FileLock(path.with_suffix(".lock")):
+    with FileLock(baselines.MADE / f"{path.stem}.lock"):
         known = [*records(record["task"]), record]
         path.write_text("".join(sorted(json.dumps(one, sort_keys=True) + "\n" for one in known)))
 
