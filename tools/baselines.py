@@ -133,7 +133,7 @@ WRENCH = """
 The masses of `mass_sort` are hidden: a heavy cube looks like a light one, and is known by the force at the wrist once
 it is lifted. Three cubes lie in one of the five orders that are not the wanted one, so that 4 of 20 are chance.
 Scenarios solved of 20 by `bc`, trained on 200 demonstrations, without and with `force_torque` among its
-observations. Columns as above. Made by `python tools/trainings.py wrench`.
+observations. Columns as above, over two trainings. Made by `python tools/trainings.py wrench`.
 
 """
 
