@@ -150,12 +150,13 @@ baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
 
 # Trains with three seeds on 25 to 200 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
-# ones (a quarter of an hour for each task), for the sections of docs/baselines.md. WORKERS=4 trains at once.
+# ones (a quarter of an hour for each task), and with the wrench (mass_sort), for docs/baselines.md. WORKERS=4 trains at once.
 WORKERS ?= 1
 curves: setup
 	$(BIN)/python tools/trainings.py curves workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py styles workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py curation workers=$(WORKERS) $(TASKS)
+	$(BIN)/python tools/trainings.py wrench workers=$(WORKERS)
 	$(BIN)/python tools/baselines.py page
 
 # Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.

@@ -37,6 +37,7 @@ from filelock import FileLock
 from scengen import load_task
 from scengen.envs.object_state import NAME
 from scengen.envs.observations import proprioception
+from scengen.learn.data import KEPT
 from scengen.learn.models import BC, KNN, MIP
 from scengen.pool import Pool
 
@@ -134,9 +135,15 @@ def _of_task(question: Question, task: str) -> Iterator[Training]:
 
 
 def records(task: str) -> list[dict[str, Any]]:
-    """The records of a task that were made with its pools as they are."""
+    """The records of a task that were made as they would be now: with these pools, and as long."""
+    made = _made(task)
+    return [one for one in axis_records.lines(_path(task)) if {name: one[name] for name in made} == made]
+
+
+def _made(task: str) -> dict[str, Any]:
+    """What a record says of how it was made."""
     hashes = {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
-    return [one for one in axis_records.lines(_path(task)) if one["pools_sha256"] == hashes]
+    return {"epochs": baselines.EPOCHS, "pools_sha256": hashes}
 
 
 def identity(record: dict[str, Any]) -> Training:
@@ -145,7 +152,7 @@ def identity(record: dict[str, Any]) -> Training:
 
 
 def store(record: dict[str, Any]) -> None:
-    """Add a record to those of its task; records of other pools are dropped."""
+    """Add a record to those of its task; those that were made otherwise are dropped."""
     path = _path(record["task"])
     path.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(baselines.MADE / f"{path.stem}.lock"):
@@ -181,8 +188,7 @@ def train(training: Training) -> dict[str, Any]:
         for split, episodes in baselines.episodes(to / "evaluation", evaluated).items()
     }
     solved = {split: sum(own) for split, own in outcomes.items()}
-    hashes = {split: Pool.open(pool).sha256 for split, pool in evaluated.items()}
-    return {**asdict(training), "solved": solved, "outcomes": outcomes, "pools_sha256": hashes}
+    return {**asdict(training), "solved": solved, "outcomes": outcomes, **_made(training.task)}
 
 
 # --- sets of demonstrations ---------------------------------------------------------------
@@ -210,7 +216,7 @@ def derive(question: Question, task: str) -> None:
         sets = _recordings(task)
         _make(sets[ALL], sets[MIXED], spoil)
         _make(sets[CURATED], sets[ALL], curate)
-        kept = json.loads((sets[CURATED] / "curation" / "kept.json").read_text())
+        kept = json.loads((sets[CURATED] / KEPT).read_text())
         _make(sets[RANDOM], sets[ALL], partial(choose, count=len(kept)))
 
 
@@ -233,8 +239,8 @@ def choose(recording: Path, count: int) -> None:
     """Keep some episodes of a recording at random, as a curation would."""
     total = json.loads((recording / "meta" / "info.json").read_text())["total_episodes"]
     kept = sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
-    (recording / "curation").mkdir()
-    (recording / "curation" / "kept.json").write_text(json.dumps(kept))
+    (recording / KEPT).parent.mkdir()
+    (recording / KEPT).write_text(json.dumps(kept))
 
 
 def spoil(recording: Path) -> None:
