@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
@@ -181,6 +182,7 @@ def test_threads_that_limit_memory_at_the_same_time_leave_no_limit_behind():
 
 def test_without_what_only_linux_has_work_is_done_all_the_same(monkeypatch):
     """As on macOS and Windows, where none of it was tried: no copies of processes, no /proc, no limits of memory."""
+    resource_tracker.ensure_running()  # Python's own, which would start with the first worker, masks signals where it runs
     monkeypatch.setattr(machine, "LINUX", False)
     monkeypatch.delattr(signal, "pthread_sigmask")
     monkeypatch.delattr(os, "sched_getaffinity")
