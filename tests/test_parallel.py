@@ -182,7 +182,7 @@ def test_threads_that_limit_memory_at_the_same_time_leave_no_limit_behind():
 
 def test_without_what_only_linux_has_work_is_done_all_the_same(monkeypatch):
     """As on macOS and Windows, where none of it was tried: no copies of processes, no /proc, no limits of memory."""
-    resource_tracker.ensure_running()  # it masks signals itself while it starts, which the first worker would bring about
+    resource_tracker.ensure_running()  # it masks signals while it starts, which the first worker would bring about
     monkeypatch.setattr(machine, "LINUX", False)
     monkeypatch.delattr(signal, "pthread_sigmask")
     monkeypatch.delattr(os, "sched_getaffinity")
