@@ -140,10 +140,8 @@ def _exceptions() -> list[str]:
         "|---|---|---|---|---|",
     ]
     for one in _trials():
-        known = axis_records.baselines(load_task(one.task))[one.axis]
-        card = [found for name, found in known.items() if name not in LEARNERS]
-        broken = any(found.finding == "breaks" for found in card if found.name in (*OBJECT_CENTRIC, *BELIEF))
-        told = verdict(card)
+        broken = any(found.finding == "breaks" for found in one.card if found.name in (*OBJECT_CENTRIC, *BELIEF))
+        told = verdict(one.card)
         clear = broken or (told != INCONCLUSIVE and not told.startswith("breaks"))
         if clear and broken != (one.learner.finding == "breaks"):
             rates = [one.learner.training, one.learner.here]
@@ -202,6 +200,8 @@ class Trial:
     """Name of the axis."""
     learner: Baseline
     """Success of the learner."""
+    card: tuple[Baseline, ...]
+    """The other baselines of the axis."""
     losses: Mapping[str, float]
     """Figures of the predictors that are known."""
 
@@ -225,7 +225,8 @@ def _trials() -> list[Trial]:
             losses = {name: one.excess.value for name, one in clear.items() if one.excess}
             if axis in cards:
                 losses[DISTANCE] = cards[axis]["energy"]["distance"]
-            found.append(Trial(task.name, axis, learner, losses))
+            card = tuple(one for name, one in baselines.items() if name not in LEARNERS)
+            found.append(Trial(task.name, axis, learner, card, losses))
     return found
 
 
