@@ -50,34 +50,39 @@ def test_the_measurement_with_more_twins_counts(tmp_path, monkeypatch):
     assert axis_records.baselines(TASK)["diagonal"]["belief"].twins == 20
 
 
-def learned(policy, split, solved, outcomes=True):
+def learned(policy, split, solved, seed=0, first=0):
     """The record of a policy that solved the first scenarios of ten."""
-    record = {
-        "policy": policy,
-        "split": split,
-        "solved": solved,
-        "scenarios": 10,
-        "shifts": axis_records.shifts(TASK, split),
-    }
-    return record | ({"outcomes": [[i, i < solved] for i in range(10)]} if outcomes else {})
+    moved = {} if split == "id" else axis_records.shifts(TASK, split)
+    outcomes = [[first + i, i < solved] for i in range(10)]
+    return {"policy": policy, "seed": seed, "split": split, "shifts": moved, "outcomes": outcomes}
 
 
 def test_the_learner_is_the_policy_that_works_best_in_training_and_paired_by_twins(tmp_path, monkeypatch):
+    def learner(*records):
+        (tmp_path / "domino_single.jsonl").write_text("".join(json.dumps(record) + "\n" for record in records))
+        return axis_records.learners(TASK)["diagonal"]
+
     monkeypatch.setattr(axis_records, "LEARNED", tmp_path)
     records = [
         learned(policy, split, solved)
         for policy, *both in (("knn", 5, 0), ("mip", 9, 2), ("bc", 9, 1))
         for split, solved in zip(("id", "diagonal"), both, strict=True)
     ]
+    best = learner(*records)
+    assert (best.name, best.twins, best.finding) == ("bc", 10, "breaks"), "of equals, the first one"
+    apart = learner(learned("bc", "id", 9), learned("bc", "diagonal", 1, first=10))
+    assert apart.twins == 0 and apart.excess.value == pytest.approx(0.8)
+    assert all_axes._baseline(apart).endswith("unpaired")
+
+
+def test_a_learner_is_judged_by_all_its_trainings(tmp_path, monkeypatch):
+    monkeypatch.setattr(axis_records, "LEARNED", tmp_path)
+    records = [learned("bc", split, 9 if split == "id" else solved, seed)
+               for seed, solved in enumerate((0, 3, 6)) for split in ("id", "diagonal")]  # fmt: skip
     (tmp_path / "domino_single.jsonl").write_text("".join(json.dumps(record) + "\n" for record in records))
-    (learner,) = axis_records.learners(TASK).values()
-    assert (learner.name, learner.twins, learner.finding) == ("bc", 10, "breaks"), "of equals, the first one"
-    for record in records:
-        del record["outcomes"]
-    (tmp_path / "domino_single.jsonl").write_text("".join(json.dumps(record) + "\n" for record in records))
-    (unpaired,) = axis_records.learners(TASK).values()
-    assert unpaired.twins == 0 and unpaired.excess.value == pytest.approx(0.8)
-    assert all_axes._baseline(unpaired).endswith("unpaired")
+    best = axis_records.learners(TASK)["diagonal"]
+    assert (best.twins, best.training.value, best.here.value) == (10, 0.9, pytest.approx(0.3))
+    assert best.here.rollouts == 30, "clusters of three"
 
 
 def test_a_card_of_an_earlier_format_is_told_with_the_remedy(tmp_path):
@@ -97,7 +102,7 @@ LEARNERS = {broken: found("bc", 8, 0 if broken else 8) for broken in (True, Fals
 
 
 def trial(k, broken):
-    return predictors.Trial("task", f"axis_{k}", LEARNERS[broken], {"belief": k / 100, "replay": 0.5})
+    return predictors.Trial("task", f"axis_{k}", LEARNERS[broken], (), {"belief": k / 100, "replay": 0.5})
 
 
 def test_the_best_predictor_orders_axes_as_the_learner_does_and_few_axes_decide_nothing(monkeypatch):

@@ -6,7 +6,7 @@ measured with.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from scengen.ood.axis_card import NOT_SEARCHED, read_card
 from scengen.ood.baseline import LEARNERS, Baseline
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
-from scengen.statistics import difference, rate
+from scengen.statistics import difference, paired, rate
 from scengen.typed import typed
 
 ROOT = Path(__file__).parent.parent
@@ -95,28 +95,41 @@ def baselines(task: Task) -> dict[str, dict[str, Baseline]]:
 
 
 def learners(task: Task) -> dict[str, Baseline]:
-    """Success of one trained policy on the axes on which it was played.
+    """Success of one trained policy on the axes on which it was played, over all its trainings.
 
     It is the policy that solves most training scenarios, so that its failures elsewhere tell most; of several, the
     first one of `LEARNERS`.
     """
-    played = {(one["policy"], one["split"]): one for one in lines(LEARNED / f"{task.name}.jsonl")}
-    training = {name: played[name, ID] for name in LEARNERS if (name, ID) in played}
+    known = lines(LEARNED / f"{task.name}.jsonl")
+    splits = {ID: {}} | {axis: shifts(task, axis) for axis in task.axes}
+    played = {
+        (name, split): outcomes(
+            one for one in known if (one["policy"], one["split"], one["shifts"]) == (name, split, moved)
+        )
+        for name in LEARNERS
+        for split, moved in splits.items()
+    }
+    training = {name: rate([*played[name, ID].values()]).value for name in LEARNERS if played[name, ID]}
     if not training:
         return {}
-    best = max(training, key=lambda name: training[name]["solved"] / training[name]["scenarios"])
-    return {
-        axis: _learner(best, training[best], played[best, axis])
-        for axis in task.axes
-        if (best, axis) in played and played[best, axis]["shifts"] == shifts(task, axis)
-    }
+    best = max(training, key=lambda name: training[name])
+    return {axis: _learner(best, played[best, ID], played[best, axis]) for axis in task.axes if played[best, axis]}
 
 
-def _learner(name: str, training: Record, here: Record) -> Baseline:
-    """The baseline of a trained policy, paired by twins if the record tells of single scenarios."""
-    inside, outside = dict(training.get("outcomes", [])), dict(here.get("outcomes", []))
-    twins = [index for index in outside if index in inside]
-    if 2 * len(twins) >= here["scenarios"]:
-        return Baseline.of(name, "training", [(inside[index], outside[index]) for index in twins])
-    a, b = (rate([[k < one["solved"]] for k in range(one["scenarios"])]) for one in (training, here))
-    return Baseline(name, 1.0, "training", a, b, difference(a, b))
+def outcomes(records: Iterable[Record]) -> dict[int, list[bool]]:
+    """Successes in each scenario, by its number: one for each record, which are those of several trainings."""
+    found: dict[int, list[bool]] = {}
+    for record in records:
+        for index, success in record["outcomes"]:
+            found.setdefault(index, []).append(success)
+    return found
+
+
+def _learner(name: str, training: Mapping[int, list[bool]], here: Mapping[int, list[bool]]) -> Baseline:
+    """The baseline of a trained policy, paired by twins if half of the scenarios have one."""
+    twins = [index for index in here if index in training]
+    if 2 * len(twins) >= len(here):
+        a, b = ([played[index] for index in twins] for played in (training, here))
+        return Baseline(name, 1.0, "training", rate(a), rate(b), paired(a, b))
+    inside, outside = (rate([*played.values()]) for played in (training, here))
+    return Baseline(name, 1.0, "training", inside, outside, difference(inside, outside))

@@ -38,6 +38,8 @@ ALL_AXES = "axes=all"
 """Argument: evaluate on all axes of the tasks."""
 POLICIES = (BC, MIP, KNN)
 """Trained policies."""
+AGAIN = (1, 2)
+"""Further seeds of trainings of `bc`. One of `mip` takes as long as three of these; nearest neighbours have no seed."""
 REPLAY = "replay"
 """Policy that replays the witness of the nearest other training scenario."""
 UNTRAINED = ("idle", "random", "oracle")
@@ -74,10 +76,11 @@ demonstrations (`scengen demos`, default styles), on {SCENARIOS} certified scena
 policies see pictures, which is a harder problem. A low rate on an axis says that this policy does not transfer, not
 that none can: the oracle solves every scenario, and doing nothing solves none; otherwise it would not be certified.
 
-* **bc**, **mip**, **knn**: see [Training](policies.md#training). They are deterministic: each scenario is played once.
+* **bc**, **mip**, **knn**: see [Training](policies.md#training). They are deterministic: each scenario is played once,
+  by each of up to three trainings.
 * **replay**: the witness of the nearest other training scenario, played without looking: the success of pure memory.
 * **idle**, **random**, **oracle**: nothing, random actions, and what `scengen` certifies with; in training alone.
-* Brackets: 95 % Wilson interval. **why not**: the most frequent reasons of failures.
+* Brackets: 95 % Wilson interval over the scenarios. **why not**: the most frequent reasons of failures.
 
 What failures in training are (`scengen evaluate keep=[episodes]`, `scengen film`, and the states that were passed): in
 `tool_retrieve`, four times of five, the hook has turned the cube farther than in any demonstration, and the hand stands
@@ -154,12 +157,13 @@ def measure(task: str, axes: tuple[str, ...]) -> None:
     record(task, data, folder / "demos", pools.values())
     found: list[dict[str, Any]] = []
     RECORDS.mkdir(parents=True, exist_ok=True)
-    for policy in (*POLICIES, REPLAY, *UNTRAINED):
-        trained = folder / policy
+    first = [(policy, 0) for policy in (*POLICIES, REPLAY, *UNTRAINED)]
+    for policy, seed in [*first, *((BC, seed) for seed in AGAIN)]:
+        trained = folder / (f"{policy}-{seed}" if seed else policy)
         if policy in POLICIES:
-            run("train", f"policy={policy}", f"data={data}", f"to={trained}")
+            run("train", f"policy={policy}", f"seed={seed}", f"data={data}", f"to={trained}")
         own = {ID: pools[ID]} if policy in UNTRAINED else pools
-        played = folder / f"{policy}-evaluation-{len(own) - 1}"  # an evaluation is bound to its pools
+        played = folder / f"{trained.name}-evaluation-{len(own) - 1}"  # an evaluation is bound to its pools
         play(str(trained) if policy in POLICIES else policy, [*own.values()], played)
         found += _results(task, policy, trained, played, own)
         lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in found)
@@ -222,7 +226,7 @@ def _results(task: str, policy: str, trained: Path, played: Path, pools: dict[st
     told: dict[str, Any] = {"task": task, "policy": policy}
     if policy in POLICIES:
         own = read_settings(trained)
-        names = ("demonstrations", "rows", "epochs", "data_sha256", "weights_sha256")
+        names = ("demonstrations", "rows", "epochs", "seed", "data_sha256", "weights_sha256")
         told |= {name: getattr(own, name) for name in names}
     records = []
     for split, own in episodes(played, pools).items():
@@ -239,9 +243,9 @@ def page() -> str:
     lines: list[str] = []
     for task in list_tasks():
         records = axis_records.lines(RECORDS / f"{task}.jsonl")
-        order = {split: k for k, split in enumerate((ID, *load_task(task).axes))} if records else {}
-        known = [record for record in records if record["split"] in order]
-        lines += [_line(record) for record in sorted(known, key=lambda record: order[record["split"]])]
+        for split, policy in product((ID, *load_task(task).axes), (*POLICIES, REPLAY, *UNTRAINED)) if records else ():
+            own = [one for one in records if (one["split"], one["policy"]) == (split, policy)]
+            lines += [_line(own)] if own else []
     return (
         HEAD
         + _table(COLUMNS, lines)
@@ -304,14 +308,16 @@ def _spread(solved: list[int]) -> str:
     return f"{sum(solved) / len(solved):.3g} [{min(solved)}, {max(solved)}]"
 
 
-def _line(record: dict[str, Any]) -> str:
-    solved, count = record["solved"], record["scenarios"]
-    interval = rate([[True]] * solved + [[False]] * (count - solved))
-    frequent = sorted(record["reasons"].items(), key=lambda item: -item[1])[:2]
-    why = "; ".join(f"{number} x {reason}" for reason, number in frequent)
+def _line(records: list[dict[str, Any]]) -> str:
+    """The row of a policy on a split, over all its trainings."""
+    first = records[0]
+    interval = rate([*axis_records.outcomes(records).values()])
+    reasons = sum((Counter(record["reasons"]) for record in records), Counter[str]())
+    why = "; ".join(f"{number} x {reason}" for reason, number in reasons.most_common(2))
     shown = f"{100 * interval.value:.0f} [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
-    task = f"[{record['task']}](tasks/{record['task']}.md)"
-    return f"| {task} | {record['split']} | {record['policy']} | {solved} of {count} | {shown} | {why} |"
+    solved = ", ".join(str(record["solved"]) for record in records)
+    task = f"[{first['task']}](tasks/{first['task']}.md)"
+    return f"| {task} | {first['split']} | {first['policy']} | {solved} of {first['scenarios']} | {shown} | {why} |"
 
 
 if __name__ == "__main__":
