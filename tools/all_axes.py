@@ -58,7 +58,7 @@ size. {verdicts}
     parameters that the axis moves to be as in training. **hidden belief**: it believes only the hidden ones, if the
     axis moves any. The control is that of the replay; a value that is constant in training is believed rightly there.
   * **learner**: of the policies trained on 200 demonstrations ([baselines](baselines.md)), the one that solves most of
-    its 20 training scenarios. Its excess is paired by twins, or marked *unpaired*. {predicted}
+    its 20 training scenarios, over all its trainings. Its excess is paired by twins, or marked *unpaired*. {predicted}
   *solved by motion memory* or *object-centric memory*: only vision can be tested there, if anything. In a task with a
   choice (`domino_select`) the memory of the twin contains the answer: an axis that makes the choice harder to see
   cannot break it. Use `scengen evaluate` to measure whether a policy still chooses correctly.
@@ -217,7 +217,7 @@ def _baseline(baseline: Baseline) -> str:
     training, here, lost = baseline.training, baseline.here, baseline.excess
     marks = [
         "weak" if baseline.finding == "too weak" else "",
-        f"{_count(training)} → {_count(here)} of {here.scenarios}",
+        f"{_count(training)} → {_count(here)} of {here.rollouts}",
         f"{lost.value:+.2f} [{lost.low:.2f}, {lost.high:.2f}]",
         "held out" if baseline.control == HELD_OUT and not baseline.name.startswith("any") else "",
         "" if lost.twins else "unpaired",
@@ -226,8 +226,8 @@ def _baseline(baseline: Baseline) -> str:
 
 
 def _count(rate: Rate) -> int:
-    """Number of solved scenarios."""
-    return round(rate.value * rate.scenarios)
+    """Number of solved episodes: one for each scenario, or one for each of a learner's trainings."""
+    return round(rate.value * rate.rollouts)
 
 
 if __name__ == "__main__":  # worker processes import this file again
