@@ -34,6 +34,8 @@ BY_WORD: Mapping[str, float] = {
     "vel_ang": RATE,
     "quat": ANGLE / 2,
     "pos": LENGTH,
+    "box_low": LENGTH,
+    "box_high": LENGTH,
     "torque": TORQUE,
     "force": FORCE,
     "tactile": FORCE,

@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE
 
 from scengen import list_tasks, load_task
+from scengen.assets.prop import TABLE_TOP
 from scengen.envs.object_state import COMMON_BODIES, RESOLUTION, ObjectState, bodies_of
 from scengen.geometry import between
 from scengen.params import values, with_values
@@ -132,6 +133,28 @@ def test_every_split_of_a_task_has_its_bodies_and_joints_among_the_entries(name)
         moving = {body.name: bool(body.joints or body.mocap) for body in scene.bodies if body.name not in COMMON_BODIES}
         assert set(moving) <= set(known)
         assert all(known[body] for body, moves in moving.items() if moves)
+
+
+def test_the_box_of_a_body_reaches_to_its_outermost_solid_parts_in_its_own_axes():
+    task = load_task("domino_single")
+    one, state = task.draw(ID, 0, 0).scenario, state_of(task)
+    sizes = {"slab.width": 0.08, "slab.thickness": 0.02, "slab.height": 0.2, "slab_yaw": 7.0}
+    for visual in (False, True):
+        world = World.load(rebuild(with_values(one, sizes)), task.embodiment, visual)
+        read = state.read(world)
+        low, high = (entries(state, read, f"slab_box_{corner}") for corner in ("low", "high"))
+        np.testing.assert_allclose(sorted(high - low), [0.02, 0.08, 0.2], atol=1e-9)
+        assert world.pos("slab")[2] + high[2] == pytest.approx(TABLE_TOP + 0.2, abs=2e-3), "its upper side"
+        assert not entries(state, read, "tile_5_box_high").any() or one.count == 6
+
+
+def test_things_of_various_heights_are_told_apart():
+    task = load_task("pick_place_ycb")
+    state, seen = state_of(task), set()
+    for index in range(8):
+        read = state.read(world_of(task.draw(ID, 0, index).scenario, task.embodiment))
+        seen.add(float(entries(state, read, "thing_box_high")[2]))
+    assert len(seen) > 2 and max(seen) - min(seen) > 0.01
 
 
 def test_bodies_of_a_pool_with_other_distributions_are_there_too():
