@@ -72,9 +72,10 @@ HEAD = f"""# Baselines
 Written by `make baselines`: success rates of small policies that `scengen train` trains on {DEMONSTRATIONS}
 demonstrations (`scengen demos`, default styles), on {SCENARIOS} certified scenarios of each split.
 
-**What these figures may not be compared with.** The policies read poses of all bodies and of the hand. The paper's
-policies see pictures, which is a harder problem. A low rate on an axis says that this policy does not transfer, not
-that none can: the oracle solves every scenario, and doing nothing solves none; otherwise it would not be certified.
+**What these figures may not be compared with.** The policies read poses and outer sizes of all bodies, and the pose of
+the hand. The paper's policies see pictures, which is a harder problem. A low rate on an axis says that this policy does
+not transfer, not that none can: the oracle solves every scenario, and doing nothing solves none; otherwise it would not
+be certified.
 
 * **bc**, **mip**, **knn**: see [Training](policies.md#training). They are deterministic: each scenario is played once,
   by each of up to three trainings.

@@ -141,7 +141,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             task: name of the task. Pools of other tasks are refused.
             pool: folder of a pool, or several folders; or the scenarios of another environment of the task.
             observations: names of streams and cameras, or one name; only these are computed. Default: proprioception.
-                Privileged streams are `object-state`, all poses and velocities in one vector
+                Privileged streams are `object-state`, all poses, velocities and sizes in one vector
                 (`scengen.envs.object_state`), each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m]
                 if the family turns pictures.
             render_mode: None or `rgb_array`.

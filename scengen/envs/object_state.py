@@ -96,7 +96,7 @@ def all_bodies(several: Iterable[Bodies]) -> Bodies:
 
 @dataclass(frozen=True)
 class ObjectState:
-    """A vector of poses and velocities: its entries, their names and bounds, and how to read it."""
+    """A vector of poses, velocities and boxes: its entries, their names and bounds, and how to read it."""
 
     bodies: Bodies
     arms: int

@@ -29,7 +29,7 @@ def test_the_same_readings_have_lerobots_names():
     assert (named["agent_pos"] == np.concatenate([seen[name] for name in OWN])).all()
     assert (named["environment_state"] == seen["object-state"]).all()
     names = env.metadata["names"]
-    assert [len(names[name]) for name in ("agent_pos", "environment_state")] == [23, 182]
+    assert [len(names[name]) for name in ("agent_pos", "environment_state")] == [23, 224]
     assert names["agent_pos"][:4] == (*plain.metadata["names"]["robot0_eef_pos"], "robot0_eef_quat.x")
 
 
