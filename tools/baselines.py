@@ -18,6 +18,7 @@ import axis_records
 from scengen import cli, list_tasks, load_task
 from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import read_settings
+from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
@@ -318,7 +319,10 @@ def _line(records: list[dict[str, Any]]) -> str:
     shown = f"{100 * interval.value:.0f} [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
     solved = ", ".join(str(record["solved"]) for record in records)
     task = f"[{first['task']}](tasks/{first['task']}.md)"
-    return f"| {task} | {first['split']} | {first['policy']} | {solved} of {first['scenarios']} | {shown} | {why} |"
+    policy, epochs = first["policy"], first.get("epochs")
+    if policy in (BC, MIP) and epochs != TrainSettings().epochs:
+        policy += f", {epochs} epochs"
+    return f"| {task} | {first['split']} | {policy} | {solved} of {first['scenarios']} | {shown} | {why} |"
 
 
 if __name__ == "__main__":
