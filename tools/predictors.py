@@ -47,8 +47,8 @@ EXCEPTIONS = {
     ),
     ("pick_place_ycb", "more_jumps"): "As for `far_jumps`.",
     ("pick_place_ycb", "small_patch"): (
-        "The policy puts the object down 3 to 5 cm beside the middle, which the square of training allows. Nothing that "
-        "it sees tells the size of a mark on the table."
+        "The policy puts the object down 3 to 5 cm beside the middle, which the square of training allows. Nothing "
+        "that it sees tells the size of a mark on the table."
     ),
     ("pick_place_ycb", "unseen_item"): (
         "A hand around a narrow thing stands as it stood in training before it had closed: the policy holds it at the "
