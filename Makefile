@@ -144,7 +144,7 @@ VERSIONS ?= 3.5.0,4.0.0
 drift: setup
 	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
 
-# Trains and evaluates small policies and writes docs/baselines.md (about 10 minutes of processor time for each task). TASKS=packing
+# Trains and evaluates small policies and writes docs/baselines.md (about half an hour of processor time for each task). TASKS=packing
 # selects tasks, TASKS="axes=all packing" evaluates on all their axes. An interrupted call is continued.
 baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
