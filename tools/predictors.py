@@ -47,8 +47,8 @@ EXCEPTIONS = {
         "The hand waits in the right place and closes when a ball of training would arrive. The planner sees the speed."
     ),
     ("mirror_pick_place", "turned_cube"): (
-        "A memory closes at the angle of training, which grips a turned cube all the same. The policy comes down 1 to 3 "
-        "cm beside a cube that is turned farther than any of training, and waits or closes there."
+        "A memory closes at the angle of training, which grips a turned cube all the same. The policy comes down "
+        "1 to 3 cm beside a cube that is turned farther than any of training, and waits or closes there."
     ),
     ("pick_place_ycb", "far_jumps"): (
         "A memory goes to where the square jumped at that time; the policy steers to where it is now."
