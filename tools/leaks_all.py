@@ -21,6 +21,7 @@ from scengen.analysis import leaks
 from scengen.envs import object_state, observations
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
+from scengen.sim import boxes
 from scengen.validate.identity import source_sha256
 
 RECORDS = Path("records/leaks")
@@ -64,7 +65,7 @@ def stored(task: Task) -> dict[str, Any]:
 
 def code_sha256(task: Task) -> str:
     """Hash of the code that the results of a task follow from."""
-    read = map(inspect.getsource, (leaks, object_state, observations))
+    read = map(inspect.getsource, (leaks, object_state, observations, boxes))
     return hashlib.sha256("\n".join([source_sha256(task.family), *read]).encode()).hexdigest()
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from ..assets.prop import TABLE_HALF, TABLE_TOP
@@ -14,6 +13,7 @@ from ..control.loop import Loop
 from ..envs.gym import Observation, PoolEnv
 from ..envs.object_state import xyzw
 from ..geometry import Vec3
+from ..sim.boxes import box_around
 from ..sim.world import World, hands
 from .calls import Calls
 from .models import Call, Turn
@@ -225,13 +225,5 @@ def _bodies(model: Any) -> list[str]:
 
 def _size(world: World, body: str) -> Vec3:
     """Edges of the box around a body's own geoms, in its axes [m], shape (3,)."""
-    model, number = world.model, world.body(body)
-    first, count = model.body_geomadr[number], model.body_geomnum[number]
-    corners = []
-    for geom in range(first, first + count):
-        centre, half = model.geom_aabb[geom].reshape(2, 3)
-        frame = np.empty(9)
-        mujoco.mju_quat2Mat(frame, model.geom_quat[geom])
-        for signs in np.ndindex(2, 2, 2):
-            corners.append(model.geom_pos[geom] + frame.reshape(3, 3) @ (centre + half * (2 * np.array(signs) - 1)))
-    return np.ptp(corners, axis=0) if corners else np.zeros(3)
+    low, high = box_around(world.model, np.flatnonzero(world.model.geom_bodyid == world.body(body)))
+    return high - low

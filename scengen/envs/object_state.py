@@ -39,6 +39,7 @@ from ..samplers.dists import Dist
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim import scene_text
+from ..sim.boxes import box_around
 from ..sim.world import World
 
 NAME = "object-state"
@@ -54,7 +55,7 @@ BOX = {"box_low": ("x", "y", "z"), "box_high": ("x", "y", "z")}
 """Corners of the box around a body, and the names of their entries."""
 POSE_SIZE = sum(map(len, POSE.values()))
 """Number of entries of a pose."""
-BOUNDS = {"pos": 3.0, "quat": 1.0, "vel_lin": 100.0, "vel_ang": 1000.0, "box_low": 3.0, "box_high": 3.0}
+BOUNDS = {"pos": 3.0, "quat": 1.0, "vel_lin": 100.0, "vel_ang": 1000.0, **dict.fromkeys(BOX, 3.0)}
 """Largest absolute value of each part, to which readings are clipped: far beyond the room [m], and beyond the speeds
 of all bodies here [m/s], [rad/s]."""
 
@@ -201,17 +202,9 @@ def _boxes(model: mujoco.MjModel) -> NDArray[np.float64]:
     It is 0 for a body without any, such as a mark on the table.
     """
     if model not in _boxes_of_models:
-        corners = np.stack([np.full((model.nbody, 3), np.inf), np.full((model.nbody, 3), -np.inf)], axis=1)
-        for geom in np.flatnonzero(model.geom_contype | model.geom_conaffinity):
-            axes = np.empty(9)
-            mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
-            axes, (middle, half) = axes.reshape(3, 3), model.geom_aabb[geom].reshape(2, 3)
-            middle, half = model.geom_pos[geom] + axes @ middle, np.abs(axes) @ half
-            low, high = corners[model.geom_bodyid[geom]]
-            np.minimum(low, middle - half, out=low)
-            np.maximum(high, middle + half, out=high)
-        corners[np.isinf(corners)] = 0.0
-        _boxes_of_models[model] = rounded(corners.reshape(-1, 6), "pos")
+        solid = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
+        boxes = [box_around(model, solid[model.geom_bodyid[solid] == body]) for body in range(model.nbody)]
+        _boxes_of_models[model] = rounded(np.reshape(boxes, (-1, 6)), "pos")
     return _boxes_of_models[model]
 
 

@@ -1,12 +1,10 @@
 """One take: an episode that a person drives, control period by control period. It knows neither devices nor clocks."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +12,7 @@ from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import ScengenError
 from ..scenario import Scenario
+from ..sim.boxes import box_around
 from ..sim.world import World
 from ..validate.rollout import Rollout, replay
 from .mapping import ARM_CONTROLS, Grips, action_of, advanced, motion
@@ -23,9 +22,6 @@ MOMENT_PERIODS = 10
 """Number of control periods between two saved states."""
 UNDO_TIME = 1.0
 """Time by which one press of the undo button goes back [s]."""
-
-CORNER_SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-"""Signs of the corners of a box, shape (8, 3)."""
 
 Phase = Literal["ready", "running", "paused", "settling", "ended"]
 """Phase of a take. `ready`: the first motion starts the clock. `settling`: the goal was reached and has to last."""
@@ -272,14 +268,7 @@ class Session:
             geoms = np.flatnonzero(model.geom_bodyid == body)
             if not len(geoms):
                 continue
-            corners = []
-            for geom in geoms:
-                centre, half, turn = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:], np.zeros(9)
-                mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-                corners.append(model.geom_pos[geom] + (centre + half * CORNER_SIGNS) @ turn.reshape(3, 3).T)
-            every = np.concatenate(corners)
-            box = (*every.min(axis=0), *every.max(axis=0))
-            found[name] = tuple(round(float(value), 4) for value in box)
+            found[name] = tuple(round(float(value), 4) for value in box_around(model, geoms).ravel())
         return found
 
     def _pose(self, number: int) -> tuple[float, ...]:
