@@ -67,7 +67,7 @@ that moving the hand gives no finer ones."""
 
 def xyzw(rot: Mat3) -> NDArray[np.float64]:
     """A rotation as a quaternion xyzw, the order of robosuite's keys, shape (4,)."""
-    return _quats(rot[None])[0]
+    return quats(rot[None])[0]
 
 
 Bodies = Mapping[str, bool]
@@ -177,10 +177,10 @@ def _frame(
     pos: NDArray[np.float64], rot: NDArray[np.float64], lin: NDArray[np.float64], ang: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Poses and velocities of n bodies side by side, shape (n, 13)."""
-    return np.hstack([pos, _quats(rot), lin, ang])
+    return np.hstack([pos, quats(rot), lin, ang])
 
 
-def _quats(rots: NDArray[np.float64]) -> NDArray[np.float64]:
+def quats(rots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotations, shape (n, 3, 3), as quaternions xyzw, shape (n, 4)."""
     quats = np.empty((len(rots), 4))
     for quat, rot in zip(quats, rots.reshape(-1, 9), strict=True):

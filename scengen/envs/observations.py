@@ -12,6 +12,7 @@ of the actions. For state-based policies `seen_<body>_pos` is the position that 
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,7 +23,7 @@ from ..orientation import Orientation
 from ..robots.panda import JOINTS, MAX_ARMS, Names
 from ..scenario import Scenario
 from ..sim.world import JAW, Arm, World, hands
-from .object_state import NAME, POSE, ObjectState, rounded, xyzw
+from .object_state import NAME, POSE, ObjectState, quats, rounded, xyzw
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]
 
@@ -44,6 +45,11 @@ class Stream:
     """Function that reads the stream from a world."""
     grid: tuple[int, ...] = ()
     """Shape of a grid; empty for a vector."""
+    view: Callable[[World], NDArray[np.float64]] | None = None
+    """Function that returns the array in which the simulation of a world holds the reading, now and later, so that
+    many simulations are read at once; None if the reading has to be computed."""
+    convert: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    """Function that converts n such arrays to readings, shape (n, entries); None if they are the readings."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -82,12 +88,29 @@ def _tactile(pad: str) -> Callable[[Arm], NDArray[np.float64]]:
     return read
 
 
+def _positions(joints: Sequence[str]) -> Callable[[World], NDArray[np.float64]]:
+    return lambda world: _part(world.data.qpos, [world.model.joint(name).qposadr[0] for name in joints])
+
+
+def _speeds(joints: Sequence[str]) -> Callable[[World], NDArray[np.float64]]:
+    return lambda world: _part(world.data.qvel, [world.model.joint(name).dofadr[0] for name in joints])
+
+
+def _part(values: NDArray[np.float64], places: Sequence[int]) -> NDArray[np.float64]:
+    """Successive entries of an array of the simulation, not copied."""
+    assert all(np.diff(places) == 1), "the joints of a chain follow one another"
+    return values[places[0] : places[-1] + 1]
+
+
 def _arm_streams(number: int, hand: str) -> dict[str, Stream]:
     """The streams of one arm without the cameras. Quaternions are xyzw, as under robosuite's keys."""
-    robot, prefix = Names(number).arm, Names(number).arm if number else ""
+    own = Names(number)
+    robot, prefix = own.arm, own.arm if number else ""
 
-    def stream(names: Sequence[str], bound: float, read: Callable[[Arm], NDArray[np.float64]]) -> Stream:
-        return Stream(tuple(names), bound, lambda world: read(world.arms[number]))
+    def stream(
+        names: Sequence[str], bound: float, read: Callable[[Arm], NDArray[np.float64]], **further: Any
+    ) -> Stream:
+        return Stream(tuple(names), bound, lambda world: read(world.arms[number]), **further)
 
     def grid(pad: str) -> Stream:
         read = _tactile(pad)
@@ -95,11 +118,21 @@ def _arm_streams(number: int, hand: str) -> dict[str, Stream]:
 
     joints, force = [f"joint{i + 1}" for i in range(JOINTS)], ("force_x", "force_y", "force_z")
     found = {
-        f"{robot}eef_pos": stream(POSE["pos"], 3.0, lambda arm: arm.hand),
-        f"{robot}eef_quat": stream(POSE["quat"], 1.0, lambda arm: xyzw(arm.hand_rot)),
-        f"{robot}joint_pos": stream(joints, 7.0, lambda arm: arm.joint_pos),
-        f"{robot}joint_vel": stream(joints, 100.0, lambda arm: arm.joint_vel),
-        f"{robot}gripper_qpos": stream(("finger_joint1", "finger_joint2"), 0.1, lambda arm: arm.finger_pos),
+        f"{robot}eef_pos": stream(
+            POSE["pos"], 3.0, lambda arm: arm.hand, view=lambda w: w.data.site(own.grip_site).xpos
+        ),
+        f"{robot}eef_quat": stream(
+            POSE["quat"],
+            1.0,
+            lambda arm: xyzw(arm.hand_rot),
+            view=lambda w: w.data.site(own.grip_site).xmat,
+            convert=lambda rots: quats(rots.reshape(-1, 3, 3)),
+        ),
+        f"{robot}joint_pos": stream(joints, 7.0, lambda arm: arm.joint_pos, view=_positions(own.joints)),
+        f"{robot}joint_vel": stream(joints, 100.0, lambda arm: arm.joint_vel, view=_speeds(own.joints)),
+        f"{robot}gripper_qpos": stream(
+            ("finger_joint1", "finger_joint2"), 0.1, lambda arm: arm.finger_pos, view=_positions(own.finger_joints)
+        ),
         f"{prefix}force_torque": stream((*force, "torque_x", "torque_y", "torque_z"), 1e4, _wrench),
         f"{prefix}force_torque_world": stream(force, 1e4, _world_force),
         **{f"{robot}{name}": grid(pad) for name, pad in PADS.items()},

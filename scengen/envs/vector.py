@@ -84,8 +84,10 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._rows, self._next = first._rows, 0
         self._labels = False
         self._over: NDArray[np.bool_] | None = None
-        self._readings = {name: np.zeros((self.num_envs, *s.shape)) for name, s in first.streams.items()}
-        self._reads = [[(s.read, self._readings[name]) for name, s in env.streams.items()] for env in self.envs]
+        self._readings = {n: np.zeros((self.num_envs, *s.shape)) for n, s in first.streams.items() if s.view is None}
+        self._reads = [[(env.streams[name].read, read) for name, read in self._readings.items()] for env in self.envs]
+        self._viewed = {name: s.view for name, s in first.streams.items() if s.view is not None}
+        self._views = {name: [np.zeros(0)] * self.num_envs for name in self._viewed}
         size = (self.num_envs, first.observed.height, first.observed.width, 3)
         self._pictures = {name: np.zeros(size, np.uint8) for name in first.cameras}
         self._crew = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
@@ -200,6 +202,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         def load(slot: int) -> None:
             env = self.envs[slot]
             env._load(rows[slot])
+            for name, view in self._viewed.items():
+                self._views[name][slot] = view(env.world)
             infos[slot] = {**env._info("", False), **(env._labels() if self._labels else {})}
 
         self._each(load, list(rows))
@@ -233,7 +237,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
                 raise error
 
     def _read(self, slot: int) -> None:
-        """Read the observation of a slot."""
+        """Read what has to be computed of a slot's observation."""
         env = self.envs[slot]
         world = env.world
         for read, readings in self._reads[slot]:
@@ -242,11 +246,11 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             self._pictures[name][slot] = env._picture(camera)
 
     def _observed(self) -> dict[str, Reading]:
-        """The observations that were read last, as new arrays."""
-        streams = self.envs[0].streams
-        found: dict[str, Reading] = {
-            name: clipped(value, streams[name].bound) for name, value in self._readings.items()
-        }
+        """The observations after the last steps, as new arrays."""
+        found = dict[str, Reading]()
+        for name, stream in self.envs[0].streams.items():
+            values = np.array(self._views[name]) if stream.view else self._readings[name]
+            found[name] = clipped(stream.convert(values) if stream.convert else values, stream.bound)
         return {**found, **{name: value.copy() for name, value in self._pictures.items()}}
 
     def _gathered(

@@ -63,7 +63,9 @@ def _check(stored: StoredPolicy, env: PoolEnv) -> None:
     ]
     if tuple(entries) != own.entries:
         other = next((a for a, b in zip(entries, own.entries, strict=False) if a != b), "their number")
-        raise BadConfig(f"the policy was trained on other entries of its observations ({other}); train it again")
+        raise BadConfig(
+            f"the policy was trained on other entries of its observations ({other}); record its data again, and train it"
+        )
     if env.action_repeat != own.action_repeat:
         raise BadConfig(
             f"action_repeat = {env.action_repeat}; the policy acts {own.rate} times per second: {own.action_repeat}"
