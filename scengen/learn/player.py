@@ -64,7 +64,7 @@ def _check(stored: StoredPolicy, env: PoolEnv) -> None:
     if tuple(entries) != own.entries:
         other = next((a for a, b in zip(entries, own.entries, strict=False) if a != b), "their number")
         raise BadConfig(
-            f"the policy was trained on other entries of its observations ({other}); record its data again, and train it"
+            f"the policy was trained on other entries of its observations ({other}); record its data and train it again"
         )
     if env.action_repeat != own.action_repeat:
         raise BadConfig(
