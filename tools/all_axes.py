@@ -17,7 +17,7 @@ from scengen import cli, list_tasks, load_task, task_files
 from scengen.analysis.distance import Energy
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.ood.behaviour import HELD_OUT
-from scengen.ood.belief import beliefs
+from scengen.ood.belief import moves_hidden
 from scengen.samplers.task import Task
 from scengen.statistics import Rate
 from scengen.validate.certify import lower_bound
@@ -57,6 +57,7 @@ size. {verdicts}
   * **belief**: the oracle of the training twin plays in the OOD twin, with all its feedback, and believes all
     parameters that the axis moves to be as in training. **hidden belief**: it believes only the hidden ones, if the
     axis moves any. The control is that of the replay; a value that is constant in training is believed rightly there.
+    **nearest belief**: it sees the moved parameters, and takes each for the nearest value of training.
   * **learner**: of the policies trained on 200 demonstrations ([baselines](baselines.md)), the one that solves most of
     its 20 training scenarios, over all its trainings. Its excess is paired by twins, or marked *unpaired*. {predicted}
   *solved by motion memory* or *object-centric memory*: only vision can be tested there, if anything. In a task with a
@@ -178,7 +179,7 @@ def _row(
         physics = ", ".join(card["leaving"]) or "stays"
         replay_ends, oracle_ends, energy = *card["boundaries"].values(), str(Energy(**card["energy"]))
     missing = {name: NO_CARD for name in (*MOTION, *OBJECT_CENTRIC) if not card}
-    if "hidden_belief" not in beliefs(task, axis):
+    if not moves_hidden(task, axis):
         missing["hidden_belief"] = "nothing hidden"
     cells = [_baseline(found[name]) if name in found else NOT_MEASURED for name in BASELINES]
     cells = [missing.get(name, cell) for name, cell in zip(BASELINES, cells, strict=True)]

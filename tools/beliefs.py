@@ -3,7 +3,7 @@
     python tools/beliefs.py n=8 [workers=1] [TASK | TASK/AXIS ...]
 
 Axes that have a record with as many twins are left out, so that a repeated call continues; n=20 extends what n=8 has
-played. `fresh` plays all of them again, which is needed after a change of a family or its oracle. A twin takes 4 to 6
+played. `fresh` plays all of them again, which is needed after a change of a family or its oracle. A twin takes 5 to 7
 rollouts, about a second of processor time. `python tools/all_axes.py page` writes docs/axes.md from the records.
 """
 
@@ -60,7 +60,7 @@ def measure(task: Task, axis: str, n: int, workers: int, fresh: bool) -> str:
     source = source_sha256(task.family)
     folder = MADE / source[:12] / f"{task.name}-{axis}"
     if fresh:
-        (folder / "belief.jsonl").unlink(missing_ok=True)
+        (folder / "beliefs.jsonl").unlink(missing_ok=True)
     found = measure_belief(task, axis, folder, Trials(n, belief_n=n, workers=workers))
     store(BELIEFS, task, axis, {"n": n, "source": source, "baselines": [one.record for one in found]})
     counts = [f"{r['name']} {r['training']} -> {r['here']} of {r['twins']}" for r in (one.record for one in found)]

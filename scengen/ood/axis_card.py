@@ -15,9 +15,9 @@ from ..work.parallel import Workers
 from . import behaviour, boundary, features
 from .baseline import Baseline
 
-FORMAT = 2
+FORMAT = 3
 """Format of `card.json`. A card without a number is of format 1, which lacks the planners with beliefs of training and
-whose verdict names a memory alone."""
+whose verdict names a memory alone; one of format 2 lacks `nearest_belief`."""
 NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
 """Reason why a card has no boundaries if none were asked for."""
 

@@ -11,7 +11,7 @@ MOTION = ("replay", "any_replay")
 """Baselines of motion memory, from the weaker to the stronger: see `behaviour`."""
 OBJECT_CENTRIC = ("object_centric", "any_object_centric")
 """Baselines of object-centric memory, from the weaker to the stronger: see `behaviour`."""
-BELIEF = ("hidden_belief", "belief")
+BELIEF = ("hidden_belief", "belief", "nearest_belief")
 """Baselines of planners with beliefs from training: see `belief`."""
 LEARNERS = ("bc", "mip", "knn")
 """Trained policies, see `scengen.learn`."""

@@ -57,7 +57,7 @@ class Trials:
     any_n: int = 0
     """Number of twins that are also tried with all memories of the library: `2 * LIBRARY_SIZE` rollouts each."""
     belief_n: int = 0
-    """Number of twins that are also tried with the planners of `belief`: up to 6 rollouts each."""
+    """Number of twins that are also tried with the planners of `belief`: up to 7 rollouts each."""
     seed: int = 0
     """Seed of the draws."""
     workers: Workers = 1

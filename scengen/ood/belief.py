@@ -6,6 +6,10 @@ parameters are as in training:
 * `belief`: all parameters that the axis moves.
 * `hidden_belief`: those of them that are hidden (`param(hidden=True)`). An axis that moves none has no such planner.
 
+A third planner, `nearest_belief`, sees the moved parameters and knows no other values than those of training: it takes
+each for the nearest of them, as a function that saturates, or a choice from a vocabulary. Where the value lies in
+training, it is the oracle, so that it is never too weak.
+
 Where a memory repeats a motion, this planner makes a new one from wrong numbers. A loss says that the motion depends on
 the value of a moved parameter. It does not say that the value is hard to see: which values an oracle reads and which it
 knows is the choice of its author. The control is the training scenario with the axis' own parameters redrawn within
@@ -18,8 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import GaveUp, Infeasible
-from ..params import values, with_values
+from ..params import Value, values, with_values
 from ..samplers.split import ID
+from ..samplers.support import nearest
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..sim.world import World
@@ -41,12 +46,12 @@ def measure_belief(
     trials: Trials,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> list[Baseline]:
-    """Play the planners on the first twins of a split, continuing the run in `belief.jsonl` of the folder.
+    """Play the planners on the first twins of a split, continuing the run in `beliefs.jsonl` of the folder.
 
     Returns:
-        The baselines `hidden_belief` and `belief`, of which the former is not tried if the axis moves nothing hidden.
+        The baselines of `BELIEF`, of which `hidden_belief` is not tried if the axis moves nothing hidden.
     """
-    where, count = folder / "belief.jsonl", trials.belief_n
+    where, count = folder / "beliefs.jsonl", trials.belief_n
     work = partial(_play_twin, task, split, trials.seed)
     played = play_indices(work, task, split, where, count, trials, partial(progress, STEP))
     control = MOVED if varies(task, split) else CONSTANT
@@ -57,17 +62,38 @@ def measure_belief(
     return [Baseline.of(name, control, arms[name]) for name in BELIEF]
 
 
-def beliefs(task: Task, split: str) -> dict[str, frozenset[str]]:
-    """Parameters of which each planner believes that they are as in training."""
-    moved = frozenset(task.shifts(split))
-    hidden = frozenset(name for name in moved if task.known[name].hidden)
-    return {"hidden_belief": hidden, "belief": moved} if hidden else {"belief": moved}
+def moves_hidden(task: Task, split: str) -> bool:
+    """Whether an axis moves a hidden parameter."""
+    return bool(_hidden(task, split))
 
 
-def believer(scenario: Scenario, trained: Scenario, believed: frozenset[str]) -> Scenario:
-    """The scenario that a planner believes to be in."""
-    known = values(trained)
-    return with_values(scenario, {name: known[name] for name in believed})
+def _hidden(task: Task, split: str) -> set[str]:
+    return {name for name in task.shifts(split) if task.known[name].hidden}
+
+
+def believed(task: Task, split: str, scenario: Scenario, trained: Scenario) -> dict[str, Scenario]:
+    """The scenario in which each planner believes to be.
+
+    Args:
+        scenario: the scenario in which it is.
+        trained: the training twin.
+    """
+    known, seen = values(trained), values(scenario)
+    moved = set(task.shifts(split))
+    hidden = _hidden(task, split)
+    told: dict[str, dict[str, Value]] = {"hidden_belief": {name: known[name] for name in hidden}} if hidden else {}
+    told["belief"] = {name: known[name] for name in moved}
+    told["nearest_belief"] = {name: _nearest(task, name, seen[name]) for name in moved}
+    return {name: with_values(scenario, wrong) for name, wrong in told.items()}
+
+
+def _nearest(task: Task, name: str, value: Value) -> Value:
+    """The value of training that is nearest to a value of a parameter."""
+    parameter = task.known[name]
+    found = nearest(task.training[name].support, value, parameter.period)
+    if parameter.period and not parameter.low <= found <= parameter.high:
+        found = parameter.low + (found - parameter.low) % parameter.period
+    return round(found) if parameter.integer else found
 
 
 def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
@@ -81,18 +107,17 @@ def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     if control is None or not (solves(task, here) and solves(task, control)):
         return record
     for arm, scenario in (("control", control), ("here", here)):
-        believed = beliefs(task, split)
-        why = {known: _play(task, scenario, trained, known) for known in set(believed.values())}
-        told = {name: why[known] for name, known in believed.items()}
+        planners = believed(task, split, scenario, trained)
+        why = {planner: _play(task, scenario, planner) for planner in set(planners.values())}  # some agree
+        told = {name: why[planner] for name, planner in planners.items()}
         record[arm] = {name: reason is None for name, reason in told.items()}
         if arm == "here":
             record["reasons"] = {name: reason for name, reason in told.items() if reason}
     return record
 
 
-def _play(task: Task, scenario: Scenario, trained: Scenario, believed: frozenset[str]) -> str | None:
+def _play(task: Task, scenario: Scenario, planner: Scenario) -> str | None:
     """Why a planner fails in a scenario; None if it solves it."""
-    planner = believer(scenario, trained, believed)
     if planner == scenario:
         return None  # its beliefs are right, so it is the oracle, which has solved the scenario
     rollout = run(

@@ -70,7 +70,7 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     assert card["funnel"]["certified"] == 2 and card["oracle"]["scenarios"] == 1
     assert [r["finding"] for r in card["baselines"]][1:4:2] == ["not tried", "not tried"]
     assert card["reasons"]["feasible: the chain leaves the table"] == card["funnel"]["proposed"] - 2
-    assert [r["name"] for r in card["baselines"]][-2:] == ["hidden_belief", "belief"]
+    assert [r["name"] for r in card["baselines"]][-3:] == ["hidden_belief", "belief", "nearest_belief"]
     assert card["boundaries"]["replay"]["trials"] == 4 and card["energy"]["distance"] > 1
     page = (tmp_path / "card.html").read_text()
     assert card["verdict"] in page and 'src="http' not in page and "<script" not in page
