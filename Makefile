@@ -145,11 +145,11 @@ drift: setup
 	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
 
 # Trains and evaluates small policies and writes docs/baselines.md (about half an hour of processor time for each task). TASKS=packing
-# selects tasks, TASKS="axes=all packing" evaluates on all their axes. An interrupted call is continued.
+# selects tasks. An interrupted call is continued.
 baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
 
-# Trains with three seeds on 25 to 200 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
+# Trains with three seeds on 25 to 100 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
 # ones (a quarter of an hour for each task), and with the wrench (mass_sort), for docs/baselines.md. WORKERS=4 trains at once.
 WORKERS ?= 1
 curves: setup

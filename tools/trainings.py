@@ -2,7 +2,7 @@
 
     python tools/trainings.py curves|styles|curation|wrench [workers=N] [TASK ...]
 
-* `curves`: the first 25, 50, 100 and 200 demonstrations.
+* `curves`: the first 25, 50 and 100 demonstrations; tools/baselines.py trains on all 200.
 * `styles`: 200 nominal demonstrations, and 200 varied and recovering ones.
 * `curation`: a recording of which every third episode is spoiled, what `scengen curate` keeps of it, and as many of its
   episodes at random.
@@ -39,18 +39,36 @@ from scengen.envs.object_state import NAME
 from scengen.envs.observations import proprioception
 from scengen.learn.data import KEPT
 from scengen.learn.models import BC, KNN, MIP
+from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
 
+AXES = {
+    "domino_single": ("diagonal", "stout_starter"),
+    "mirror_pick_place": ("small", "far"),
+    "linear_intercept": ("fast", "large_ball"),
+    "pendulum_grasp": ("plane_45", "off_centre"),
+    "edge_slide": ("heavy_strip", "thin"),
+    "tool_retrieve": ("mirrored_hook", "long_handle"),
+    "pick_place_ycb": ("far_jumps", "unseen_item"),
+    "slip_recovery": ("two_slips", "long_window"),
+    "balance_medium": ("off_centre", "narrow_ridge"),
+    "cube_toss": ("farther", "small_tray"),
+    "domino_select": ("diagonal", "longer"),
+    "bounce_intercept": ("fast", "dead_walls"),
+    "mass_sort": ("reversed", "close_masses"),
+}
+"""Axes on which the policies of a task are evaluated."""
 TASKS: dict[Question, tuple[str, ...]] = {
-    "curves": tuple(baselines.AXES),
+    "curves": baselines.TASKS,
     "styles": ("tool_retrieve", "edge_slide", "balance_medium"),
     "curation": ("tool_retrieve", "edge_slide", "balance_medium"),
     "wrench": ("mass_sort",),
 }
 """Tasks that are measured by default. Styles and curation can only show where not everything is solved anyway."""
 EPOCHS = 20
-"""Number of epochs of each training, a third of the default: data are compared with one another, many times."""
-SIZES = (25, 50, 100, 200)
+"""Number of epochs of each training except those of the learning curves, a third of the default: data are compared with
+one another, many times."""
+SIZES = (25, 50, 100)
 """Numbers of demonstrations of a learning curve, held-out ones included."""
 SEEDS = {BC: (0, 1, 2), MIP: (0, 1, 2), KNN: (0,)}
 """Seeds of the trainings of a policy; nearest neighbours have none."""
@@ -94,6 +112,11 @@ class Training:
     seed: int
 
     @property
+    def epochs(self) -> int:
+        """Number of epochs."""
+        return TrainSettings().epochs if self.data == MIXED else EPOCHS
+
+    @property
     def folder(self) -> Path:
         """Folder of the policy."""
         name = self.data.replace(" ", "_")
@@ -107,8 +130,8 @@ def main(*arguments: str) -> None:
     if question is None:
         sys.exit(f"give a question: {', '.join(get_args(Question))}")
     tasks, workers = names[1:] or TASKS[question], int(settings.get("workers", 1))
-    if unknown := {*tasks} - {*baselines.AXES}:
-        sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(baselines.AXES)}")
+    if unknown := {*tasks} - {*AXES}:
+        sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(AXES)}")
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
         list(executor.map(pools, tasks))
         list(executor.map(prepare, *zip(*product(tasks, BASES[question]), strict=True)))
@@ -138,14 +161,14 @@ def _of_task(question: Question, task: str) -> Iterator[Training]:
 
 def records(task: str) -> list[dict[str, Any]]:
     """The records of a task that were made as they would be now: with these pools, and as long."""
-    made = _made(task)
-    return [one for one in axis_records.lines(_path(task)) if {name: one[name] for name in made} == made]
+    hashes = _hashes(task)
+    known = axis_records.lines(_path(task))
+    return [one for one in known if (one["epochs"], one["pools_sha256"]) == (identity(one).epochs, hashes)]
 
 
-def _made(task: str) -> dict[str, Any]:
-    """What a record says of how it was made."""
-    hashes = {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
-    return {"epochs": EPOCHS, "pools_sha256": hashes}
+def _hashes(task: str) -> dict[str, str]:
+    """Hashes of the pools of a task, by split."""
+    return {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
 
 
 def identity(record: dict[str, Any]) -> Training:
@@ -168,7 +191,7 @@ def _path(task: str) -> Path:
 
 def pools(task: str) -> dict[str, Path]:
     """Make the pools of a task on which policies are evaluated, if they are missing. Returns them by split."""
-    return baselines.make_pools(task, baselines.AXES[task])
+    return baselines.make_pools(task, AXES[task])
 
 
 def train(training: Training) -> dict[str, Any]:
@@ -176,7 +199,7 @@ def train(training: Training) -> dict[str, Any]:
     data = _recordings(training.task)[training.data]
     to = training.folder
     settings = [f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}"]
-    settings.append(f"epochs={EPOCHS}")
+    settings.append(f"epochs={training.epochs}")
     if training.size is not None:
         settings.append(f"demonstrations={training.size}")
     if training.data == FELT:
@@ -190,7 +213,8 @@ def train(training: Training) -> dict[str, Any]:
         for split, episodes in baselines.episodes(to / "evaluation", evaluated).items()
     }
     solved = {split: sum(own) for split, own in outcomes.items()}
-    return {**asdict(training), "solved": solved, "outcomes": outcomes, **_made(training.task)}
+    made = {"epochs": training.epochs, "pools_sha256": _hashes(training.task)}
+    return {**asdict(training), "solved": solved, "outcomes": outcomes, **made}
 
 
 # --- sets of demonstrations ---------------------------------------------------------------
