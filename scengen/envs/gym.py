@@ -20,7 +20,7 @@ from .. import compose, task_files
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
-from ..errors import BadConfig, UnknownName, cut
+from ..errors import BadConfig, UnknownName, Unstable, cut
 from ..orientation import Orientation
 from ..params import Value
 from ..pictures.opengl import check_size
@@ -353,25 +353,38 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
     def _play(self, given: NDArray[np.float32]) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Take a step with a valid action, clipped unless there is a filter.
-
-        Returns:
-            Reward, whether the episode terminates, whether it is truncated, and the info.
-        """
+        """Take a step with a valid action, clipped unless there is a filter. Returns what `_told` does."""
         outcome = None
         for _ in range(self.action_repeat):
             outcome = outcome or self._advance(given)
+        return self._told(outcome)
+
+    def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
+        self._simulate(action)
+        return self._episode.judge()
+
+    def _simulate(self, action: NDArray[np.float32]) -> None:
+        """Simulate a control period, which the episode has to judge afterwards."""
+        sent = self.world.filter(action).astype(np.float32) if self.action_filter else action
+        self._played.append(sent)
+        self._episode.begin()
+        try:
+            self.world.apply(sent)
+        except Unstable as error:
+            self._episode.outcome, self._episode.reason = "unstable", str(error)
+
+    def _told(self, outcome: Outcome | None) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Reward, whether the episode terminates, whether it is truncated, and the info.
+
+        Args:
+            outcome: outcome of the step; a reached goal is settled first, if it has to be.
+        """
         reason = self._episode.reason
         terminated, truncated = outcome in ("success", "failure", "unstable"), outcome == "timeout"
         if outcome == "success" and self.settle:
             outcome, reason = self._settled()
         success = outcome == "success"
         return float(success), terminated, truncated, self._info(reason, success)
-
-    def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
-        sent = self.world.filter(action) if self.action_filter else action
-        self._played.append(sent.astype(np.float32))
-        return self._episode.step(sent)
 
     def _settled(self) -> tuple[Outcome, str]:
         """Outcome and reason after the robot has been idle for the certificate's settling time."""

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from ..control.teleop import unfiltered
+from ..episode import Outcome
 from ..errors import BadConfig, UnknownName
 from ..pool import PoolRow
 from ..work.machine import cores
@@ -131,8 +132,16 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
         infos: dict[int, dict[str, Any]] = {}
 
-        def play(slot: int) -> None:
-            rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._play(given[slot])
+        def play(slots: Sequence[int]) -> None:
+            outcomes = dict[int, Outcome | None].fromkeys(slots)
+            for _ in range(self.envs[0].action_repeat):
+                going = [slot for slot in slots if outcomes[slot] is None]
+                for slot in going:
+                    self.envs[slot]._simulate(given[slot])
+                for slot in going:
+                    outcomes[slot] = self.envs[slot]._episode.judge()
+            for slot, outcome in outcomes.items():
+                rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._told(outcome)
 
         self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh])
         infos |= self._begin(fresh)
@@ -199,31 +208,31 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         """Begin episodes in some slots, and return their infos."""
         infos: dict[int, dict[str, Any]] = {}
 
-        def load(slot: int) -> None:
-            env = self.envs[slot]
-            env._load(rows[slot])
-            for name, view in self._viewed.items():
-                self._views[name][slot] = view(env.world)
-            infos[slot] = {**env._info("", False), **(env._labels() if self._labels else {})}
+        def load(slots: Sequence[int]) -> None:
+            for slot in slots:
+                env = self.envs[slot]
+                env._load(rows[slot])
+                for name, view in self._viewed.items():
+                    self._views[name][slot] = view(env.world)
+                infos[slot] = {**env._info("", False), **(env._labels() if self._labels else {})}
 
         self._each(load, list(rows))
         return infos
 
     # --- work of the threads --------------------------------------------------------------
 
-    def _each(self, work: Callable[[int], None], slots: Sequence[int]) -> None:
-        """Do some work for each of some slots and read its observation, in all threads.
+    def _each(self, work: Callable[[Sequence[int]], None], slots: Sequence[int]) -> None:
+        """Do some work for some slots and read their observations, in all threads.
 
-        A thread takes a few slots at a time and reads them together: the interpreter's code stays in the cache, which
-        the simulation of each slot empties. An error is raised when all threads have stopped.
+        A thread takes a few slots at a time, and judges and reads them together: the interpreter's code stays in the
+        cache, which the simulation of each slot empties. An error is raised when all threads have stopped.
         """
         size = max(1, min(MAX_TAKEN, len(slots) // self.threads))
         queue = iter([slots[start : start + size] for start in range(0, len(slots), size)])  # threads may share it
 
         def drain() -> None:
             for some in queue:
-                for slot in some:
-                    work(slot)
+                work(some)
                 for slot in some:
                     self._read(slot)
 
