@@ -50,8 +50,8 @@ RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
 RESET_OPTIONS = ("scenario", "labels")
 """Names of the options of `reset`."""
-INFOS: Mapping[str, type] = {"success": bool, "is_success": bool, "reason": object, "time": float}
-"""Entries of `info` without labels, and their types in an array."""
+INFOS = ("success", "is_success", "reason", "time")
+"""Entries of `info` without labels."""
 MAX_ACTION_REPEAT = 100
 """Largest `action_repeat` [control periods]: one second. With longer repeats the arm is hardly controlled."""
 
