@@ -7,11 +7,16 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from helpers import REFERENCE, pictures_are_possible
 
 import scengen.envs.gym
+from scengen import load_task
 from scengen.envs.gym import PoolEnv
+from scengen.envs.observations import proprioception, streams_of
 from scengen.envs.vector import PoolVectorEnv
-from scengen.errors import BadConfig, UnknownName
+from scengen.errors import BadConfig, UnknownName, Unstable
 from scengen.pool import Pool
+from scengen.samplers.split import ID
+from scengen.sim.world import World
 from scengen.tasks.domino_single import DominoSingle
+from scengen.validate.rebuilt import world_of
 
 STREAMS = ["robot0_eef_pos", "robot0_joint_vel", "force_torque", "robot0_tactile_left", "object-state"]
 STEPS = 40
@@ -40,6 +45,23 @@ def played(threads, mode, slots=3):
             ids[slot].append(infos["scenario"][slot])
     envs.close()
     return trace, ids
+
+
+@pytest.mark.parametrize("task", ["plate_shelf_hobi", "plate_shelf_hetbi"])
+def test_what_many_simulations_hold_is_what_is_read_of_each(task):
+    """Both hands, and no jaw in place of a suction cup; `eef_quat` is converted, the rest is copied."""
+    known = load_task(task)
+    world = world_of(known.draw(ID, 0, 0).scenario, known.embodiment)
+    for wiggle in (0.5, -0.5):
+        for _ in range(20):
+            world.apply(np.full(14, wiggle, np.float32))
+        for stream in (streams := streams_of(known.embodiment)).values():
+            if stream.view:
+                held = np.array([stream.view(world)] * 2)
+                told = stream.convert(held) if stream.convert else held
+                assert [row.tobytes() for row in told] == [stream.read(world).tobytes()] * 2
+    viewed = {name for name, stream in streams.items() if stream.view}
+    assert viewed == set(proprioception(known.embodiment))
 
 
 @pytest.mark.usefixtures("brief")
@@ -162,6 +184,20 @@ def test_bad_actions_and_seeds_are_refused_before_anything_is_simulated():
     assert envs.get_attr("world")[0].time == 0.0
     with pytest.raises(BadConfig, match="3 seeds for 2 slots"):
         envs.reset(seed=[1, 2, 3])
+
+
+def test_a_simulation_that_becomes_unstable_ends_its_episode(monkeypatch):
+    def unstable(world, sent):
+        raise Unstable("MuJoCo raised a warning")
+
+    envs, env = PoolVectorEnv("domino_single", REFERENCE, 2), PoolEnv("domino_single", REFERENCE)
+    envs.reset(seed=0), env.reset(seed=0)
+    monkeypatch.setattr(World, "apply", unstable)
+    *_, terminated, truncated, infos = envs.step(np.zeros((2, 7)))
+    assert terminated.all() and not truncated.any() and not infos["success"].any()
+    assert [*infos["reason"]] == ["MuJoCo raised a warning"] * 2
+    *_, terminated, truncated, info = env.step(np.zeros(7))
+    assert terminated and not truncated and info["reason"] == "MuJoCo raised a warning"
 
 
 def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):

@@ -36,7 +36,10 @@ def test_hidden_beliefs_are_those_about_hidden_parameters_alone():
 
 
 def test_the_nearest_belief_is_the_end_of_training_on_the_side_of_the_axis():
-    thickness, height = {"starter.thickness": 0.014}, {"starter.height": 0.08}  # the nominal height, constant in training
+    thickness, height = (
+        {"starter.thickness": 0.014},
+        {"starter.height": 0.08},
+    )  # the nominal height, constant in training
     _, here, planners = believed(TASK, "squat_starter")
     assert planners["nearest_belief"] == with_values(here, thickness | height)
 
