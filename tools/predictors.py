@@ -24,7 +24,7 @@ MIN_AXES = 60
 width of 0.2, so that a good predictor can be told from a useless one."""
 MIN_TRAINING = 0.5
 """Smallest share of the training scenarios that a learner has to solve for its losses to count. `domino_select` is a
-choice of five, and its learners solve 5 and 7 of 20 scenarios: they tip a chain, and cannot lose what is chance."""
+choice of five, and its learners solve 4 to 6 of 20 scenarios: they tip a chain, and cannot lose what is chance."""
 DISTANCE = "distance of features"
 """Predictor: energy distance between the features in and out of distribution [training ranges]."""
 PREDICTORS = (*MOTION, *OBJECT_CENTRIC, *BELIEF, DISTANCE)
