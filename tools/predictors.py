@@ -124,7 +124,7 @@ def page() -> str:
         if found.correlation is not None:
             told = "{:+.2f} [{:+.2f}, {:+.2f}]".format(found.correlation, *found.interval)
         auc = "not defined" if found.auc is None else f"{found.auc:.2f}"
-        rows.append((name.replace("_", " "), str(found.axes), told, auc))
+        rows.append((_spelled(name), str(found.axes), told, auc))
     lines = [f"| {' | '.join(row)} |" for row in rows]
     tried = [
         f"| {one.task} | {one.axis} | {one.learner.name} | {one.drop:+.2f} | {one.learner.finding} |"
@@ -170,7 +170,7 @@ def sentence() -> str:
     """Which predictor is the best, in words."""
     name, tried = best(), len(_trials())
     if name:
-        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {name}."
+        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {_spelled(name)}."
     return (
         f"Which baseline predicts the learner is not decided: {tried} axes were tried with a learner, and it takes "
         f"{MIN_AXES} ([figures](predictors.md))."
@@ -182,7 +182,12 @@ def cell(found: Mapping[str, Baseline]) -> str:
     name = best()
     if name is None:
         return "not measured"
-    return f"not measured; {name} predicts: {found[name].finding if name in found else 'not measured'}"
+    return f"not measured; {_spelled(name)} predicts: {found[name].finding if name in found else 'not measured'}"
+
+
+def _spelled(name: str) -> str:
+    """Name of a predictor in words."""
+    return name.replace("_", " ")
 
 
 @cache
