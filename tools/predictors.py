@@ -170,7 +170,8 @@ def sentence() -> str:
     """Which predictor is the best, in words."""
     name, tried = best(), len(_trials())
     if name:
-        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {_spelled(name)}."
+        told = _spelled(name)
+        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {told}."
     return (
         f"Which baseline predicts the learner is not decided: {tried} axes were tried with a learner, and it takes "
         f"{MIN_AXES} ([figures](predictors.md))."
