@@ -57,7 +57,8 @@ size. {verdicts}
   * **belief**: the oracle of the training twin plays in the OOD twin, with all its feedback, and believes all
     parameters that the axis moves to be as in training. **hidden belief**: it believes only the hidden ones, if the
     axis moves any. The control is that of the replay; a value that is constant in training is believed rightly there.
-    **nearest belief**: it sees the moved parameters, and takes each for the nearest value of training.
+    **nearest belief**: it sees the moved parameters, and takes each for the nearest value of training, and an unseen
+    word for one of training.
   * **learner**: of the policies trained on 200 demonstrations ([baselines](baselines.md)), the one that solves most of
     its 20 training scenarios, over all its trainings. Its excess is paired by twins, or marked *unpaired*. {predicted}
   *solved by motion memory* or *object-centric memory*: only vision can be tested there, if anything. In a task with a
