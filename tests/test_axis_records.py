@@ -107,14 +107,16 @@ def trial(k, broken):
 
 
 def test_the_best_predictor_orders_axes_as_the_learner_does_and_few_axes_decide_nothing(monkeypatch):
-    for count, best in ((predictors.MIN_AXES, "belief"), (predictors.MIN_AXES - 1, None)):
+    for count, best in ((predictors.MIN_AXES, ["belief"]), (predictors.MIN_AXES - 1, [])):
         monkeypatch.setattr(predictors, "_trials", lambda n=count: [trial(k, k >= n // 2) for k in range(n)])
-        predictors.best.cache_clear()
-        assert predictors.best() == best
+        predictors.ranking.cache_clear()
+        assert predictors.ranking()[:1] == best
         assert predictors.score("belief").auc == 1.0 and predictors.score("belief").correlation > 0.8
         assert predictors.score("replay").correlation is None, "the same everywhere"
-        assert ("not decided" in predictors.sentence()) == (best is None)
-    predictors.best.cache_clear()
+        assert ("not decided" in predictors.sentence()) == (not best)
+        assert predictors.cell({"belief": LEARNERS[True]}).endswith("belief predicts: breaks") == bool(best)
+        assert predictors.cell({"nearest_belief": LEARNERS[True]}) == "not measured", "not known on enough axes"
+    predictors.ranking.cache_clear()
 
 
 def test_the_interval_of_a_rank_correlation_is_that_of_bonett_and_wright():

@@ -27,6 +27,8 @@ MIN_TRAINING = 0.5
 choice of five, and its learners solve 4 to 6 of 20 scenarios: they tip a chain, and cannot lose what is chance."""
 DISTANCE = "distance of features"
 """Predictor: energy distance between the features in and out of distribution [training ranges]."""
+TELLING = ("breaks", "holds")
+"""Findings that tell something."""
 PREDICTORS = (*MOTION, *OBJECT_CENTRIC, *BELIEF, DISTANCE)
 """What is compared."""
 EXCEPTIONS = {
@@ -86,7 +88,7 @@ predicts the learner.
 * **AUC**: probability that the predictor's loss is larger on an axis that breaks the learner than on one that does not;
   0.5 is chance.
 * The best predictor is that with the highest rank correlation over at least {MIN_AXES} axes. [Every split,
-  measured](axes.md) shows what it says of axes that no learner has tried.
+  measured](axes.md) shows what it says of axes that no learner has tried, or the next best one where it was not tried.
 
 """
 
@@ -168,22 +170,19 @@ def _exceptions() -> list[str]:
 
 def sentence() -> str:
     """Which predictor is the best, in words."""
-    name, tried = best(), len(_trials())
-    if name:
-        told = _spelled(name)
-        return f"On axes that no learner has tried, the best predictor ([figures](predictors.md)) stands in: {told}."
-    return (
-        f"Which baseline predicts the learner is not decided: {tried} axes were tried with a learner, and it takes "
-        f"{MIN_AXES} ([figures](predictors.md))."
-    )
+    told = ", otherwise ".join(map(_spelled, ranking()))
+    if told:
+        return f"Where no learner was tried, the best predictor that was ([figures](predictors.md)) stands in: {told}."
+    tried = f"it takes {MIN_AXES} axes, and {len(_trials())} were tried ([figures](predictors.md))"
+    return f"Which baseline predicts the learner is not decided: {tried}."
 
 
 def cell(found: Mapping[str, Baseline]) -> str:
     """What is told of an axis that no learner has tried."""
-    name = best()
-    if name is None:
-        return "not measured"
-    return f"not measured; {_spelled(name)} predicts: {found[name].finding if name in found else 'not measured'}"
+    for name in ranking():
+        if name in found and found[name].finding in TELLING:
+            return f"not measured; {_spelled(name)} predicts: {found[name].finding}"
+    return "not measured"
 
 
 def _spelled(name: str) -> str:
@@ -192,11 +191,11 @@ def _spelled(name: str) -> str:
 
 
 @cache
-def best() -> str | None:
-    """The best predictor that is a baseline; None as long as too few axes are known."""
+def ranking() -> list[str]:
+    """The predictors that are baselines and known on enough axes, the best one first."""
     known = {name: score(name) for name in PREDICTORS if name != DISTANCE}
     enough = {name: one.correlation for name, one in known.items() if one.axes >= MIN_AXES and one.correlation}
-    return max(enough, key=lambda name: enough[name], default=None)
+    return sorted(enough, key=lambda name: -enough[name])
 
 
 def score(name: str) -> Score:
