@@ -10,7 +10,7 @@ A third planner, `nearest_belief`, sees the moved parameters and knows no other 
 each for the nearest of them, as a function that saturates, or a choice from a vocabulary. Where the value lies in
 training, it is the oracle, so that it is never too weak.
 
-Where a memory repeats a motion, this planner makes a new one from wrong numbers. A loss says that the motion depends on
+Where a memory repeats a motion, a planner makes a new one from wrong numbers. A loss says that the motion depends on
 the value of a moved parameter. It does not say that the value is hard to see: which values an oracle reads and which it
 knows is the choice of its author. The control is the training scenario with the axis' own parameters redrawn within
 training, and the same wrong numbers. A parameter that is constant in training is believed rightly there.
@@ -24,7 +24,7 @@ from typing import Any
 from ..errors import GaveUp, Infeasible
 from ..params import Value, values, with_values
 from ..samplers.split import ID
-from ..samplers.support import nearest
+from ..samplers.support import nearest, wrapped
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
 from ..sim.world import World
@@ -91,8 +91,7 @@ def _nearest(task: Task, name: str, value: Value) -> Value:
     """The value of training that is nearest to a value of a parameter."""
     parameter = task.known[name]
     found = nearest(task.training[name].support, value, parameter.period)
-    if parameter.period and not parameter.low <= found <= parameter.high:
-        found = parameter.low + (found - parameter.low) % parameter.period
+    found = wrapped(found, parameter.low, parameter.high, parameter.period)
     return round(found) if parameter.integer else found
 
 

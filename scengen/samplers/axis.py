@@ -8,7 +8,7 @@ from ..errors import BadConfig
 from ..params import Parameter, Value
 from ..symmetry import Symmetry, images
 from .dists import Choice, Dist, Fixed, Integer
-from .support import Interval, Support, distance, meet, nearest, turned, width
+from .support import Interval, Support, distance, meet, nearest, turned, width, wrapped
 
 
 @dataclass(frozen=True)
@@ -151,12 +151,7 @@ class Axis:
         far = max(ends, key=lambda v: abs(nearest(training, v, period) - v))
         edge = nearest(training, far, period)
         far = self.limits.get(parameter.name, far)
-        value = edge + fraction * (far - edge)
-        if period:
-            while value < parameter.low:
-                value += period
-            while value > parameter.high:
-                value -= period
+        value = wrapped(edge + fraction * (far - edge), parameter.low, parameter.high, period)
         if not parameter.integer:
             return value
         if abs(value - round(value)) > 1e-9:

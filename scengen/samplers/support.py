@@ -78,6 +78,16 @@ def nearest(support: Support, value: float, period: float | None = None) -> floa
     return min(found, key=lambda v: abs(v - value))
 
 
+def wrapped(value: float, low: float, high: float, period: float | None) -> float:
+    """The value, shifted by whole periods into the range from `low` to `high`; unchanged without a period."""
+    if period:
+        while value < low:
+            value += period
+        while value > high:
+            value -= period
+    return value
+
+
 def width(support: Support) -> float:
     """Length from the lowest to the highest value."""
     return max(i.high for i in support) - min(i.low for i in support)
