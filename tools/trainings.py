@@ -65,9 +65,6 @@ TASKS: dict[Question, tuple[str, ...]] = {
     "wrench": ("mass_sort",),
 }
 """Tasks that are measured by default. Styles and curation can only show where not everything is solved anyway."""
-EPOCHS = 20
-"""Number of epochs of each training except those of the learning curves, a third of the default: data are compared with
-one another, many times."""
 SIZES = (25, 50, 100)
 """Numbers of demonstrations of a learning curve, held-out ones included."""
 SEEDS = {BC: (0, 1, 2), MIP: (0, 1, 2), KNN: (0,)}
@@ -110,11 +107,6 @@ class Training:
     size: int | None
     """Number of demonstrations, the first ones; None: all of the set."""
     seed: int
-
-    @property
-    def epochs(self) -> int:
-        """Number of epochs."""
-        return TrainSettings().epochs if self.data == MIXED else EPOCHS
 
     @property
     def folder(self) -> Path:
@@ -160,15 +152,15 @@ def _of_task(question: Question, task: str) -> Iterator[Training]:
 
 
 def records(task: str) -> list[dict[str, Any]]:
-    """The records of a task that were made as they would be now: with these pools, and as long."""
-    hashes = _hashes(task)
-    known = axis_records.lines(_path(task))
-    return [one for one in known if (one["epochs"], one["pools_sha256"]) == (identity(one).epochs, hashes)]
+    """The records of a task that were made as they would be now."""
+    made = _made(task)
+    return [one for one in axis_records.lines(_path(task)) if made.items() <= one.items()]
 
 
-def _hashes(task: str) -> dict[str, str]:
-    """Hashes of the pools of a task, by split."""
-    return {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
+def _made(task: str) -> dict[str, Any]:
+    """How trainings of a task are made: the number of epochs, and the hashes of the pools by split."""
+    hashes = {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
+    return {"epochs": TrainSettings().epochs, "pools_sha256": hashes}
 
 
 def identity(record: dict[str, Any]) -> Training:
@@ -199,7 +191,6 @@ def train(training: Training) -> dict[str, Any]:
     data = _recordings(training.task)[training.data]
     to = training.folder
     settings = [f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}"]
-    settings.append(f"epochs={training.epochs}")
     if training.size is not None:
         settings.append(f"demonstrations={training.size}")
     if training.data == FELT:
@@ -213,8 +204,7 @@ def train(training: Training) -> dict[str, Any]:
         for split, episodes in baselines.episodes(to / "evaluation", evaluated).items()
     }
     solved = {split: sum(own) for split, own in outcomes.items()}
-    made = {"epochs": training.epochs, "pools_sha256": _hashes(training.task)}
-    return {**asdict(training), "solved": solved, "outcomes": outcomes, **made}
+    return {**asdict(training), "solved": solved, "outcomes": outcomes, **_made(training.task)}
 
 
 # --- sets of demonstrations ---------------------------------------------------------------

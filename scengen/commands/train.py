@@ -64,9 +64,9 @@ def _table(trained: Trained) -> Table:
         ("demonstrations", f"{own.demonstrations}, and {trained.held_out} held out"),
         ("rows", f"{own.rows}, {own.rate} per second"),
         ("inputs", f"{own.inputs} of {own.steps} observations of {', '.join(own.streams)}"),
-        ("actions", f"{own.chunk} in a chunk, {own.played} played"),
+        ("goals", f"{own.chunk} in a chunk, {own.played} played"),
         ("epochs", f"{own.epochs}, {trained.seconds:.0f} s of processor time"),
-        ("error of the actions [variances]", f"{learned:.4f}, held out {held_out:.4f}"),
+        ("error of the goals [variances]", f"{learned:.4f}, held out {held_out:.4f}"),
         ("weights", own.weights_sha256),
     ):
         table.add_row(what, told)

@@ -149,7 +149,7 @@ def completed(settings: EvaluateSettings) -> EvaluateSettings:
         return settings
     own = read_settings(settings.name)
     repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
-    return replace(settings, observations=settings.observations or list(own.streams), action_repeat=repeat)
+    return replace(settings, observations=settings.observations or list(own.observed), action_repeat=repeat)
 
 
 def _folder_name(policy: str) -> str:

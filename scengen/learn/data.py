@@ -1,7 +1,7 @@
 """Demonstrations for training: the observations and actions of each episode of a recording, at its own rate."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import Loop
+from ..control.loop import ACTION, Loop
 from ..envs.object_state import NAME
 from ..envs.observations import proprioception
 from ..errors import BadConfig, PoolError, UnknownName, cut
 from ..export.dataset import EpisodeData, Recording
 from ..export.streams import ENVIRONMENT
 from ..pool.files import read_json_file, sha256, sha256_of_file
+from .goals import pose_streams
 
 KEPT = Path("curation", "kept.json")
 """File in which `scengen curate` lists the episodes that are kept."""
@@ -31,6 +32,8 @@ class Trajectory:
     """Id of its scenario."""
     observations: NDArray[np.float32]
     """Observed entries, shape (rows, entries)."""
+    hands: NDArray[np.float32]
+    """Poses of the hands: positions [m] and quaternions xyzw, shape (rows, 7 * arms)."""
     actions: NDArray[np.float32]
     """Action that is held until the next row, shape (rows, 7 * arms)."""
 
@@ -76,7 +79,7 @@ class TrainingData:
             raise BadConfig(f"{folder} holds demonstrations of {' and '.join(tasks)}; record one task alone")
         robot = str(recording.info["robot_type"])
         streams = tuple(observations or (*proprioception(robot), NAME))
-        columns = _columns(recording, streams)
+        columns, hands = _columns(recording, streams), tuple(_columns(recording, pose_streams(robot)))
         kept = _kept(recording)
         found, left_out = [], {"failed": 0, "not kept by the curation": 0}
         for episode in recording.read():
@@ -85,7 +88,7 @@ class TrainingData:
             elif kept is not None and episode.number not in kept:
                 left_out["not kept by the curation"] += 1
             else:
-                found.append(_trajectory(recording, episode, columns))
+                found.append(_trajectory(recording, episode, columns, hands))
         if len(found) < MIN_EPISODES:
             told = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
             raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({told}); at least {MIN_EPISODES}")
@@ -137,13 +140,19 @@ def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[st
     return found
 
 
-def _trajectory(recording: Recording, episode: EpisodeData, columns: Mapping[str, Sequence[str]]) -> Trajectory:
-    rows = len(episode)
-    seen = np.concatenate([episode.columns[name].reshape(rows, -1) for name in columns], axis=1, dtype=np.float32)
-    actions = np.asarray(episode.columns["action"], np.float32)
-    if not (np.isfinite(seen).all() and np.isfinite(actions).all()):
+def _trajectory(recording: Recording, episode: EpisodeData, columns: Iterable[str], hands: Iterable[str]) -> Trajectory:
+    seen, poses, actions = (_values(episode, names) for names in (columns, hands, ("action",)))
+    if not (np.isfinite(seen).all() and np.isfinite(poses).all() and np.isfinite(actions).all()):
         raise PoolError(f"{recording.folder}: episode {episode.number} has numbers that are not finite; see curate")
-    return Trajectory(str(episode.about["scengen/id"]), seen, actions)
+    if poses.shape != actions.shape or not poses.reshape(-1, ACTION)[:, 3:].any(axis=1).all():
+        raise PoolError(f"{recording.folder}: episode {episode.number} has no pose of a hand for each action")
+    return Trajectory(str(episode.about["scengen/id"]), seen, poses, actions)
+
+
+def _values(episode: EpisodeData, columns: Iterable[str]) -> NDArray[np.float32]:
+    """Columns of an episode side by side, shape (rows, entries)."""
+    found = [episode.columns[name].reshape(len(episode), -1) for name in columns]
+    return np.concatenate(found, axis=1, dtype=np.float32)
 
 
 def _kept(recording: Recording) -> set[int] | None:

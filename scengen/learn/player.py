@@ -1,6 +1,6 @@
-"""A trained policy in an environment: it observes, predicts a chunk of actions, and plays the first few of them."""
+"""A trained policy in an environment: it observes, predicts a chunk of goals, and goes to the first few of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from ..envs.gym import Observation, PoolEnv
 from ..errors import BadConfig
 from . import models
 from .data import entry_names
+from .goals import action_to
 from .store import StoredPolicy
 
 
@@ -32,28 +33,33 @@ class TrainedPolicy:
         self._planned: list[NDArray[np.float32]] = []
 
     def act(self, observation: Observation) -> ArrayLike:
-        """The next action of the chunk, shape (7 * arms,); of a new chunk if enough of the last one was played."""
+        """The action to the next goal of the chunk, shape (7 * arms,); of a new chunk if enough of the last one was
+        played."""
         own = self.settings
-        now = np.concatenate([np.ravel(observation[name]) for name in own.streams], dtype=np.float32)
-        self._seen = [*self._seen, now][-own.steps :]
+        self._seen = [*self._seen, _values(observation, own.streams)][-own.steps :]
+        hands = _values(observation, own.pose_streams)
         if not self._planned:
-            self._planned = list(self._predicted()[: own.played])
-        return self._planned.pop(0)
+            self._planned, self._origin = list(self._predicted()[: own.played]), hands
+        return np.clip(action_to(self._planned.pop(0), self._origin, hands), -1.0, 1.0)
 
     def _predicted(self) -> NDArray[np.float32]:
-        """A chunk of actions from the last observations, shape (chunk, 7 * arms)."""
+        """A chunk of goals from the last observations, shape (chunk, 7 * arms)."""
         arrays = self.stored.arrays
         inputs = self.stored.features.inputs(np.stack(self._seen))[-1:]
         standard = models.predict(self.settings.kind, arrays, inputs)[0]
-        actions = standard * arrays["output_scale"] + arrays["output_mean"]
-        return np.clip(actions, -1.0, 1.0).reshape(self.settings.chunk, -1)
+        return (standard * arrays["output_scale"] + arrays["output_mean"]).reshape(self.settings.chunk, -1)
+
+
+def _values(observation: Observation, streams: Iterable[str]) -> NDArray[np.float32]:
+    """Streams of an observation one after the other."""
+    return np.concatenate([np.ravel(observation[name]) for name in streams], dtype=np.float32)
 
 
 def _check(stored: StoredPolicy, env: PoolEnv) -> None:
     own = stored.settings
     if own.task != env.task.name:
         raise BadConfig(f"the policy was trained for {own.task}, the pool holds {env.task.name}; train one for it")
-    missing = [name for name in own.streams if name not in env.streams]
+    missing = [name for name in own.observed if name not in env.streams]
     if missing:
         raise BadConfig(
             f"the policy observes {missing[0]}, the environment does not; say observations=[...,{missing[0]}]"

@@ -1,4 +1,4 @@
-"""What a policy learns: inputs and standardised chunks of actions at each row of the demonstrations."""
+"""What a policy learns: inputs and standardised chunks of goals at each row of the demonstrations."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import ACTION
 from ..errors import BadConfig
 from ..export.floors import ACTION_SHARE
 from ..samplers.keyed import unit
 from .data import Trajectory
 from .features import Features
+from .goals import goals_of
 from .models import predict
 
 HELD_OUT = 0.1
@@ -65,7 +65,7 @@ def scaling_of(
         learned: demonstrations that are learned from.
     """
     features = Features.of(entries, steps, np.concatenate([one.observations for one in learned]))
-    chunks = np.concatenate([_chunks(one.actions, chunk) for one in learned])
+    chunks = np.concatenate([goals_of(one.hands, one.actions, chunk) for one in learned])
     return {
         "input_mean": features.mean,
         "input_scale": features.scale,
@@ -76,14 +76,6 @@ def scaling_of(
 
 def samples_of(features: Features, chunk: int, scaling: Arrays, trajectories: Sequence[Trajectory]) -> Samples:
     """Samples of some demonstrations, scaled."""
-    chunks = np.concatenate([_chunks(one.actions, chunk) for one in trajectories])
+    chunks = np.concatenate([goals_of(one.hands, one.actions, chunk) for one in trajectories])
     inputs = np.concatenate([features.inputs(one.observations) for one in trajectories])
     return Samples(inputs, (chunks - scaling["output_mean"]) / scaling["output_scale"])
-
-
-def _chunks(actions: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-    """The next `count` actions at each row, shape (rows, count * size). After the end the arms rest as gripped."""
-    rest = np.zeros((count, actions.shape[1]), np.float32)
-    rest[:, ACTION - 1 :: ACTION] = actions[-1, ACTION - 1 :: ACTION]
-    longer = np.concatenate([actions, rest])
-    return np.stack([longer[row : row + count].ravel() for row in range(len(actions))])

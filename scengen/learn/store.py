@@ -26,6 +26,7 @@ from ..sim.world import EMBODIMENTS, action_size
 from ..typed import typed
 from ..work.targets import write
 from .features import Features, number_names
+from .goals import pose_streams
 from .models import KINDS, KNN, MIP
 
 SETTINGS = "policy.json"
@@ -34,12 +35,12 @@ WEIGHTS = "weights.npz"
 """File with the arrays of a policy."""
 LOSS = "loss.svg"
 """File with a plot of the losses."""
-FORMAT = 2
+FORMAT = 3
 """Version of the format."""
 MAX_ENTRIES = 100_000
 """Largest number of entries of an observation."""
 MAX_CHUNK = 1000
-"""Largest number of actions in a chunk."""
+"""Largest number of goals in a chunk."""
 MAX_STEPS = 100
 """Largest number of observations that a policy sees at once."""
 MAX_LAYERS = 100
@@ -69,15 +70,15 @@ class PolicySettings:
     rate: int
     """Actions per second, a divisor of 100."""
     streams: tuple[str, ...]
-    """Names of the observed streams."""
+    """Names of the streams that are its inputs."""
     entries: tuple[str, ...]
     """Names of the entries of these streams, one after the other."""
     steps: int
     """Number of observations that the policy sees at once, the present one included."""
     chunk: int
-    """Number of predicted actions."""
+    """Number of predicted goals."""
     played: int
-    """Number of actions that are played before the next prediction."""
+    """Number of goals that are played before the next prediction."""
     hidden: tuple[int, ...]
     """Units of each hidden layer; empty for `knn`."""
     members: int
@@ -104,6 +105,16 @@ class PolicySettings:
     def action_repeat(self) -> int:
         """Number of control periods for which an action is held."""
         return round(1 / Loop.PERIOD) // self.rate
+
+    @property
+    def pose_streams(self) -> tuple[str, ...]:
+        """Names of the streams with the poses of the hands, from which goals are seen."""
+        return pose_streams(self.embodiment)
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """Names of all streams that the policy reads."""
+        return tuple(dict.fromkeys((*self.streams, *self.pose_streams)))
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:

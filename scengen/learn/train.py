@@ -21,7 +21,7 @@ from .epochs import Training
 from .features import Features
 from .models import BC, KINDS, KNN
 from .samples import parted, samples_of, scaling_of
-from .store import LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPolicy, is_policy
+from .store import FORMAT, LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPolicy, is_policy
 
 GIVEN_BY_DATA = ("data", "to", "demonstrations")
 """Settings that change no weights, or only by the data, which have a hash of their own."""
@@ -40,7 +40,7 @@ class TrainSettings:
     demonstrations: int | None = None
     steps: int = 2
     chunk: int = 8
-    played: int = 4
+    played: int = 2
     hidden: list[int] = field(default_factory=lambda: [256, 256])
     members: int = 5
     epochs: int = 60
@@ -149,7 +149,8 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
 def _identity(settings: TrainSettings, data: TrainingData) -> str:
     """Hash of everything that decides the weights."""
     chosen = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
-    told = {**chosen, "sha256": data.sha256, "streams": data.streams, "version": _version("scengen")}
+    versions = {"format": FORMAT, "version": _version("scengen")}
+    told = {**chosen, "sha256": data.sha256, "streams": data.streams, **versions}
     return sha256(json.dumps(told, sort_keys=True))
 
 
@@ -202,7 +203,7 @@ def _curve(own: PolicySettings, losses: Sequence[tuple[float, float]]) -> bytes:
     marker = "o" if len(losses) == 1 else ""
     axes.plot(epochs, [loss for loss, _ in losses], marker=marker, label="learned from")
     axes.plot(epochs, [loss for _, loss in losses], marker=marker, label="held out")
-    axes.set(xlabel="epoch", ylabel="error of the actions [variances]", title=f"{own.kind}, {own.task}")
+    axes.set(xlabel="epoch", ylabel="error of the goals [variances]", title=f"{own.kind}, {own.task}")
     axes.set_ylim(bottom=0.0)
     axes.legend()
     return svg_bytes(figure)

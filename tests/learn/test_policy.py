@@ -54,7 +54,7 @@ def test_a_policy_brings_its_observations_and_its_rate(memory, tmp_path):
 
 
 def test_a_chunk_is_played_before_the_next_is_predicted(memory, monkeypatch):
-    env = PoolEnv("domino_single", REFERENCE, list(StoredPolicy.open(memory).settings.streams), action_repeat=4)
+    env = PoolEnv("domino_single", REFERENCE, list(StoredPolicy.open(memory).settings.observed), action_repeat=4)
     policy = find_policy(str(memory))(env)
     assert isinstance(policy, TrainedPolicy)
     calls, predicted = [], policy._predicted
@@ -63,7 +63,7 @@ def test_a_chunk_is_played_before_the_next_is_predicted(memory, monkeypatch):
     policy.reset(observation, info, 0)
     for step in range(9):
         policy.act(observation)
-        assert len(calls) == 1 + step // 4
+        assert len(calls) == 1 + step // 2
 
 
 def change(folder, **values):
@@ -83,7 +83,7 @@ def change(folder, **values):
         ({"inputs": 10**6}, "inputs = 1000000"),
         ({"surprise": 1}, "no key named 'surprise'"),
         ({"weights_sha256": "0" * 64}, "its sha256 is not that in policy.json"),
-        ({"format": 99}, "has format 99, this scengen reads 2"),
+        ({"format": 99}, "has format 99, this scengen reads 3"),
     ],
 )
 def test_settings_of_a_stranger_are_refused(mine, values, said):
