@@ -1,4 +1,4 @@
-"""The three policies as functions of arrays, in plain numpy: from inputs to a chunk of future actions.
+"""The three policies as functions of arrays, in plain numpy: from inputs to a chunk of future goals (`goals`).
 
     knn    weighted mean of the chunks of the k nearest rows of the demonstrations
     bc     behaviour cloning: a perceptron that minimises the squared error of the chunk
@@ -10,7 +10,7 @@ Both are ensembles: several perceptrons of different initial weights, whose outp
 in a few rare states decides episodes, and differs from training to training: three trainings on 200 demonstrations of
 `edge_slide` solved 9, 14 and 16 of 20 scenarios, the mean of five 17.
 
-Chunks are standardised: each number of an action is shifted by its mean and divided by its spread.
+Chunks are standardised: each number of a goal is shifted by its mean and divided by its spread.
 """
 
 from collections.abc import Mapping

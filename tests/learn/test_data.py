@@ -105,6 +105,22 @@ def test_streams_that_were_not_recorded_are_refused(mine):
         TrainingData.read(mine)
 
 
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(float("nan"), "has numbers that are not finite"), (0.0, "has no pose of a hand for each action")],
+)
+def test_a_hand_without_a_pose_is_refused(mine, value, said):
+    """The first row of the second episode has no orientation."""
+    path = mine / "data" / "chunk-000" / "file-000.parquet"
+    table = pq.read_table(path)
+    quats = table["robot0_eef_quat"].to_pylist()
+    quats[table["episode_index"].to_pylist().index(1)] = [value] * 4
+    place = table.column_names.index("robot0_eef_quat")
+    pq.write_table(table.set_column(place, table.schema.field(place), [quats]), path)
+    with pytest.raises(PoolError, match=f"episode 1 {said}"):
+        TrainingData.read(mine, ["force_torque"])
+
+
 def test_what_is_no_recording_is_one_line(tmp_path, capsys):
     assert cli.run(["train", f"data={tmp_path}", f"to={tmp_path / 'policy'}"]) == 2
     assert "no recording at" in capsys.readouterr().err

@@ -53,6 +53,16 @@ def test_a_policy_brings_its_observations_and_its_rate(memory, tmp_path):
         played(memory, tmp_path / "b", observations=["robot0_eef_pos"])
 
 
+def test_a_policy_need_not_see_the_hand_that_it_moves(memory, tmp_path):
+    """Poses of the hands are read to play goals, also where they are no inputs."""
+    own = tmp_path / "policy"
+    data = f"data={memory.parent / 'data'}"
+    assert cli.run(["train", "policy=knn", data, "observations=[object-state]", f"to={own}"]) == 0
+    settings = StoredPolicy.open(own).settings
+    assert settings.streams == ("object-state",) and "robot0_eef_quat" in settings.observed
+    assert sum(episode["success"] for episode in played(own, tmp_path / "results")) >= 5
+
+
 def test_a_chunk_is_played_before_the_next_is_predicted(memory, monkeypatch):
     env = PoolEnv("domino_single", REFERENCE, list(StoredPolicy.open(memory).settings.observed), action_repeat=4)
     policy = find_policy(str(memory))(env)
