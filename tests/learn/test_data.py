@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from helpers import REFERENCE
@@ -116,7 +117,8 @@ def test_a_hand_without_a_pose_is_refused(mine, value, said):
     quats = table["robot0_eef_quat"].to_pylist()
     quats[table["episode_index"].to_pylist().index(1)] = [value] * 4
     place = table.column_names.index("robot0_eef_quat")
-    pq.write_table(table.set_column(place, table.schema.field(place), [quats]), path)
+    values = pa.array(quats, table.schema.field(place).type)
+    pq.write_table(table.set_column(place, table.schema.field(place), values), path)
     with pytest.raises(PoolError, match=f"episode 1 {said}"):
         TrainingData.read(mine, ["force_torque"])
 
