@@ -31,6 +31,8 @@ KINDS = (KNN, BC, MIP)
 """Names of the policies."""
 NEIGHBOURS = 5
 """Number of neighbours of `knn`."""
+CANDIDATES = 100
+"""Number of rows among which the neighbours are searched exactly. Before, distances are rounded."""
 REFINED_AT = 0.9
 """Time t* of the second call of `mip`, as in the paper."""
 
@@ -78,7 +80,9 @@ def layers(arrays: Mapping[str, Any]) -> int:
 
 def _neighbours(known: NDArray[np.float32], chunks: NDArray[np.float32], here: NDArray[np.float32]) -> Any:
     """Mean of the chunks of the nearest rows, weighted by the inverse of the squared distance."""
-    far = np.square(known - here).sum(axis=1)
+    roughly = np.einsum("ij,ij->i", known, known) - 2.0 * (known @ here)  # less |here|^2, in a tenth of the time
+    among = np.sort(np.argpartition(roughly, min(CANDIDATES, len(known)) - 1)[:CANDIDATES])
+    far = np.square(known[among] - here).sum(axis=1)
     near = np.argsort(far, kind="stable")[:NEIGHBOURS]
     weights = 1.0 / (far[near] + 1e-6)
-    return (weights / weights.sum()) @ chunks[near]
+    return (weights / weights.sum()) @ chunks[among[near]]
