@@ -40,7 +40,7 @@ class TrainSettings:
     demonstrations: int | None = None
     steps: int = 2
     chunk: int = 8
-    played: int = 2
+    played: int = 3
     hidden: list[int] = field(default_factory=lambda: [256, 256])
     members: int = 5
     epochs: int = 60

@@ -73,7 +73,7 @@ def test_a_chunk_is_played_before_the_next_is_predicted(memory, monkeypatch):
     policy.reset(observation, info, 0)
     for step in range(9):
         policy.act(observation)
-        assert len(calls) == 1 + step // 2
+        assert len(calls) == 1 + step // 3
 
 
 def change(folder, **values):
