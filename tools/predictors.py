@@ -32,10 +32,6 @@ TELLING = ("breaks", "holds")
 PREDICTORS = (*MOTION, *OBJECT_CENTRIC, *BELIEF, DISTANCE)
 """What is compared."""
 EXCEPTIONS = {
-    ("balance_medium", "narrow_ridge"): (
-        "The policy lets the rod go up to 13 mm beside the ridge's middle, which a ridge of 12 mm forgives more often "
-        "than one of 9 mm."
-    ),
     ("balance_medium", "wide_rod"): (
         "The wider the hand stands, the less firmly the policy closes it: in training such a width was passed while "
         "closing. The rod slips, or is never lifted."
@@ -45,6 +41,9 @@ EXCEPTIONS = {
         "at half of the swing, and the cube falls short."
     ),
     ("cube_toss", "farther"): "A memory throws as far as in training; the policy looks where the tray is.",
+    ("edge_slide", "far_inset"): (
+        "A memory pushes as far as in training; the policy goes on until the plate overhangs."
+    ),
     ("linear_intercept", "fast"): (
         "The hand waits in the right place and closes when a ball of training would arrive. The planner sees the speed."
     ),
@@ -55,20 +54,17 @@ EXCEPTIONS = {
     ("pick_place_ycb", "far_jumps"): (
         "A memory goes to where the square jumped at that time; the policy steers to where it is now."
     ),
+    ("pick_place_ycb", "late_jump"): "As for `far_jumps`.",
     ("pick_place_ycb", "more_jumps"): "As for `far_jumps`.",
     ("pick_place_ycb", "small_patch"): (
-        "The policy puts the object down 3 to 5 cm beside the middle, which the square of training allows. Nothing "
+        "The policy puts the object down 4 to 7 cm beside the middle, which the square of training allows. Nothing "
         "that it sees tells the size of a mark on the table."
     ),
-    ("pick_place_ycb", "unseen_item"): (
-        "A hand around a narrow thing stands as it stood in training before it had closed: the policy holds it at the "
-        "square until the time is up. Above a lower thing than any of training the jaw closes on air."
-    ),
     ("slip_recovery", "late_slip"): (
-        "The object falls beside or onto the square, and lies under an open hand as after it was put down. A policy "
-        "without memory cannot tell the two, and rests."
+        "The object falls 10 to 13 cm from the middle of the square, nearer than nearly always in training. The open "
+        "hand hovers 10 cm above it, 2 to 4 cm beside, and does not come down."
     ),
-    ("slip_recovery", "two_slips"): "As for `late_slip`, after the second slip.",
+    ("slip_recovery", "two_slips"): "As for `late_slip` after the second slip, or the object is put down 3 to 5 cm beside the middle.",
     ("slip_recovery", "long_window"): (
         "A memory closes the hand at a remembered moment, when it is still held open; the policy looks."
     ),

@@ -39,6 +39,7 @@ from scengen.envs.object_state import NAME
 from scengen.envs.observations import proprioception
 from scengen.learn.data import KEPT
 from scengen.learn.models import BC, KNN, MIP
+from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
 
@@ -158,9 +159,9 @@ def records(task: str) -> list[dict[str, Any]]:
 
 
 def _made(task: str) -> dict[str, Any]:
-    """How trainings of a task are made: the number of epochs, and the hashes of the pools by split."""
+    """How trainings of a task are made: their format and number of epochs, and the hashes of the pools by split."""
     hashes = {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
-    return {"epochs": TrainSettings().epochs, "pools_sha256": hashes}
+    return {"format": FORMAT, "epochs": TrainSettings().epochs, "pools_sha256": hashes}
 
 
 def identity(record: dict[str, Any]) -> Training:
