@@ -110,10 +110,11 @@ On those of the table, three trainings of `bc`, and one of `mip`:
 
 * actions instead of goals, 4 before the next prediction: 16, 18, 9, and 9 of `slip_recovery`; 15, 12, 15, and 10 of
   `balance_medium`; 9, 11, 7, and 17 of `pick_place_ycb`; 17, 19, 19, and 20 of `edge_slide`; 15, 16, 19, and 19 of
-  `tool_retrieve`; 4, 2, 3, and 5 of `bounce_intercept`. On an axis, `mip` solves 14
-  instead of 20 of `far_inset` in `edge_slide`;
+  `tool_retrieve`; 4, 2, 3, and 5 of `bounce_intercept`. On axes, `bc` solves 2, 3 and 6 of `diagonal` in
+  `domino_single` instead of 19, 20 and 19, and `mip` 14 of `far_inset` in `edge_slide` instead of 20: goals are seen
+  from the hand, which turns with a scene;
 * actions, 2 before the next prediction: 19, 19, 20, and 19 of `slip_recovery`; 11, 7, 8, and 11 of `balance_medium`;
-  12, 16, 13, and 16 of `pick_place_ycb`; 7, 9, 17, and 20 of `edge_slide`; 16, 17, 15, and 17 of `tool_retrieve`;
+  12, 16, 13, and 16 of `pick_place_ycb`; 7, 9, 17, and 20 of `edge_slide`; 16, 17, 15, and 17 of `tool_retrieve`.
 
 And with actions instead of goals, 4 before the next prediction, one training:
 
