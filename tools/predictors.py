@@ -67,10 +67,9 @@ EXCEPTIONS = {
         "The object falls 10 to 13 cm from the middle of the square, nearer than nearly always in training. The open "
         "hand hovers 10 cm above it, 2 to 4 cm beside, and does not come down."
     ),
-    (
-        "slip_recovery",
-        "two_slips",
-    ): "As for `late_slip` after the second slip, or the object is put down 3 to 5 cm beside the middle.",
+    ("slip_recovery", "two_slips"): (
+        "As for `late_slip` after the second slip, or the object is put down 3 to 5 cm beside the middle."
+    ),
     ("slip_recovery", "long_window"): (
         "A memory closes the hand at a remembered moment, when it is still held open; the policy looks."
     ),
