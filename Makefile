@@ -148,6 +148,7 @@ drift: setup
 # selects tasks. An interrupted call is continued.
 baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
+	$(BIN)/python tools/baselines_page.py
 
 # Trains with three seeds on 25 to 100 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
 # ones (a quarter of an hour for each task), and with the wrench (mass_sort), for docs/baselines.md. WORKERS=4 trains at once.
@@ -157,7 +158,7 @@ curves: setup
 	$(BIN)/python tools/trainings.py styles workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py curation workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py wrench workers=$(WORKERS)
-	$(BIN)/python tools/baselines.py page
+	$(BIN)/python tools/baselines_page.py
 
 # Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
 docs: setup
@@ -166,7 +167,7 @@ docs: setup
 	$(BIN)/python tools/cluster_page.py
 	$(BIN)/python tools/all_axes.py page
 	$(BIN)/python tools/predictors.py
-	$(BIN)/python tools/baselines.py page
+	$(BIN)/python tools/baselines_page.py
 	$(BIN)/python tools/task_pages.py $(TASKS)
 
 # Writes a web site into SITE: a page for each task with films in three dimensions, and README, docs, axis cards and reports. The first

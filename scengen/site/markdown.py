@@ -22,7 +22,16 @@ PAGES = (
     "integrations/*/README.md",
 )
 """Pages of a repository."""
-FILES = ("docs/*.png", "docs/*.webp", "docs/*/*.jpg", "docs/*/*.png", "LICENSE", "CITATION.cff", "Dockerfile")
+FILES = (
+    "docs/*.png",
+    "docs/*.webp",
+    "docs/*.svg",
+    "docs/*/*.jpg",
+    "docs/*/*.png",
+    "LICENSE",
+    "CITATION.cff",
+    "Dockerfile",
+)
 """Files that pages show or link to."""
 INDEX = Path("docs/index.md")
 """Page whose headings and links are the navigation."""
