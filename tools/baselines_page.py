@@ -198,14 +198,19 @@ def page() -> str:
 
 
 def _rates() -> dict[str, baseline_plots.Rates]:
-    """Solved scenarios [%] of each training of each policy in training and on all axes, by task."""
+    """Solved scenarios [%] of each training of each policy in training and on all axes, by task.
+
+    Tasks that not all of these policies have played are left out.
+    """
     found = dict[str, baseline_plots.Rates]()
     for task, records in _measured().items():
         splits = (ID, *load_task(task).axes)
-        found[task] = {
+        rates = {
             policy: {split: [_percent(one) for one in _chosen(records, policy, split)] for split in splits}
             for policy in SHOWN
         }
+        if all(solved for known in rates.values() for solved in known.values()):
+            found[task] = rates
     return found
 
 
@@ -295,7 +300,7 @@ def _sizes() -> list[int]:
 def _learned(task: str, split: str, policy: str, size: int) -> list[int]:
     """Solved scenarios of each training on so many demonstrations."""
     if size == DEMONSTRATIONS:
-        return [one["solved"] for one in _chosen(_measured()[task], policy, split)]
+        return [one["solved"] for one in _chosen(_measured().get(task, []), policy, split)]
     known = _trainings(MIXED)[task]
     return [one["solved"][split] for one in known if (one["policy"], one["size"]) == (policy, size)]
 
