@@ -98,8 +98,8 @@ What failures are (`scengen evaluate keep=[episodes]`, `scengen film`, and the s
 TRIED = """
 ## What was tried
 
-With 20 training scenarios of each task, of which a difference of 3 is noise. On scenarios apart from
-those of the tables:
+With 20 training scenarios of each task, of which a difference of 3 is noise. On scenarios apart from those of the
+tables:
 
 * 2, 3 and 4 goals before the next prediction: 247, 247 and 223 of 300, by `bc` and `mip` in `slip_recovery` (76, 66 and
   49 of 80), `balance_medium` (55, 69 and 67 of 80), `pendulum_grasp` (70, 71 and 70 of 80) and `pick_place_ycb` (46, 41
@@ -202,6 +202,7 @@ def page() -> str:
     )
 
 
+@cache
 def _rates() -> dict[str, baseline_plots.Rates]:
     """Solved scenarios [%] of each training of each policy in training and on all axes, by task.
 
