@@ -22,7 +22,8 @@ RECORDING = "recording"
 def command(arguments: Arguments) -> int:
     settings = read("train", arguments, TrainSettings)
     settings.check()
-    data = TrainingData.read(_recording(settings, arguments), settings.observations, settings.demonstrations)
+    recording = _recording(settings, arguments)
+    data = TrainingData.read(recording, settings.observations, settings.demonstrations, settings.task)
     left_out = ", ".join(f"{count} {why}" for why, count in data.left_out.items() if count)
     if left_out:
         remark(f"episodes that are not learned from: {left_out}")

@@ -58,9 +58,13 @@ class TrainingData:
 
     @classmethod
     def read(
-        cls, folder: str | Path, observations: Sequence[str] | None = None, demonstrations: int | None = None
+        cls,
+        folder: str | Path,
+        observations: Sequence[str] | None = None,
+        demonstrations: int | None = None,
+        task: str | None = None,
     ) -> "TrainingData":
-        """Read the demonstrations of a recording.
+        """Read the demonstrations of one task in a recording.
 
         Failed episodes are left out, and those that a curation of the recording has not kept.
 
@@ -68,22 +72,23 @@ class TrainingData:
             folder: a LeRobot recording of `scengen record`.
             observations: streams to observe; default: proprioception and `object-state`.
             demonstrations: number of demonstrations, the first ones; default: all.
+            task: the task; default: that of the recording, if it holds no other.
 
         Raises:
-            ScengenError: the recording is damaged, holds several tasks, fewer demonstrations or no success, or lacks a
-                stream.
+            ScengenError: the recording is damaged, holds several tasks of which none is named, fewer demonstrations or
+                no success, or lacks a stream.
         """
         recording = Recording.open(folder)
-        tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
-        if len(tasks) > 1:
-            raise BadConfig(f"{folder} holds demonstrations of {' and '.join(tasks)}; record one task alone")
+        task = _task(recording, task)
         robot = str(recording.info["robot_type"])
         streams = tuple(observations or (*proprioception(robot), NAME))
         columns, hands = _columns(recording, streams), tuple(_columns(recording, pose_streams(robot)))
         kept = _kept(recording)
-        found, left_out = [], {"failed": 0, "not kept by the curation": 0}
+        found, left_out = [], {"of another task": 0, "failed": 0, "not kept by the curation": 0}
         for episode in recording.read():
-            if not episode.about.get("scengen/success"):
+            if episode.task != task:
+                left_out["of another task"] += 1
+            elif not episode.about.get("scengen/success"):
                 left_out["failed"] += 1
             elif kept is not None and episode.number not in kept:
                 left_out["not kept by the curation"] += 1
@@ -98,7 +103,7 @@ class TrainingData:
         entries = tuple(name for names in columns.values() for name in names)
         identity = [*_hashes(recording), json.dumps([trajectory.scenario for trajectory in found])]
         return cls(
-            tasks[0], robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out
+            task, robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out
         )
 
     @property
@@ -114,6 +119,20 @@ def entry_names(stream: str, names: Sequence[str], shape: Sequence[int]) -> tupl
         names: names of the entries of a vector, or of the axes of a grid.
     """
     return tuple(names) if len(shape) < 2 else tuple(f"{stream}.{i}" for i in range(prod(shape)))
+
+
+def _task(recording: Recording, asked: str | None) -> str:
+    """The task whose demonstrations are read.
+
+    Raises:
+        ScengenError: the recording has none of it, or has several tasks and none is asked for.
+    """
+    tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
+    if asked is not None and asked not in tasks:
+        raise UnknownName(f"task in {recording.folder}", asked, tasks)
+    if asked is None and len(tasks) > 1:
+        raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; say task=...")
+    return asked or tasks[0]
 
 
 def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[str, ...]]:

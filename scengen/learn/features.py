@@ -50,6 +50,13 @@ class Features:
         """Number of inputs."""
         return self.steps * int(np.isfinite(self.scale).sum())
 
+    @property
+    def used(self) -> set[str]:
+        """Names of the entries that are not left out."""
+        numbers = zip(number_names(self.entries), self.scale, strict=True)
+        readings = {name.rpartition(".rot")[0] or name for name, scale in numbers if np.isfinite(scale)}
+        return {entry for entry in self.entries if readings & {entry, entry.rpartition(".")[0]}}
+
     def inputs(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Inputs at each row of one episode, shape (rows, size). Before the first row is the first row.
 

@@ -26,6 +26,7 @@ class TrainedPolicy:
         self.version = stored.settings.weights_sha256
         """Version of the policy, to which an evaluation is bound."""
         _check(stored, env)
+        self._places = _places(stored, env)
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Begin an episode without earlier observations."""
@@ -36,7 +37,8 @@ class TrainedPolicy:
         """The action to the next goal of the chunk, shape (7 * arms,); of a new chunk if enough of the last one was
         played."""
         own = self.settings
-        self._seen = [*self._seen, _values(observation, own.streams)][-own.steps :]
+        seen = np.append(_values(observation, own.streams), np.float32(0.0))[self._places]
+        self._seen = [*self._seen, seen][-own.steps :]
         hands = _values(observation, own.pose_streams)
         if not self._planned:
             self._planned, self._origin = list(self._predicted()[: own.played]), hands
@@ -64,15 +66,31 @@ def _check(stored: StoredPolicy, env: PoolEnv) -> None:
         raise BadConfig(
             f"the policy observes {missing[0]}, the environment does not; say observations=[...,{missing[0]}]"
         )
-    entries = [
-        n for name in own.streams for n in entry_names(name, env.streams[name].entries(name), env.streams[name].shape)
-    ]
-    if tuple(entries) != own.entries:
-        other = next((a for a, b in zip(entries, own.entries, strict=False) if a != b), "their number")
-        raise BadConfig(
-            f"the policy was trained on other entries of its observations ({other}); record its data and train it again"
-        )
     if env.action_repeat != own.action_repeat:
         raise BadConfig(
             f"action_repeat = {env.action_repeat}; the policy acts {own.rate} times per second: {own.action_repeat}"
         )
+
+
+def _places(stored: StoredPolicy, env: PoolEnv) -> NDArray[np.intp]:
+    """Place in the environment's observation of each entry that the policy observes.
+
+    It is one past the end for entries that the environment lacks and the policy does not use: those of bodies of other
+    tasks in the recording.
+
+    Raises:
+        BadConfig: the policy uses an entry that the environment lacks, or does not know one that it has.
+    """
+    own, used = stored.settings, stored.features.used
+    entries = [
+        n for name in own.streams for n in entry_names(name, env.streams[name].entries(name), env.streams[name].shape)
+    ]
+    places = {name: i for i, name in enumerate(entries)}
+    other = [name for name in own.entries if name in used and name not in places]
+    other += [name for name in entries if name not in own.entries]
+    if other:
+        raise BadConfig(
+            f"the policy was trained on other entries of its observations ({other[0]}); "
+            "record its data and train it again"
+        )
+    return np.array([places.get(name, len(entries)) for name in own.entries])

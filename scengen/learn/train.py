@@ -23,7 +23,7 @@ from .models import BC, KINDS, KNN
 from .samples import parted, samples_of, scaling_of
 from .store import FORMAT, LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPolicy, is_policy
 
-GIVEN_BY_DATA = ("data", "to", "demonstrations")
+GIVEN_BY_DATA = ("data", "to", "demonstrations", "task")
 """Settings that change no weights, or only by the data, which have a hash of their own."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
@@ -36,6 +36,7 @@ class TrainSettings:
     policy: str = BC
     data: str = ""
     to: str = ""
+    task: str | None = None
     observations: list[str] | None = None
     demonstrations: int | None = None
     steps: int = 2

@@ -77,7 +77,7 @@ def test_failures_and_what_a_curation_left_out_are_not_learned_from(mine):
     (mine / "curation").mkdir()
     (mine / "curation" / "kept.json").write_text("[0, 2]")
     data = TrainingData.read(mine)
-    assert len(data.trajectories) == 2 and data.left_out == {"failed": 0, "not kept by the curation": 1}
+    assert len(data.trajectories) == 2 and data.left_out["not kept by the curation"] == 1
     change_episode(mine, 0, success=False)
     with pytest.raises(BadConfig, match=r"1 demonstrations to learn from \(1 failed, 1 not kept by the curation\)"):
         TrainingData.read(mine)
@@ -90,10 +90,16 @@ def test_a_damaged_list_of_kept_episodes_is_one_line(mine):
         TrainingData.read(mine)
 
 
-def test_several_tasks_are_refused(mine):
+def test_of_several_tasks_one_is_chosen(mine):
     change_episode(mine, 1, task="packing")
-    with pytest.raises(BadConfig, match="demonstrations of domino_single and packing; record one task alone"):
+    with pytest.raises(BadConfig, match="demonstrations of domino_single and packing; say task="):
         TrainingData.read(mine)
+    data = TrainingData.read(mine, task="domino_single")
+    assert (data.task, len(data.trajectories), data.left_out["of another task"]) == ("domino_single", 2, 1)
+    with pytest.raises(BadConfig, match=r"1 demonstrations to learn from \(2 of another task\)"):
+        TrainingData.read(mine, task="packing")
+    with pytest.raises(UnknownName, match="no task in .* named 'packin' .did you mean 'packing'"):
+        TrainingData.read(mine, task="packin")
 
 
 def test_streams_that_were_not_recorded_are_refused(mine):

@@ -3,6 +3,7 @@
 import json
 import shutil
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from scengen.errors import BadConfig, PoolError
 from scengen.evaluate.policies import find_policy
 from scengen.evaluate.rollouts import evaluate
 from scengen.evaluate.settings import EvaluateSettings
+from scengen.learn.data import TrainingData
 from scengen.learn.features import LARGEST_INPUT, Features
 from scengen.learn.player import TrainedPolicy
 from scengen.learn.store import StoredPolicy
+from scengen.learn.train import TrainSettings, train
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +144,21 @@ def test_weights_of_a_stranger_are_refused(mine, write, said):
     with pytest.raises(PoolError, match="damaged") as error:
         StoredPolicy.open(mine)
     assert said in str(error.value)
+
+
+def test_bodies_of_other_tasks_in_the_recording_do_not_matter(memory, tmp_path):
+    """A recording of several tasks has entries for the bodies of all of them, which read 0 in a scene without them."""
+    data = TrainingData.read(memory.parent / "data")
+    wider = [
+        replace(one, observations=np.insert(one.observations, 23, 0.0, axis=1).astype(np.float32))
+        for one in data.trajectories
+    ]
+    entries = (*data.entries[:23], "plate_pos.x", *data.entries[23:])
+    own = tmp_path / "policy"
+    train(TrainSettings(policy="knn", to=str(own)), replace(data, entries=entries, trajectories=tuple(wider)), print)
+    first, second = played(memory, tmp_path / "a", keep=["episodes"]), played(own, tmp_path / "b", keep=["episodes"])
+    assert [one["success"] for one in first] == [one["success"] for one in second]
+    assert [one["seconds"] for one in first] == [one["seconds"] for one in second]
 
 
 def test_a_policy_of_another_task_or_other_bodies_is_refused(mine, tmp_path):
