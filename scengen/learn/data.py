@@ -102,9 +102,7 @@ class TrainingData:
         found = found[:demonstrations]
         entries = tuple(name for names in columns.values() for name in names)
         identity = [*_hashes(recording), json.dumps([trajectory.scenario for trajectory in found])]
-        return cls(
-            task, robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out
-        )
+        return cls(task, robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out)
 
     @property
     def rows(self) -> int:
