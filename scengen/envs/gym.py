@@ -285,10 +285,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ValueError: the action has another shape than `action_space`, or is not finite. Nothing is simulated then.
         """
-        given = np.asarray(action, np.float32)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
-            size = action_size(self.task.embodiment)
-            raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
+        given = checked(action, action_size(self.task.embodiment))
         if self._world is None:
             raise BadConfig("no scenario is running; call reset first")
         with self._lock:
@@ -471,6 +468,18 @@ def _requested(
         {name: streams[name] for name in names if name in streams},
         {name: cameras[name] for name in names if name in cameras},
     )
+
+
+def checked(action: ArrayLike, size: int) -> NDArray[np.float32]:
+    """An action as an array, shape (size,).
+
+    Raises:
+        ValueError: it has another shape, or is not finite.
+    """
+    given = np.asarray(action, np.float32)
+    if given.shape != (size,) or not np.isfinite(given).all():
+        raise ValueError(f"an action is {size} finite numbers in [-1, 1], not {np.array2string(given)}")
+    return given
 
 
 def clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) -> NDArray[np.float32]:

@@ -14,15 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..control.teleop import unfiltered
 from ..episode import Outcome
-from ..errors import BadConfig, UnknownName
+from ..errors import BadConfig, UnknownName, cut
 from ..pool import PoolRow
 from ..work.machine import cores
 from .gym import INFOS, RESET_OPTIONS, PoolEnv, clipped
 from .observations import Reading
 from .pools import Folders
 
-MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
-"""Modes in which a slot begins its next episode: in the step after the end, or at once."""
+MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
+"""Modes in which a slot begins its next episode: in the step after the end, at once, or when it is reset."""
+MASK = "reset_mask"
+"""Reset option that chooses slots, as in Gymnasium's own vector environments."""
 MAX_SLOTS = 4096
 """Largest number of slots."""
 MAX_TAKEN = 4
@@ -44,7 +46,9 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
 
     With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and begins the next
     one. With `AutoresetMode.SAME_STEP` the step that ends an episode returns the first observation of the next one;
-    `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one.
+    `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `AutoresetMode.DISABLED` a slot
+    stays at the end of its episode, and its actions are ignored, until `reset(options={"reset_mask": mask})` begins
+    another one.
     """
 
     def __init__(
@@ -63,7 +67,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             pool: folder of a pool, or several folders.
             num_envs: number of slots.
             threads: number of threads that step slots; None for the available cores.
-            autoreset_mode: `NEXT_STEP` or `SAME_STEP`.
+            autoreset_mode: `NEXT_STEP`, `SAME_STEP` or `DISABLED`.
             settings: further arguments of `PoolEnv`, such as `observations` and `action_repeat`.
 
         Raises:
@@ -81,10 +85,10 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self.single_observation_space, self.single_action_space = first.observation_space, first.action_space
         self.observation_space = batch_space(first.observation_space, self.num_envs)
         self.action_space = batch_space(first.action_space, self.num_envs)
-        self._same_step = mode == AutoresetMode.SAME_STEP
+        self._mode = mode
         self._rows, self._next = first._rows, 0
         self._labels = False
-        self._over: NDArray[np.bool_] | None = None
+        self._begun, self._terminated, self._truncated = np.zeros((3, self.num_envs), np.bool_)
         self._infos: dict[str, NDArray[Any]] = {
             **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in INFOS},
             **{name: np.zeros(self.num_envs, np.bool_) for name in ("success", "is_success")},
@@ -108,18 +112,22 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         Args:
             seed: number of the first slot's scenario, or the numbers for all slots; None for those that come next.
             options: `scenario` names the scenario of all slots, or of each; `labels` adds to `info` which scenario
-                runs, in later episodes too.
+                runs, in later episodes too; `reset_mask`, shape (num_envs,), chooses the slots that begin an episode.
+                The episodes of the others go on; in the first reset they are over as soon as they have begun.
 
         Raises:
             UnknownName: there is no such scenario or option.
-            BadConfig: several ids have this prefix, or there are not as many names or seeds as slots.
+            BadConfig: several ids have this prefix, there are not as many names or seeds as slots, or the mask is none.
         """
-        if unknown := set(options or {}) - set(RESET_OPTIONS):
-            raise UnknownName("reset option", unknown.pop(), RESET_OPTIONS)
+        if unknown := set(options or {}) - {*RESET_OPTIONS, MASK}:
+            raise UnknownName("reset option", unknown.pop(), (*RESET_OPTIONS, MASK))
+        mask = self._mask((options or {}).get(MASK))
         self._labels = bool((options or {}).get("labels"))
-        numbers = self._numbers(seed, (options or {}).get("scenario"))
-        infos = self._begin({slot: self._rows[number] for slot, number in enumerate(numbers)})
-        self._over = np.zeros(self.num_envs, np.bool_)
+        fresh = np.flatnonzero(mask | ~self._begun).tolist()
+        numbers = self._numbers(seed, (options or {}).get("scenario"), fresh)
+        infos = self._begin({slot: self._rows[number] for slot, number in numbers.items()})
+        self._terminated, self._truncated = self._terminated & ~mask, (self._truncated | ~self._begun) & ~mask
+        self._begun[:] = True
         return self._observed(), self._gathered(infos)
 
     def step(self, actions: ArrayLike) -> Steps:
@@ -132,11 +140,13 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
         """
         given = self._checked(actions)
-        if self._over is None:
+        if not self._begun.all():
             raise BadConfig("no scenario is running; call reset first")
-        fresh = {} if self._same_step else self._handed_out(self._over)
+        over = self._terminated | self._truncated
+        fresh = self._handed_out(over) if self._mode == AutoresetMode.NEXT_STEP else {}
         rewards = np.zeros(self.num_envs)
-        terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
+        stays = over if self._mode == AutoresetMode.DISABLED else np.zeros(self.num_envs, np.bool_)
+        terminated, truncated = self._terminated & stays, self._truncated & stays
         infos: dict[int, dict[str, Any]] = {}
         times = self._infos["time"]
 
@@ -154,15 +164,15 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
                 if outcome is not None:
                     rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._told(outcome)
 
-        self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh])
+        self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh and not stays[slot]])
         infos |= self._begin(fresh)
-        self._over = terminated | truncated
+        self._terminated, self._truncated = terminated.copy(), truncated.copy()
         seen, final = self._observed(), dict[int, dict[str, Any]]()
-        if self._same_step and self._over.any():
-            for slot in np.flatnonzero(self._over).tolist():
+        if self._mode == AutoresetMode.SAME_STEP and (over := terminated | truncated).any():
+            for slot in np.flatnonzero(over).tolist():
                 told = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
                 final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": told}
-            infos |= self._begin(self._handed_out(self._over))
+            infos |= self._begin(self._handed_out(over))
             seen = self._observed()
         return seen, rewards, terminated, truncated, self._gathered(infos, final)
 
@@ -188,22 +198,35 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
 
     # --- scenarios ------------------------------------------------------------------------
 
-    def _numbers(self, seed: int | Sequence[int | None] | None, named: Any) -> list[int]:
-        """Numbers of the scenarios with which the slots begin."""
+    def _mask(self, given: Any) -> NDArray[np.bool_]:
+        """The slots that a reset begins, shape (num_envs,)."""
+        if given is None:
+            return np.ones(self.num_envs, np.bool_)
+        mask = np.asarray(given)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise BadConfig(f"reset_mask = {cut(repr(given))}; give {self.num_envs} booleans, one of them true")
+        return mask
+
+    def _numbers(self, seed: int | Sequence[int | None] | None, named: Any, slots: Sequence[int]) -> dict[int, int]:
+        """Numbers of the scenarios with which some slots begin."""
         count = self.num_envs
         if named is not None:
             names = [named] * count if isinstance(named, str) else list(named)
             if len(names) != count:
                 raise BadConfig(f"{len(names)} scenarios for {count} slots; give one name, or one for each slot")
-            numbers = [self._rows.find(str(name)) for name in names]
-        elif seed is not None:
-            seeds = [int(seed) + slot for slot in range(count)] if isinstance(seed, (int, np.integer)) else list(seed)
+            numbers = {slot: self._rows.find(str(names[slot])) for slot in slots}
+        else:
+            if seed is None or isinstance(seed, (int, np.integer)):
+                seeds = [None if seed is None else seed + slot for slot in range(count)]
+            else:
+                seeds = list(seed)
             if len(seeds) != count:
                 raise BadConfig(f"{len(seeds)} seeds for {count} slots; give one number, or one for each slot")
-            numbers = [self._following() if each is None else int(each) % len(self._rows) for each in seeds]
-        else:
-            numbers = [self._following() for _ in range(count)]
-        self._next = (numbers[-1] + 1) % len(self._rows)
+            numbers = {
+                slot: self._following() if (own := seeds[slot]) is None else int(own) % len(self._rows)
+                for slot in slots
+            }
+        self._next = (numbers[slots[-1]] + 1) % len(self._rows)
         return numbers
 
     def _following(self) -> int:

@@ -1,12 +1,17 @@
-"""Rollouts of a policy, one after the other."""
+"""Rollouts of a policy: as many at once as there are slots, one batch after the other."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike, NDArray
 
 from ..compose import load_task
-from ..envs.gym import PoolEnv
+from ..envs.gym import INFOS, Observation, PoolEnv, checked
+from ..envs.vector import PoolVectorEnv
 from ..episode import check_rules
 from ..errors import ForeignCode, ScengenError
 from ..pool import Pool
@@ -16,6 +21,8 @@ from ..samplers.split import ID
 from ..sim.world import ROBOT, World
 from .policies import REPLAY, Policy, find_policy, identity, make_policy, policy_errors
 from .settings import EvaluateSettings, RolloutId
+
+A = TypeVar("A")
 
 
 class BadPolicy(ScengenError):
@@ -38,77 +45,112 @@ def phase(world: World) -> str:
 
 
 class PolicyPlayer:
-    """Plays rollouts. It keeps one environment and one policy as long as the task stays the same."""
+    """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by a policy of its
+    own. It keeps the environment and the policies as long as the task stays the same."""
 
     def __init__(self, settings: EvaluateSettings, search: Sequence[str] = (), strict: bool = True):
         """
         Args:
-            strict: whether a policy that crashes in the very first episode ends the evaluation.
+            strict: whether a policy that crashes in the very first batch ends the evaluation.
         """
         self.settings, self.search, self.strict = settings, search, strict
-        self._running: tuple[PoolEnv, Policy] | None = None
+        self._running: tuple[str, PoolVectorEnv, list[Policy]] | None = None
 
-    def __call__(self, which: RolloutId) -> dict[str, Any]:
-        """Play one rollout, from reset to its end, or until the policy crashes.
+    def __call__(self, batch: Sequence[RolloutId]) -> list[dict[str, Any]]:
+        """Play rollouts of one task, from reset to their ends, or until their policies crash.
 
         Returns:
-            The record, with the actions that the controller received as `played` if episodes are kept.
+            The records, each with the actions that the controller received as `played` if episodes are kept.
 
         Raises:
-            BadPolicy: the policy returned an invalid action.
-            ForeignCode: the policy crashed in the first episode.
+            BadPolicy: a policy returned an invalid action.
+            ForeignCode: a policy crashed in the first batch.
         """
-        crashed = ""
+        envs, policies = self._prepared_for(batch[0].task)
+        rollouts = [_Rollout(*each) for each in zip(batch, envs.envs, policies, strict=False)]
+        self._play(envs, rollouts)
+        self.strict = False
+        return [rollout.record for rollout in rollouts]
+
+    def _play(self, envs: PoolVectorEnv, rollouts: "Sequence[_Rollout]") -> None:
+        """Play rollouts in the first slots."""
+        count, size = envs.action_space.shape or (0, 0)
+        names = [rollouts[min(slot, len(rollouts) - 1)].which.scenario for slot in range(count)]
+        seen, infos = envs.reset(options={"scenario": names, "reset_mask": np.arange(count) < len(rollouts)})
+        for slot, rollout in enumerate(rollouts):
+            info = {name: infos[name].tolist()[slot] for name in INFOS}
+            begin = partial(rollout.policy.reset, _of_slot(seen, slot), info, rollout.seed)
+            self._tried([rollout], f"its reset {rollout.where}", begin)
+        actions = np.zeros((count, size), np.float32)
+        while going := {slot: rollout for slot, rollout in enumerate(rollouts) if not rollout.record}:
+            chosen = self._actions([*going.values()], [_of_slot(seen, slot) for slot in going])
+            for (slot, rollout), action in zip(going.items(), chosen, strict=True):
+                if action is not None:
+                    actions[slot] = self._checked(rollout, action, size)
+            seen, _, terminated, truncated, infos = envs.step(actions)
+            for slot, rollout in going.items():
+                if not rollout.record and (terminated[slot] or truncated[slot]):
+                    rollout.end(bool(infos["success"][slot]), infos["reason"][slot])
+                    if self.settings.keep:
+                        rollout.record["played"] = rollout.env.played
+
+    def _actions(
+        self, rollouts: "Sequence[_Rollout]", observations: Sequence[Observation]
+    ) -> list[NDArray[np.float64] | None]:
+        """The next action in each rollout; None if its policy crashes, which ends it."""
+        policies, together = [one.policy for one in rollouts], getattr(rollouts[0].policy, "act_all", None)
+        if together is None or self.settings.slots == 1:
+            return [
+                self._tried([one], f"its act {one.where}", lambda one=one, seen=seen: _array(one.policy.act(seen)))
+                for one, seen in zip(rollouts, observations, strict=True)
+            ]
+        found = self._tried(rollouts, "its act_all", lambda: [*map(_array, together(policies, observations))])
+        if found is not None and len(found) != len(rollouts):
+            told = f"its act_all returns {len(found)} actions for {len(rollouts)} policies"
+            raise BadPolicy(f"policy {self.settings.name}: {told}")
+        return [None] * len(rollouts) if found is None else [*found]
+
+    def _tried(self, rollouts: "Sequence[_Rollout]", part: str, call: Callable[[], A]) -> A | None:
+        """What a part of a policy returns; None if it crashes, which ends its rollouts."""
         try:
-            success, reason = self._played(which)
+            with policy_errors(self.settings.name, part):
+                return call()
         except ForeignCode as error:
             if self.strict:
                 raise
-            success, reason, crashed = False, "", str(error)
-        self.strict = False
-        env, _ = self._prepared_for(which.task)
-        told = {"success": success, "reason": reason, "seconds": round(env.world.time, 3), "phase": phase(env.world)}
-        key = {"pool": which.pool, "scenario": which.scenario, "rollout": which.rollout}
-        kept = {"played": env.played} if self.settings.keep and not crashed else {}
-        return {**key, **told, **({"crashed": crashed} if crashed else {}), **kept}
+            for rollout in rollouts:
+                rollout.end(False, "", crashed=str(error))
+            return None
 
-    def _played(self, which: RolloutId) -> tuple[bool, str]:
-        """Whether a rollout succeeds, and why not."""
-        env, policy = self._prepared_for(which.task)
-        observation, info = env.reset(options={"scenario": which.scenario})
-        name, where = self.settings.name, f"on scenario {env.row.name}"
-        with policy_errors(name, f"its reset {where}"):
-            policy.reset(observation, info, int(2**31 * unit("rollout", which.scenario, which.rollout)))
-        over = False
-        while not over:
-            with policy_errors(name, f"its act {where}"):
-                action = np.asarray(policy.act(observation), float)
-            try:
-                observation, _, terminated, truncated, info = env.step(action)
-            except (ValueError, TypeError) as error:
-                raise BadPolicy(f"policy {name} {where}: {error}") from None
-            over = terminated or truncated
-        return bool(info["success"]), info["reason"]
+    def _checked(self, rollout: "_Rollout", action: NDArray[np.float64], size: int) -> NDArray[np.float32]:
+        try:
+            return checked(action, size)
+        except ValueError as error:
+            raise BadPolicy(f"policy {self.settings.name} {rollout.where}: {error}") from None
 
     def identities(self, tasks: set[str]) -> dict[str, str]:
         """Hashes of the policy by task, see `policies.identity`."""
         return {task: self._identity(task) for task in sorted(tasks)}
 
     def _identity(self, task: str) -> str:
-        _, policy = self._prepared_for(task)
+        _, policies = self._prepared_for(task)
         factory = find_policy(self.settings.name, client=self.settings.remote)
-        return identity(self.settings.name, factory, policy)
+        return identity(self.settings.name, factory, policies[0])
 
-    def _prepared_for(self, task: str) -> tuple[PoolEnv, Policy]:
-        if self._running and self._running[0].task.name != task:
+    def _prepared_for(self, task: str) -> tuple[PoolVectorEnv, list[Policy]]:
+        if self._running and self._running[0] != task:
             self.close()
         if not self._running:
             settings, remote = self.settings, self.settings.remote
             folders = [f for f in settings.folders if task in Pool.open(f).kinds("task")[0]]
-            env = PoolEnv(
+            observed = remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations
+            envs = PoolVectorEnv(
                 task,
                 folders,
-                remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations,
+                settings.slots,
+                settings.threads,
+                AutoresetMode.DISABLED,
+                observations=observed,
                 width=settings.width,
                 height=settings.height,
                 action_filter=settings.action_filter,
@@ -119,18 +161,56 @@ class PolicyPlayer:
             )
             memory = _training(folders) if settings.name == REPLAY else None
             factory = find_policy(settings.name, memory, remote)
-            self._running = env, make_policy(settings.name, factory, env)
-        return self._running
+            self._running = task, envs, [make_policy(settings.name, factory, env) for env in envs.envs]
+        return self._running[1:]
 
     def close(self) -> None:
-        """Close the environment, and the policy if it has a method `close`."""
+        """Close the environment, and the policies if they have a method `close`."""
         if self._running:
-            env, policy = self._running
-            env.close()
-            if callable(close := getattr(policy, "close", None)):
-                with policy_errors(self.settings.name, "its close"):
-                    close()
+            _, envs, policies = self._running
+            envs.close()
+            for policy in policies:
+                if callable(close := getattr(policy, "close", None)):
+                    with policy_errors(self.settings.name, "its close"):
+                        close()
             self._running = None
+
+
+@dataclass
+class _Rollout:
+    """A rollout in a slot."""
+
+    which: RolloutId
+    env: PoolEnv
+    policy: Policy
+    record: dict[str, Any] = field(default_factory=dict)
+    """What is known at its end; empty before."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of the policy's random numbers."""
+        return int(2**31 * unit("rollout", self.which.scenario, self.which.rollout))
+
+    @property
+    def where(self) -> str:
+        """The scenario, for errors."""
+        return f"on scenario {self.env.row.name}"
+
+    def end(self, success: bool, reason: str, **more: str) -> None:
+        """Write its record."""
+        key = {"pool": self.which.pool, "scenario": self.which.scenario, "rollout": self.which.rollout}
+        world = self.env.world
+        told = {"success": success, "reason": reason, "seconds": round(world.time, 3), "phase": phase(world)}
+        self.record = {**key, **told, **more}
+
+
+def _of_slot(seen: Mapping[str, Any], slot: int) -> Observation:
+    """The observation of one slot."""
+    return {name: values[slot] for name, values in seen.items()}
+
+
+def _array(action: ArrayLike) -> NDArray[np.float64]:
+    return np.asarray(action, float)
 
 
 def _training(folders: Sequence[str]) -> Library | None:

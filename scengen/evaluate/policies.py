@@ -1,7 +1,9 @@
 """Policies: their interface, how one is found by name, and four built-in ones that serve as references for a pool.
 
 A policy is any object with the two methods of `Policy` that `factory(env)` returns. The factory is named
-`module:factory` and called once in every process and for every task.
+`module:factory` and called for every slot in every process and for every task. A policy may have a static method
+`act_all(policies, observations)` that returns the actions of several of them, in their order: a network computes those
+of all slots at once.
 """
 
 import hashlib

@@ -4,7 +4,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -78,8 +78,7 @@ def evaluate(
             done = len(wanted) - len(todo)
             progress(done, len(wanted))
             player.strict = not done
-            play = player if settings.workers == 1 else _for_workers(player)
-            for count, episode in enumerate(each(play, todo, settings.workers, lost=_crashed), done + 1):
+            for count, episode in enumerate(_played(player, todo), done + 1):
                 played, task = episode.pop("played", None), about[episode["pool"], episode["scenario"]]["task"]
                 if played is not None:
                     keep(_id({"task": task, **episode}), played)
@@ -91,6 +90,25 @@ def evaluate(
         key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
     )
     return Evaluation(episodes, done, lost)
+
+
+def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[str, Any]]:
+    """Records of the rollouts as their batches are played. Those of a batch whose process dies are played alone."""
+    settings, alone = player.settings, list[Sequence[RolloutId]]()
+    play = player if settings.workers == 1 else _for_workers(player)
+
+    def lost(batch: Sequence[RolloutId], reason: str) -> list[dict[str, Any]]:
+        if len(batch) == 1:
+            return [_crashed(batch[0], reason)]
+        alone.extend([which] for which in batch)
+        return []
+
+    of_tasks = [list(group) for _, group in itertools.groupby(todo, lambda which: which.task)]
+    batches = [some[i : i + settings.slots] for some in of_tasks for i in range(0, len(some), settings.slots)]
+    for records in each(play, batches, settings.workers, lost=lost):
+        yield from records
+    for records in each(play, alone, settings.workers, lost=lost):
+        yield from records
 
 
 def _id(episode: Mapping[str, Any]) -> RolloutId:

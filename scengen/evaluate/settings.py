@@ -6,10 +6,12 @@ from functools import cached_property
 from pathlib import Path
 
 from ..control.teleop import check_filter
+from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, at_least, cut
 from ..learn.store import is_policy, read_settings
 from ..pool import collection
+from ..work.machine import cores
 from ..work.parallel import Workers
 from .policies import FULL_RATE_POLICIES
 from .remote.client import ClientSettings, address_of, is_address, read_client
@@ -40,6 +42,7 @@ class EvaluateSettings:
     width: int = 256
     height: int = 256
     workers: Workers = 1
+    slots: int = 1
     to: str | None = None
     version: str | None = None
     fresh: bool = False
@@ -103,6 +106,11 @@ class EvaluateSettings:
         """Names of observations and actions of a policy behind a socket; None for other policies."""
         return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
 
+    @property
+    def threads(self) -> int:
+        """Number of threads that step the slots of a process."""
+        return max(1, cores() // self.workers) if isinstance(self.workers, int) else 1
+
     def check_pools(self) -> None:
         """Raise `BadConfig` unless the settings name pools, or sets of an edition."""
         if self.pool is None and self.edition is None:
@@ -119,6 +127,8 @@ class EvaluateSettings:
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
+        if not 1 <= self.slots <= MAX_SLOTS:
+            raise BadConfig(f"slots = {self.slots}; it must lie in [1, {MAX_SLOTS}]")
         if self.action_repeat != 1 and self.name in FULL_RATE_POLICIES:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.name} acts at 100 Hz: leave it out")
         if set(self.keep) - {EPISODES}:

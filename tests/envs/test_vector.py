@@ -139,6 +139,49 @@ def test_returned_arrays_are_never_written_again():
     assert all(np.array_equal(seen[name], kept[name]) for name in seen)
 
 
+@pytest.mark.usefixtures("brief")
+def test_without_autoreset_a_slot_waits_for_its_reset():
+    envs = PoolVectorEnv("domino_single", REFERENCE, 4, autoreset_mode=AutoresetMode.DISABLED)
+    env = PoolEnv("domino_single", REFERENCE)
+    names = [row.id for row in Pool.open(REFERENCE).rows(witness=False)]
+    envs.reset(seed=0)
+    given, over, rewards, ends = actions(STEPS, 4), np.zeros(4, bool), np.zeros(4), {}
+    for row in given:
+        before, (seen, rewards, terminated, truncated, infos) = over, envs.step(row)
+        over = terminated | truncated
+        assert (over >= before).all() and not rewards.any()
+        for slot in np.flatnonzero(over & ~before):
+            ends[slot] = {name: value[slot].copy() for name, value in seen.items()}
+            assert infos["reason"][slot] == "too late"
+        for slot in np.flatnonzero(before):
+            assert all(np.array_equal(seen[name][slot], value) for name, value in ends[slot].items())
+    assert over.all()
+    mask = np.array([False, True, False, False])
+    seen, infos = envs.reset(options={"scenario": names[5], "reset_mask": mask, "labels": True})
+    assert infos["scenario"][1] == names[5] and infos["_scenario"].tolist() == mask.tolist()
+    seen, _, terminated, _, _ = envs.step(given[0])
+    assert terminated.tolist() == [True, False, True, True]
+    env.reset(options={"scenario": names[5]})
+    single = env.step(given[0, 1])[0]
+    assert all(np.array_equal(seen[name][1], value) for name, value in single.items())
+    assert all(np.array_equal(seen[name][0], value) for name, value in ends[0].items())
+
+
+def test_slots_that_the_first_reset_leaves_out_stand_still():
+    envs = PoolVectorEnv("domino_single", REFERENCE, 2, autoreset_mode=AutoresetMode.DISABLED)
+    envs.reset(seed=0, options={"reset_mask": [True, False]})
+    _, _, _, truncated, _ = envs.step(np.zeros((2, 7)))
+    assert truncated.tolist() == [False, True]
+    assert [world.time for world in envs.get_attr("world")] == [pytest.approx(0.01), 0.0]
+
+
+@pytest.mark.parametrize("mask", [[True], [False, False], [0, 1], "1"])
+def test_a_mask_that_is_none_is_refused(mask):
+    envs = PoolVectorEnv("domino_single", REFERENCE, 2)
+    with pytest.raises(BadConfig, match="give 2 booleans, one of them true"):
+        envs.reset(options={"reset_mask": mask})
+
+
 def test_scenarios_can_be_named_for_each_slot():
     order = [row.id for row in Pool.open(REFERENCE).rows(witness=False)]
     envs = PoolVectorEnv("domino_single", REFERENCE, 2)
@@ -163,7 +206,7 @@ def test_pictures_are_those_of_single_environments():
     [
         ({"num_envs": 0}, BadConfig, r"num_envs = 0; it must be a whole number in \[1, 4096\]"),
         ({"threads": 1.5}, BadConfig, "threads = 1.5; it must be a whole number"),
-        ({"autoreset_mode": AutoresetMode.DISABLED}, UnknownName, "no autoreset_mode named 'Disabled'"),
+        ({"autoreset_mode": "Never"}, UnknownName, "no autoreset_mode named 'Never'"),
         ({"observations": ["nothing"]}, UnknownName, "no observation named 'nothing'"),
     ],
 )

@@ -3,7 +3,8 @@
     python policy_server.py openpi|gr00t ACTIONS.npy LOG.json [FAULT]
 
 It prints its port, plays the rows of ACTIONS.npy in chunks of 20, and writes a description of the last observation
-into LOG.json. With a FAULT it misbehaves from the second request on.
+into LOG.json, with the largest number of requests that it had at once. With a FAULT it misbehaves from the second
+request on; "slow" takes some time for each.
 """
 
 import json
@@ -29,12 +30,17 @@ class Policy:
 
     def __init__(self, actions, log, fault):
         self.actions, self.log, self.fault = np.load(actions).astype(np.float32), log, fault
-        self.asked = self.next = 0
+        self.asked = self.next = self.pending = self.most = 0
 
     def chunk(self, observation):
         self.asked += 1
+        self.pending += 1
+        self.most = max(self.most, self.pending)
+        if self.fault == "slow":
+            time.sleep(0.02)
+        self.pending -= 1
         with open(self.log, "w") as file:
-            json.dump({"asked": self.asked, **described(observation)}, file)
+            json.dump({"asked": self.asked, "most": self.most, **described(observation)}, file)
         found = self.actions[self.next : self.next + CHUNK]
         idle = np.append(np.zeros(6, np.float32), self.actions[-1, -1:])
         found = np.concatenate([found, np.tile(idle, (CHUNK - len(found), 1))])

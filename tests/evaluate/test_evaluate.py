@@ -62,6 +62,13 @@ def test_random_actions_are_the_same_for_the_same_rollout_only(tmp_path):
     assert first == again
 
 
+@pytest.mark.parametrize("policy", ["random", "oracle", "replay"])
+def test_slots_change_no_result(policy, tmp_path):
+    """Six episodes of unequal lengths, in batches of four and two."""
+    alone, together = (run(tmp_path / str(slots), policy, seeds=6, slots=slots) for slots in (1, 4))
+    assert alone == together and len({e["seconds"] for e in alone}) > 1
+
+
 def test_replay_never_plays_a_scenarios_own_witness(tmp_path):
     outcomes = [e["success"] for e in run(tmp_path, "replay", seeds=6)]
     assert outcomes.count(False) >= 1  # its own witness succeeds in every one of them
@@ -275,6 +282,37 @@ CRASHING = (
     "        if self.bad: raise RuntimeError('no GPU')\n"
     "        return [0] * 7\n"
 )
+
+
+TOGETHER = (
+    "class Up:\n"
+    "    calls = []\n"
+    "    def __init__(self, env): self.env = env\n"
+    "    def reset(self, *_): self.steps = 0\n"
+    "    def act(self, seen): raise RuntimeError('alone')\n"
+    "    @staticmethod\n"
+    "    def act_all(policies, seen):\n"
+    "        Up.calls.append(len(policies))\n"
+    "        for policy, one in zip(policies, seen):\n"
+    "            assert (one['robot0_eef_pos'] == policy.env._observe()['robot0_eef_pos']).all()\n"
+    "        return [[0] * 7] * len(policies)\n"
+)
+
+
+def test_a_policy_can_act_for_all_slots_in_one_call(mine, tmp_path, capsys):
+    assert mine("seeds=5", "slots=2", source=TOGETHER) == 0
+    (calls,) = (module.Up.calls for name, module in sys.modules.items() if name.startswith("mine_test_a_policy_can"))
+    assert set(calls) == {1, 2} and len((tmp_path / "out" / "episodes.jsonl").read_text().splitlines()) == 1 + 5
+    wrong = TOGETHER.replace("* len(policies)", "")
+    assert mine("seeds=5", "slots=2", "fresh=true", source=wrong) == 2
+    assert "its act_all returns 1 actions for 2 policies" in capsys.readouterr().err
+    assert mine("slots=0") == 2 and "slots = 0; it must lie in [1, 4096]" in capsys.readouterr().err
+
+
+def test_a_crash_in_one_slot_leaves_the_others_alone(mine, tmp_path, capsys):
+    source = CRASHING.replace("== 2", "== 5")
+    assert mine("seeds=6", "slots=3", source=source) == 1
+    assert "crashed in 1 of 6 episodes" in capsys.readouterr().err
 
 
 def test_a_crash_of_a_policy_is_counted_beside_the_rate(mine, tmp_path, capsys):

@@ -173,6 +173,11 @@ def test_episodes_of_unknown_weights_are_not_mixed(serve, client, tmp_path):
     assert len(play(address, file, tmp_path / "named", version="step 1000", rollouts=2)) == 2
 
 
+def test_slots_ask_at_the_same_time(serve, client, tmp_path):
+    episodes = play(serve("openpi", "slow"), client("openpi"), tmp_path / "out", slots=3, rollouts=3)
+    assert len(episodes) == 3 and json.loads((tmp_path / "log.json").read_text())["most"] == 3
+
+
 @pytest.mark.slow
 def test_workers_have_connections_of_their_own(serve, client, tmp_path):
     episodes = play(serve("gr00t"), client("gr00t"), tmp_path / "out", workers=2, seeds=2)

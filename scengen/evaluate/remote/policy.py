@@ -3,7 +3,8 @@
 import hashlib
 import json
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -62,14 +63,28 @@ class RemotePolicy:
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """The next action of the chunk; a request for another chunk if `execute` of its actions are played."""
-        self._history.append(observation)
-        if not self._plan:
-            self._plan.extend(self._chunk(self.server.infer(self._request()))[: self.client.execute])
-        return self._plan.popleft()
+        return self.act_all([self], [observation])[0]
+
+    @staticmethod
+    def act_all(policies: "Sequence[RemotePolicy]", observations: Sequence[Observation]) -> list[NDArray[np.float32]]:
+        """The next actions of several policies, which send their requests at the same time."""
+        for policy, observation in zip(policies, observations, strict=True):
+            policy._history.append(observation)
+        asking = [policy for policy in policies if not policy._plan]
+        if len(asking) > 1:
+            with ThreadPoolExecutor(len(asking)) as crew:
+                list(crew.map(RemotePolicy._ask, asking))
+        elif asking:
+            asking[0]._ask()  # not in a thread: Ctrl-C ends it
+        return [policy._plan.popleft() for policy in policies]
 
     def close(self) -> None:
         """Close the connection."""
         self.server.close()
+
+    def _ask(self) -> None:
+        """Request a chunk; `execute` of its actions are played."""
+        self._plan.extend(self._chunk(self.server.infer(self._request()))[: self.client.execute])
 
     def _request(self) -> dict[str, Any]:
         """The observation under the server's names."""
