@@ -165,7 +165,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
                     rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._told(outcome)
 
         self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh and not stays[slot]])
-        infos |= self._begin(fresh)
+        if fresh:
+            infos |= self._begin(fresh)
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
         seen, final = self._observed(), dict[int, dict[str, Any]]()
         if self._mode == AutoresetMode.SAME_STEP and (over := terminated | truncated).any():
