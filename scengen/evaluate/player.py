@@ -48,12 +48,19 @@ class PolicyPlayer:
     """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by a policy of its
     own. It keeps the environment and the policies as long as the task stays the same."""
 
-    def __init__(self, settings: EvaluateSettings, search: Sequence[str] = (), strict: bool = True):
+    def __init__(
+        self,
+        settings: EvaluateSettings,
+        search: Sequence[str] = (),
+        strict: bool = True,
+        threads: int | None = None,
+    ):
         """
         Args:
             strict: whether a policy that crashes in the very first batch ends the evaluation.
+            threads: number of threads that step the slots; None for the available cores.
         """
-        self.settings, self.search, self.strict = settings, search, strict
+        self.settings, self.search, self.strict, self.threads = settings, search, strict, threads
         self._running: tuple[str, PoolVectorEnv, list[Policy]] | None = None
 
     def __call__(self, batch: Sequence[RolloutId]) -> list[dict[str, Any]]:
@@ -148,7 +155,7 @@ class PolicyPlayer:
                 task,
                 folders,
                 settings.slots,
-                settings.threads,
+                self.threads,
                 AutoresetMode.DISABLED,
                 observations=observed,
                 width=settings.width,

@@ -18,6 +18,7 @@ from ..samplers.split import ID
 from ..task_files import about as about_task
 from ..validate.playable import unplayable
 from ..work.log import Log
+from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import refused, try_folder
 from .player import PolicyPlayer
@@ -203,9 +204,11 @@ def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, An
 def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
     """The player of each worker, which may run in another folder: with absolute paths."""
     settings = player.settings
+    threads = max(1, cores() // settings.workers) if isinstance(settings.workers, int) else 1
     folders = [str(Path(folder).resolve()) for folder in settings.folders]
     client = settings.remote and str(Path(settings.remote.file).resolve())
-    return PolicyPlayer(replace(settings, pool=folders, client=client, workers=1), player.search, player.strict)
+    changed = replace(settings, pool=folders, client=client, workers=1)
+    return PolicyPlayer(changed, player.search, player.strict, threads)
 
 
 def _move_aside(path: Path) -> None:

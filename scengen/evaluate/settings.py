@@ -11,7 +11,6 @@ from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, at_least, cut
 from ..learn.store import is_policy, read_settings
 from ..pool import collection
-from ..work.machine import cores
 from ..work.parallel import Workers
 from .policies import FULL_RATE_POLICIES
 from .remote.client import ClientSettings, address_of, is_address, read_client
@@ -105,11 +104,6 @@ class EvaluateSettings:
     def remote(self) -> ClientSettings | None:
         """Names of observations and actions of a policy behind a socket; None for other policies."""
         return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
-
-    @property
-    def threads(self) -> int:
-        """Number of threads that step the slots of a process."""
-        return max(1, cores() // self.workers) if isinstance(self.workers, int) else 1
 
     def check_pools(self) -> None:
         """Raise `BadConfig` unless the settings name pools, or sets of an edition."""
