@@ -3,6 +3,9 @@
 The perceptrons are scikit-learn's `MLPRegressor`. An epoch is one `fit` of each that continues from the weights of the
 epoch before, with fresh noise and a learning rate of its own. All random numbers depend on the seed, the member and the
 epoch, and the arithmetic runs on one core: the same data give the same weights, with or without interruptions.
+
+One pass of one perceptron over 48 300 rows of 176 inputs took scikit-learn 1.0 to 1.5 s of processor time, and the same
+network in jax 0.7.1 (compiled, one core, by turns) 0.65 to 0.9 s. This saves too little for another dependency.
 """
 
 import math
