@@ -158,9 +158,9 @@ the scenarios, each with its trainings; one that holds 0 is below its noise. Mad
 
 """
 STYLES_SHOWN = """
-Variation does not help these policies. Of 7 failures of `long_handle` after varied demonstrations that were looked at, 6
-hold the hook and creep on at 2 to 5 mm/s from the 8th to 11th second on. Varied demonstrations pause before a third of
-their moves, nominal ones never; 8 episodes of a policy that had learned from those never slowed down like this.
+Variation does not help these policies. Of 7 failures of `long_handle` after varied demonstrations that were looked at,
+6 hold the hook and creep on at 2 to 5 mm/s from the 8th to 11th second on. Varied demonstrations pause before a third
+of their moves, nominal ones never; 8 episodes of a policy that had learned from those never slowed down like this.
 
 Policies that predicted actions instead of goals, and saw no sizes (20 epochs, three trainings), gained 42 points in
 training by variation in `balance_medium` (7 of 20 without it) and 10 in `edge_slide`, within noise, and lost 17 in
@@ -177,9 +177,8 @@ number is that of one training. Made by `python tools/trainings.py curation`.
 
 """
 CURATION_SHOWN = """
-A third of such episodes ruins a policy of goals. Policies that predicted actions suffered less, and gained less by
-curation: 45 and 43 points in training beside all and random in `balance_medium`, 17 and 55 in `edge_slide` (20 epochs,
-three trainings).
+A third of such episodes ruins a policy of goals. Those that predicted actions gained less by curation: 45 and 43 points
+in training over all and random in `balance_medium`, 17 and 55 in `edge_slide` (20 epochs, three trainings).
 """
 WRENCH = """
 ## What the wrench is worth
