@@ -88,7 +88,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._mode = mode
         self._rows, self._next = first._rows, 0
         self._labels = False
-        self._begun, self._terminated, self._truncated = np.zeros((3, self.num_envs), np.bool_)
+        self._terminated, self._truncated = np.zeros((2, self.num_envs), np.bool_)
+        self._begun = False
         self._infos: dict[str, NDArray[Any]] = {
             **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in INFOS},
             **{name: np.zeros(self.num_envs, np.bool_) for name in ("success", "is_success")},
@@ -123,11 +124,12 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             raise UnknownName("reset option", unknown.pop(), (*RESET_OPTIONS, MASK))
         mask = self._mask((options or {}).get(MASK))
         self._labels = bool((options or {}).get("labels"))
-        fresh = np.flatnonzero(mask | ~self._begun).tolist()
+        first = not self._begun
+        fresh = np.flatnonzero(mask | first).tolist()
         numbers = self._numbers(seed, (options or {}).get("scenario"), fresh)
         infos = self._begin({slot: self._rows[number] for slot, number in numbers.items()})
-        self._terminated, self._truncated = self._terminated & ~mask, (self._truncated | ~self._begun) & ~mask
-        self._begun[:] = True
+        self._terminated, self._truncated = self._terminated & ~mask, (self._truncated | first) & ~mask
+        self._begun = True
         return self._observed(), self._gathered(infos)
 
     def step(self, actions: ArrayLike) -> Steps:
@@ -140,12 +142,12 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
         """
         given = self._checked(actions)
-        if not self._begun.all():
+        if not self._begun:
             raise BadConfig("no scenario is running; call reset first")
         over = self._terminated | self._truncated
         fresh = self._handed_out(over) if self._mode == AutoresetMode.NEXT_STEP else {}
         rewards = np.zeros(self.num_envs)
-        stays = over if self._mode == AutoresetMode.DISABLED else np.zeros(self.num_envs, np.bool_)
+        stays = over & (self._mode == AutoresetMode.DISABLED)
         terminated, truncated = self._terminated & stays, self._truncated & stays
         infos: dict[int, dict[str, Any]] = {}
         times = self._infos["time"]

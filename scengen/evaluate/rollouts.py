@@ -106,10 +106,9 @@ def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[st
 
     of_tasks = [list(group) for _, group in itertools.groupby(todo, lambda which: which.task)]
     batches = [some[i : i + settings.slots] for some in of_tasks for i in range(0, len(some), settings.slots)]
-    for records in each(play, batches, settings.workers, lost=lost):
-        yield from records
-    for records in each(play, alone, settings.workers, lost=lost):
-        yield from records
+    for some in (batches, alone):
+        for records in each(play, some, settings.workers, lost=lost):
+            yield from records
 
 
 def _id(episode: Mapping[str, Any]) -> RolloutId:

@@ -317,6 +317,27 @@ def test_a_crash_in_one_slot_leaves_the_others_alone(mine, tmp_path, capsys):
     assert "crashed in 1 of 6 episodes" in capsys.readouterr().err
 
 
+DYING = (
+    "import os\n"
+    "class Up:\n"
+    "    def __init__(self, env): self.env = env\n"
+    "    def reset(self, *_): self.bad = self.env.row.index == 2\n"
+    "    def act(self, _):\n"
+    "        if self.bad: os._exit(3)\n"
+    "        return [0] * 7\n"
+)
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_takes_one_episode_of_its_batch(mine, tmp_path, capsys):
+    assert mine("seeds=4", "slots=3", "workers=2", "action_repeat=20", source=DYING) == 1
+    assert "crashed in 1 of 4 episodes" in capsys.readouterr().err
+    _, *records = map(json.loads, (tmp_path / "out" / "episodes.jsonl").read_text().splitlines())
+    assert len(records) == 4 and [one["crashed"] for one in records if "crashed" in one] == [
+        "the process died: it ended with 3"
+    ]
+
+
 def test_a_crash_of_a_policy_is_counted_beside_the_rate(mine, tmp_path, capsys):
     assert mine("seeds=3", source=CRASHING) == 1
     assert "crashed in 1 of 3 episodes, which are in no rate" in capsys.readouterr().err
