@@ -10,6 +10,7 @@ request on; "slow" takes some time for each.
 import json
 import socket
 import sys
+import threading
 import time
 
 import msgpack
@@ -31,14 +32,20 @@ class Policy:
     def __init__(self, actions, log, fault):
         self.actions, self.log, self.fault = np.load(actions).astype(np.float32), log, fault
         self.asked = self.next = self.pending = self.most = 0
+        self.lock = threading.Lock()  # each connection has a thread of its own
 
     def chunk(self, observation):
-        self.asked += 1
-        self.pending += 1
-        self.most = max(self.most, self.pending)
+        with self.lock:
+            self.pending += 1
+            self.most = max(self.most, self.pending)
         if self.fault == "slow":
-            time.sleep(0.02)
-        self.pending -= 1
+            time.sleep(0.1)
+        with self.lock:
+            self.pending -= 1
+            return self._chunk(observation)
+
+    def _chunk(self, observation):
+        self.asked += 1
         with open(self.log, "w") as file:
             json.dump({"asked": self.asked, "most": self.most, **described(observation)}, file)
         found = self.actions[self.next : self.next + CHUNK]
