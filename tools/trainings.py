@@ -42,6 +42,8 @@ from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
+from scengen.pool.files import sha256
+from scengen.samplers.split import ID
 
 AXES = {
     "domino_single": ("diagonal", "stout_starter"),
@@ -159,9 +161,17 @@ def records(task: str) -> list[dict[str, Any]]:
 
 
 def _made(task: str) -> dict[str, Any]:
-    """How trainings of a task are made: their format and number of epochs, and the hashes of the pools by split."""
-    hashes = {split: Pool.open(pool).sha256 for split, pool in pools(task).items()}
-    return {"format": FORMAT, "epochs": TrainSettings().epochs, "pools_sha256": hashes}
+    """How trainings of a task are made: their format and number of epochs, and what is drawn in each split.
+
+    Machines with different fingerprints draw the same scenarios, and write pools that differ in the last bits.
+    """
+    own = load_task(task)
+    moved = {split: {} if split == ID else own.shifts(split) for split in (ID, *AXES[task])}
+    told = {
+        split: {name: str(dist) for name, dist in {**own.training, **dists}.items()} for split, dists in moved.items()
+    }
+    hashes = {split: sha256(json.dumps(dists, sort_keys=True)) for split, dists in told.items()}
+    return {"format": FORMAT, "epochs": TrainSettings().epochs, "draws_sha256": hashes}
 
 
 def identity(record: dict[str, Any]) -> Training:
@@ -205,7 +215,8 @@ def train(training: Training) -> dict[str, Any]:
         for split, episodes in baselines.episodes(to / "evaluation", evaluated).items()
     }
     solved = {split: sum(own) for split, own in outcomes.items()}
-    return {**asdict(training), "solved": solved, "outcomes": outcomes, **_made(training.task)}
+    played = {"pools_sha256": {split: Pool.open(pool).sha256 for split, pool in evaluated.items()}}
+    return {**asdict(training), "solved": solved, "outcomes": outcomes, **played, **_made(training.task)}
 
 
 # --- sets of demonstrations ---------------------------------------------------------------
