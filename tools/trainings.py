@@ -166,11 +166,10 @@ def _made(task: str) -> dict[str, Any]:
     Machines with different fingerprints draw the same scenarios, and write pools that differ in the last bits.
     """
     own = load_task(task)
-    moved = {split: {} if split == ID else own.shifts(split) for split in (ID, *AXES[task])}
-    told = {
-        split: {name: str(dist) for name, dist in {**own.training, **dists}.items()} for split, dists in moved.items()
-    }
-    hashes = {split: sha256(json.dumps(dists, sort_keys=True)) for split, dists in told.items()}
+    hashes = {}
+    for split in (ID, *AXES[task]):
+        dists = {name: str(dist) for name, dist in {**own.training, **own.shifts(split)}.items()}
+        hashes[split] = sha256(json.dumps(dists, sort_keys=True))
     return {"format": FORMAT, "epochs": TrainSettings().epochs, "draws_sha256": hashes}
 
 
