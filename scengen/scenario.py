@@ -126,6 +126,8 @@ class Scenario(abc.ABC):
     `shortcuts`, `ablations`, `constraints`, `features`, `facts`, geometry.
     """
 
+    VERSION: ClassVar[int] = 1
+    """Version of the task. It rises when draws, scenes, rules or verdicts change, and never for a refactoring."""
     HOLD: ClassVar[float] = 0.0
     """Time for which the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()

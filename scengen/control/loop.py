@@ -193,6 +193,10 @@ class Loop:
         """
         self._arms[arm]["state"]["jammed"] = float(on)
 
+    def jammed(self, arm: int) -> bool:
+        """Whether the gripper of an arm is jammed."""
+        return bool(self._arms[arm]["state"]["jammed"])
+
     def state(self) -> NDArray[np.float64]:
         """Everything that the future depends on: integration state, controllers, contact tables and warnings."""
         physics = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))

@@ -519,15 +519,15 @@ class World:
 
         `ROBOT` and the `label` of an arm are accepted in the place of a body.
         """
-        return bool(self.loop.touching[self._label(a), self._label(b)])
+        return bool(self.loop.touching[self.row(a), self.row(b)])
 
     def touched(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step since the start. Names as for `touching`."""
-        return bool(self.loop.touched[self._label(a), self._label(b)])
+        return bool(self.loop.touched[self.row(a), self.row(b)])
 
     def touching_bodies(self, body: str) -> set[str]:
         """Names of the bodies that touched a body in the last control period. `ROBOT` stands for the robot's bodies."""
-        others = self.loop.touching[self._label(body)]
+        others = self.loop.touching[self.row(body)]
         scene = {self.model.body(int(i)).name for i in np.flatnonzero(others[: self.model.nbody]) if i not in self.own}
         return scene | {ROBOT} if others[-1] and body != ROBOT else scene
 
@@ -595,6 +595,6 @@ class World:
         joints = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         return tuple(self.model.body(int(self.model.jnt_bodyid[j])).name for j in joints)
 
-    def _label(self, name: str) -> int:
-        """Row of the loop's contact table for a name."""
+    def row(self, name: str) -> int:
+        """Row of the loop's contact tables for a name as in `touching`."""
         return self._labels[name] if name in self._labels else self.body(name)

@@ -1,0 +1,1 @@
+"""Evidence about tasks: their stored behaviour, and the figures that were measured on them."""

@@ -1,0 +1,351 @@
+"""Stored behaviour of a task: what it declares and draws, what its rules say, and how rollouts end.
+
+The file `conf/behaviour/<task>.json` says what version N of a task is. As long as a task behaves like its file, every
+figure that was measured on version N stands, whatever was renamed or moved in the code.
+"""
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..assets.prop import table
+from ..errors import Infeasible, PoolError
+from ..fingerprint import fingerprint
+from ..params import parameters
+from ..samplers.split import ID
+from ..samplers.task import Draw, Task
+from ..scenario import Plan, Scenario
+from ..sim import scene_text
+from ..sim.world import World
+from ..task_files import conf_dir
+from ..validate.identity import source_sha256
+from ..validate.rebuilt import portable_sha256
+from ..versions import versions
+from . import edges, rules
+from .rollouts import Stage
+
+FORMAT = 1
+"""Format of a behaviour file, which includes the rollouts and states of which it consists."""
+SEED = 7
+"""Seed of the draws."""
+TRAINING_DRAWS = 3
+"""Number of stored training draws. All rollouts are played in the first one, and the oracle alone in the others."""
+CORE = ("oracle", "noise 0.3", "idle", "shortcut", "jitter 1", "ablation")
+"""Beginnings of the names of the rollouts that are played for every change of the code. Raw shortcuts are not among
+them."""
+
+Cheat = tuple[Callable[[Scenario, World], Plan], bool]
+"""A plan that once reached the goal without the intended means, and whether it acts without the filter."""
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """Behaviour of one version of a task, as plain data."""
+
+    task: str
+    version: int
+    made: Mapping[str, Any]
+    """`fingerprint` of the machine, `versions` of packages, and `text`, the hash of the code at the last full
+    comparison."""
+    declared: Mapping[str, Any]
+    """Declared values: time limit, instruction, bounds, distributions, hash of the robot."""
+    draws: Mapping[str, Mapping[str, Any]]
+    """Draws by split and index: id, attempt, portable hashes of scene and ablations, features, facts, orientation."""
+    constraints: Sequence[Any]
+    """Limits of the constraints, see `edges.Edge`."""
+    answers: Sequence[str]
+    """Answers of the rules, to which `states` and `limits` refer by number."""
+    contacts: Sequence[Sequence[str]]
+    """Questions about contact that the rules ask, see `rules.Contact`."""
+    states: Sequence[Mapping[str, Any]]
+    """Stored states and what the rules say of them, of other contacts, and of random changes."""
+    limits: Sequence[Any]
+    """Limits of the rules: state, coordinate, magnitude, answers before and after."""
+    rollouts: Mapping[str, Sequence[Any]]
+    """Verdict, time [s] and bits of each rollout, see `rollouts.Played`."""
+
+    @classmethod
+    def read(cls, path: Path) -> "Behaviour":
+        """The behaviour in a file.
+
+        Raises:
+            PoolError: there is none, it is damaged, or it has another format.
+        """
+        if not path.is_file():
+            raise PoolError(f"no stored behaviour at {path}; write it with python tools/behaviour.py write {path.stem}")
+        try:
+            plain = json.loads(path.read_text())
+            if plain.pop("format") == FORMAT:
+                return cls(**plain)
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise PoolError(f"{path} is damaged ({' '.join(str(error).split())[:160]}); restore it") from None
+        raise PoolError(f"{path} has another format than {FORMAT}; install the scengen that wrote it, or restore it")
+
+    def write(self, path: Path) -> None:
+        """Write the file: one line for each draw, limit, state and rollout."""
+        parts = [f'"format": {FORMAT}']
+        for name, value in asdict(self).items():
+            if isinstance(value, Mapping) and value:
+                lines = [f"{json.dumps(key)}: {json.dumps(each)}" for key, each in value.items()]
+                parts.append(f'"{name}": {{\n' + ",\n".join(lines) + "\n}")
+            elif isinstance(value, (list, tuple)) and value:
+                parts.append(f'"{name}": [\n' + ",\n".join(map(json.dumps, value)) + "\n]")
+            else:
+                parts.append(f'"{name}": {json.dumps(value)}')
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("{\n" + ",\n".join(parts) + "\n}\n")
+
+
+def path_of(task: str) -> Path:
+    """The file of a task's behaviour."""
+    return conf_dir() / "behaviour" / f"{task}.json"
+
+
+# --- what does not need a rollout -------------------------------------------------------------------------------------
+
+
+def declared(task: Task) -> dict[str, Any]:
+    """Values that a task declares, by name."""
+    family = task.family
+    found: dict[str, Any] = {
+        "family": f"{family.__module__}.{family.__qualname__}",
+        "instruction": task.instruction,
+        "horizon": task.horizon,
+        "embodiment": task.embodiment,
+        "robot": robot_sha256(task.embodiment),
+        "hold": family.HOLD,
+        "moving": list(family.MOVING),
+        "disturbed": list(family.DISTURBED),
+        "symmetries": sorted(map(repr, family.SYMMETRIES)),
+        "certify": json.dumps(task.certify, sort_keys=True),
+        "steps": list(task.nominal.steps()),
+        "shortcuts": {name: shortcut.to_rest for name, shortcut in task.nominal.shortcuts().items()},
+    }
+    for p in parameters(task.nominal):
+        told = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
+        found[f"parameter {p.name}"] = told
+    found |= {f"{ID} {name}": str(dist) for name, dist in sorted(task.training.items())}
+    for axis in task.axes.values():
+        for name, dist in axis.replace.items():
+            found[f"{axis.name} {name}"] = f"{dist} {axis.severities} {axis.limits.get(name, '')}".strip()
+    return found
+
+
+ROBOT_FIELDS = (
+    *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "jnt_range", "jnt_axis", "jnt_pos"),
+    *("dof_damping", "dof_armature", "dof_frictionloss", "geom_size", "geom_pos", "geom_quat", "geom_friction"),
+    *("geom_solref", "geom_solimp", "mesh_vert", "site_pos", "site_quat", "actuator_gainprm", "actuator_biasprm"),
+    *("actuator_ctrlrange", "geom_contype", "geom_conaffinity", "geom_condim", "geom_type"),
+)
+"""Fields of a compiled model that say what the robot is."""
+
+
+def robot_sha256(embodiment: str) -> str:
+    """Hash of the robot of an embodiment on an empty table, to six digits."""
+    model = World.load(scene_text.emit(table())[0], embodiment).model
+    parts = [np.asarray(getattr(model, name), float).ravel() for name in ROBOT_FIELDS]
+    text = " ".join(f"{value + 0.0:.6g}" for value in np.concatenate(parts).tolist())
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def splits(task: Task) -> Iterator[tuple[str, int]]:
+    """Splits and indices of the stored draws."""
+    yield from ((ID, index) for index in range(TRAINING_DRAWS))
+    yield from ((axis, 0) for axis in task.axes)
+
+
+def described(draw: Draw) -> dict[str, Any]:
+    """A draw: its scenario, scenes and descriptions."""
+    scenario = draw.scenario
+    ablations = {name: _scene(spec) for name, spec in scenario.ablations().items()}
+    return {
+        "id": scenario.id,
+        "attempt": draw.attempt,
+        "scene": _scene(scenario.build()),
+        "ablations": ablations,
+        "features": {name: _rounded(value) for name, value in scenario.features().items()},
+        "facts": {name: _rounded(value) for name, value in scenario.facts().items()},
+        "orientation": str(scenario.orientation),
+    }
+
+
+def drawn(task: Task, split: str, index: int) -> dict[str, Any]:
+    """The draw of an index; the reason alone if it has no feasible scenario."""
+    try:
+        return described(task.draw(split, SEED, index))
+    except Infeasible as error:
+        return {"infeasible": sorted(error.reasons)}
+
+
+def _scene(spec: mujoco.MjSpec) -> str:
+    return portable_sha256(scene_text.emit(spec)[0])[:12]
+
+
+def _rounded(value: Any) -> Any:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+# --- rules in stored states -------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Book:
+    """Answers of the rules by number."""
+
+    answers: list[str] = field(default_factory=list)
+
+    def number(self, answer: str) -> int:
+        """Number of an answer, a new one if it was not there."""
+        if answer not in self.answers:
+            self.answers.append(answer)
+        return self.answers.index(answer)
+
+    def numbers(self, pair: tuple[str, str]) -> list[int]:
+        return [self.number(answer) for answer in pair]
+
+
+def packed(state: NDArray[np.float64]) -> str:
+    """A state of a world as text, in single precision."""
+    return base64.b85encode(zlib.compress(state.astype(np.float32).tobytes(), 9)).decode()
+
+
+def unpacked(text: str) -> NDArray[np.float64]:
+    """The reverse of `packed`."""
+    return np.frombuffer(zlib.decompress(base64.b85decode(text)), np.float32).astype(np.float64)
+
+
+def asked(stage: Stage, stored: Behaviour) -> dict[str, Any]:
+    """Entries `answers`, `states` and `limits` of a behaviour as the rules answer now."""
+    book, scenario, world = Book(list(stored.answers)), stage.scenario, stage.world
+    contacts = [rules.Contact(*each) for each in stored.contacts]
+    along = list(rules.coordinates(world))
+    probes = [rules.Probe(scenario, world, unpacked(each["state"])) for each in stored.states]
+    states = [_answers(probe, k, along, contacts, book, stored.states[k]["state"]) for k, probe in enumerate(probes)]
+    limits = []
+    for state, text, magnitude, _, _ in stored.limits:
+        sides = probes[state].around(rules.Coordinate.parse(text), magnitude)
+        limits.append([state, text, magnitude, *(book.numbers(side) for side in sides)])
+    return {"answers": book.answers, "states": states, "limits": limits}
+
+
+def _answers(
+    probe: rules.Probe,
+    number: int,
+    along: Sequence[rules.Coordinate],
+    contacts: Sequence[rules.Contact],
+    book: Book,
+    state: str,
+) -> dict[str, Any]:
+    """What the rules say of a stored state and its surroundings."""
+    return {
+        "answers": book.numbers(probe.answers()),
+        "numbers": probe.numbers,
+        "contacts": list(rules.under_contacts(probe, contacts)),
+        "mixed": list(rules.under_mixtures(probe, number, along, contacts)),
+        "state": state,
+    }
+
+
+def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, Any]:
+    """Entries `answers`, `contacts`, `states` and `limits` of a new behaviour."""
+    book, scenario, world = Book(), stage.scenario, stage.world
+    texts = [packed(state) for state in states]
+    contacts = rules.contacts_asked(scenario, world, [unpacked(text) for text in texts])
+    along, described_states, limits = list(rules.coordinates(world)), [], []
+    counts: dict[Any, int] = {}
+    for number, text in enumerate(texts):
+        probe = rules.Probe(scenario, world, unpacked(text))
+        described_states.append(_answers(probe, number, along, contacts, book, text))
+        for limit in rules.limits(probe, number, along):
+            kind = (limit.before, limit.after, limit.coordinate.kind, limit.coordinate.of)
+            counts[kind] = counts.get(kind, 0) + 1
+            if counts[kind] <= rules.MAX_LIMITS:
+                numbers = book.numbers(limit.before), book.numbers(limit.after)
+                limits.append([number, str(limit.coordinate), limit.magnitude, *numbers])
+    plain = [[contact.table, contact.a, contact.b] for contact in contacts]
+    return {"answers": book.answers, "contacts": plain, "states": described_states, "limits": limits}
+
+
+# --- rollouts ---------------------------------------------------------------------------------------------------------
+
+
+def is_core(name: str) -> bool:
+    """Whether a rollout of the first training draw is played for every change."""
+    return name.startswith(CORE) and not name.endswith(", raw")
+
+
+def rollouts(stage: Stage, wanted: Callable[[str], bool], steady: bool = False) -> dict[str, list[Any]]:
+    """Play the wanted rollouts of a scenario. The oracle is always played, because others repeat its actions.
+
+    Args:
+        steady: whether to find out, in disturbed worlds, which verdicts rounding decides.
+    """
+    found: dict[str, list[Any]] = {}
+    for name, how in stage.plays():
+        if name == "oracle" or wanted(name):
+            result = stage.play(name, how)
+            found[name] = [*result.plain, *_unsteady(steady and not stage.steady(result.verdict, how))]
+    for name, text in stage.ablations():
+        if wanted(f"ablation {name}"):
+            result = stage.replay_ablated(text)
+            found[f"ablation {name}"] = list(result.plain)
+    return found
+
+
+def _unsteady(flag: bool) -> list[str]:
+    return ["unsteady"] if flag else []
+
+
+def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Behaviour:
+    """Observe all of a task's behaviour anew, as a file stores it.
+
+    Args:
+        cheats: kept cheats of the task by name.
+        steady: see `rollouts`.
+    """
+    states: dict[str, NDArray[np.float64]] = {}
+    stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats)
+    stage.on_change = lambda world, answer: states.setdefault(answer, world.state())
+    played = rollouts(stage, lambda name: True)
+    stage.on_change = None
+    found = explored(stage, rules.chosen(states))
+    if steady:
+        played = rollouts(stage, lambda name: True, steady=True)
+    starts = [task.draw(ID, SEED, index).scenario for index in range(TRAINING_DRAWS)]
+    return Behaviour(
+        task.name,
+        task.version,
+        made(task),
+        declared(task),
+        {f"{split} {index}": drawn(task, split, index) for split, index in splits(task)},
+        [edge.plain for edge in edges.edges(task, starts, SEED)],
+        rollouts={f"{ID} 0 {name}": result for name, result in played.items()} | oracles(task),
+        **found,
+    )
+
+
+def oracles(task: Task) -> dict[str, list[Any]]:
+    """Rollouts of the oracle in the stored draws but the first one."""
+    found = {}
+    for split, index in splits(task):
+        if (split, index) != (ID, 0):
+            try:
+                stage = Stage(task.draw(split, SEED, index).scenario, task.embodiment, task.horizon)
+            except Infeasible:
+                continue
+            found[f"{split} {index} oracle"] = rollouts(stage, lambda name: False)["oracle"]
+    return found
+
+
+def made(task: Task) -> dict[str, Any]:
+    """With what a behaviour is observed."""
+    return {"fingerprint": fingerprint(), "versions": versions(), "text": source_sha256(task.family)}

@@ -1,0 +1,210 @@
+"""Comparison of a task with its stored behaviour."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from ..errors import Infeasible
+from ..fingerprint import fingerprint
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..versions import versions
+from .behaviour import (
+    SEED,
+    TRAINING_DRAWS,
+    Behaviour,
+    Cheat,
+    asked,
+    declared,
+    drawn,
+    is_core,
+    oracles,
+    rollouts,
+    splits,
+)
+from .edges import Edge
+from .rollouts import Stage
+
+Level = Literal["version", "bits", "new"]
+"""Weight of a difference. `version`: the task is another one, and its `VERSION` must rise. `bits`: the same verdict
+with other bits, and the file must be written again. `new`: the file lacks it, likewise."""
+NOTHING = None
+"""Value of what is missing on one side."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One difference between a task and its stored behaviour."""
+
+    task: str
+    kind: str
+    """Kind of behaviour, such as `draw`, `scene`, `constraint`, `success or failure`, `events`, `oracle`."""
+    what: str
+    """What differs, such as the name of a split or a rollout."""
+    stored: Any
+    """Stored value; None if there is none."""
+    now: Any
+    """Present value; None if there is none."""
+    level: Level
+
+    def __str__(self) -> str:
+        return f"{self.task}: {self.kind}: {self.what}: {_short(self.stored)} is now {_short(self.now)}"
+
+
+def _short(value: Any) -> str:
+    text = "nothing" if value is NOTHING else str(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Result of a comparison."""
+
+    task: str
+    version: int
+    """Version of the file."""
+    differences: tuple[Difference, ...]
+    rollouts: int
+    """Number of rollouts that were played."""
+    same_machine: bool
+    """Whether bits are compared: machine and packages are those with which the file was written."""
+
+    @property
+    def reproduces(self) -> str:
+        """What this machine reproduces: `bits`, `verdicts`, or `no`."""
+        levels = {difference.level for difference in self.differences}
+        if "version" in levels:
+            return "no"
+        return "verdicts" if "bits" in levels or not self.same_machine else "bits"
+
+
+def compare(
+    task: Task,
+    stored: Behaviour,
+    wanted: Callable[[str], bool] = is_core,
+    cheats: Mapping[str, Cheat] | None = None,
+    every_split: bool = False,
+) -> Compared:
+    """Compare a task with its stored behaviour.
+
+    Args:
+        wanted: rollouts of the first training draw that are played, by name.
+        cheats: kept cheats of the task; without them their rollouts are not played.
+        every_split: whether the oracle plays in the other stored draws, too.
+    """
+    same = same_machine(stored)
+    found = list(_without_rollouts(task, stored))
+    played: dict[str, list[Any]] = {}
+    try:
+        stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats or {})
+    except Infeasible:
+        return Compared(task.name, stored.version, tuple(found), 0, same)
+    if not any(each.kind == "scene" and each.what == f"{ID} 0" for each in found):
+        found += _rules(task.name, stored, asked(stage, stored))
+    played = {f"{ID} 0 {name}": result for name, result in rollouts(stage, wanted).items()}
+    if every_split:
+        played |= oracles(task)
+    found += _rollouts(task.name, stored.rollouts, played, same)
+    expected = {
+        name for name in stored.rollouts if name.startswith(f"{ID} 0 ") and wanted(name.removeprefix(f"{ID} 0 "))
+    }
+    gone = expected - played.keys() - {name for name in expected if " cheat " in name and not cheats}
+    found += [
+        Difference(task.name, "rollout", name, stored.rollouts[name][0], NOTHING, "version") for name in sorted(gone)
+    ]
+    return Compared(task.name, stored.version, tuple(found), len(played), same)
+
+
+def same_machine(stored: Behaviour) -> bool:
+    """Whether this machine and its packages give the bits of a file."""
+    names = ("mujoco", "robosuite", "numpy")
+    made = stored.made["versions"]
+    return stored.made["fingerprint"] == fingerprint() and all(made[name] == versions()[name] for name in names)
+
+
+def _without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
+    """Differences of declared values, draws and constraints."""
+    if task.version != stored.version:
+        yield Difference(task.name, "version", "VERSION", stored.version, task.version, "version")
+    yield from _mappings(task.name, "declared value", stored.declared, declared(task), task.axes)
+    for split, index in splits(task):
+        name = f"{split} {index}"
+        now, was = drawn(task, split, index), stored.draws.get(name)
+        if was is None:
+            yield Difference(task.name, "split", name, NOTHING, "drawn", "new")
+            continue
+        for part in was.keys() | now.keys():
+            if was.get(part) != now.get(part):
+                kind = "draw" if part in ("id", "attempt", "infeasible") else part.rstrip("s")
+                yield Difference(task.name, kind, name, was.get(part), now.get(part), "version")
+    starts = [task.draw(ID, SEED, index).scenario for index in range(TRAINING_DRAWS)]
+    for edge in map(Edge.of, stored.constraints):
+        if (again := edge.again(starts[edge.start])) != edge:
+            was, now = (f"{e.before or 'feasible'} / {e.after or 'feasible'}" for e in (edge, again))
+            yield Difference(task.name, "constraint", ", ".join(edge.pairs), was, now, "version")
+
+
+def _mappings(
+    task: str, kind: str, stored: Mapping[str, Any], now: Mapping[str, Any], axes: Mapping[str, Any]
+) -> Iterator[Difference]:
+    """Differences between declared values. What belongs to a new axis alone is new."""
+    for name in [*stored, *(name for name in now if name not in stored)]:
+        was, here = stored.get(name, NOTHING), now.get(name, NOTHING)
+        if was != here:
+            new = was is NOTHING and name.split(" ")[0] in axes
+            yield Difference(task, kind, name, was, here, "new" if new else "version")
+
+
+def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Difference]:
+    """Differences of what the rules say in stored states, and around their limits."""
+    for number, (was, here) in enumerate(zip(stored.states, now["states"], strict=True)):
+        told = [[now["answers"][k] for k in each["answers"]] for each in (was, here)]
+        for part, kind in enumerate(RULES):
+            if was["answers"][part] != here["answers"][part]:
+                yield Difference(task, kind, f"state {number}", told[0][part], told[1][part], "version")
+            for how in ("contacts", "mixed"):
+                if was[how][part] != here[how][part]:
+                    yield Difference(task, kind, f"state {number}, {how}", was[how][part], here[how][part], "version")
+        if was["numbers"] != here["numbers"]:
+            yield Difference(task, "events", f"state {number}, numbers", was["numbers"], here["numbers"], "version")
+    for was, here in zip(stored.limits, now["limits"], strict=True):
+        state, coordinate, magnitude = was[:3]
+        for part, kind in enumerate(RULES):
+            told = [" / ".join(now["answers"][side[part]] for side in limit[3:]) for limit in (was, here)]
+            if told[0] != told[1]:
+                what = f"limit at {magnitude:g} along {coordinate} in state {state}"
+                yield Difference(task, kind, what, told[0], told[1], "version")
+
+
+RULES = ("success or failure", "events")
+"""Kinds of answers of the rules, in the order of an answer's two parts."""
+
+
+def _rollouts(
+    task: str, stored: Mapping[str, Sequence[Any]], now: Mapping[str, Sequence[Any]], same: bool
+) -> Iterator[Difference]:
+    """Differences of verdicts, and of bits if both machines are the same."""
+    for name, here in now.items():
+        was = stored.get(name)
+        kind = name.split(" ", 2)[2].split(" ")[0]
+        if was is None:
+            yield Difference(task, kind, name, NOTHING, here[0], "new")
+        elif was[0] != here[0] and was[-1] != "unsteady":
+            yield Difference(task, kind, name, was[0], here[0], "version")
+        elif same and list(was[:3]) != list(here[:3]):
+            yield Difference(
+                task, kind, name, f"{was[0]}, {was[1]:g} s, {was[2]}", f"{here[0]}, {here[1]:g} s, {here[2]}", "bits"
+            )
+
+
+def merged(stored: Behaviour, observed: Behaviour) -> Behaviour:
+    """What a file stores after a change that kept every verdict: its states and limits, and the present bits.
+
+    A verdict that rounding decides keeps its mark.
+    """
+    marks = {name for name, result in stored.rollouts.items() if result[-1] == "unsteady"}
+    played = {
+        name: [*result[:3], "unsteady"] if name in marks else list(result) for name, result in observed.rollouts.items()
+    }
+    kept = {name: getattr(stored, name) for name in ("constraints", "answers", "contacts", "states", "limits")}
+    return replace(observed, rollouts=played, **kept)
