@@ -314,7 +314,12 @@ def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Beh
     """
     states: dict[str, NDArray[np.float64]] = {}
     stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats)
-    stage.on_change = lambda world, answer: states.setdefault(answer, world.state())
+
+    def keep(world: World, answer: str) -> None:
+        if answer not in states:
+            states[answer] = world.state()
+
+    stage.on_change = keep
     played = rollouts(stage, lambda name: True)
     stage.on_change = None
     found = explored(stage, rules.chosen(states))

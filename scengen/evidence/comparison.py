@@ -28,6 +28,8 @@ from .rollouts import Stage
 Level = Literal["version", "bits", "new"]
 """Weight of a difference. `version`: the task is another one, and its `VERSION` must rise. `bits`: the same verdict
 with other bits, and the file must be written again. `new`: the file lacks it, likewise."""
+FIRST = f"{ID} 0 "
+"""Beginning of the names of the rollouts in the first training draw."""
 NOTHING = None
 """Value of what is missing on one side."""
 

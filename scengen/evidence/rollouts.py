@@ -1,4 +1,4 @@
-"""Rollouts of one scenario that show how a task behaves: its oracle, disturbances of it, and every way that must fail."""
+"""Rollouts of one scenario that show how a task behaves: the oracle, disturbances of it, and ways that must fail."""
 
 import hashlib
 import json
@@ -44,17 +44,21 @@ class Watched(World):
         """Table and names of every question about contact since the set was cleared."""
 
     def touching(self, a: str, b: str) -> bool:
-        self.asked.add(("touching", *sorted((a, b))))
+        self._ask("touching", a, b)
         return super().touching(a, b)
 
     def touched(self, a: str, b: str) -> bool:
-        self.asked.add(("touched", *sorted((a, b))))
+        self._ask("touched", a, b)
         return super().touched(a, b)
 
     def touching_bodies(self, body: str) -> set[str]:
         found = super().touching_bodies(body)
-        self.asked.update(("touching", *sorted((body, other))) for other in found | {ROBOT} if other != body)
+        for other in found | {ROBOT}:
+            self._ask("touching", body, other)
         return found
+
+    def _ask(self, table: str, a: str, b: str) -> None:
+        self.asked.add((table, min(a, b), max(a, b)))
 
     def apply(self, filtered: NDArray[np.float32]) -> None:
         super().apply(filtered)
