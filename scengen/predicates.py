@@ -6,7 +6,8 @@ import numpy as np
 
 from .assets.prop import TABLE_TOP
 from .geometry import Vec3
-from .sim.world import ROBOT, World
+from .sim.arm import ROBOT
+from .sim.world import World
 
 
 def fallen(world: World, *bodies: str, below: float = 0.05) -> str | None:

@@ -123,7 +123,7 @@ class About:
     instruction: str
     """Instruction for a policy."""
     embodiment: str
-    """Robot of the task, one of `sim.world.EMBODIMENTS`."""
+    """Robot of the task, one of `sim.embodiment.EMBODIMENTS`."""
     axes: tuple[str, ...]
     """Names of its OOD axes."""
     paper_axes: tuple[str, ...]

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "api.md"
 MODULES = {
     "The family": ("scenario", "params", "symmetry", "orientation"),
-    "The world": ("sim.world", "sim.memory", "predicates", "geometry", "physics"),
+    "The world": ("sim.world", "sim.arm", "sim.embodiment", "sim.memory", "predicates", "geometry", "physics"),
     "Moves": (
         "skills.motion",
         "skills.pace",

@@ -20,7 +20,8 @@ from scengen.params import param
 from scengen.predicates import fallen, inside, still
 from scengen.robots.jaw import FINGER_ACROSS
 from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import pick, poke, put
 from scengen.skills.motion import wait
 

@@ -16,7 +16,7 @@ from scengen.control.osc import STEP, TURN
 from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.pools import rows_of
 from scengen.pool import Pool
-from scengen.sim.world import hands
+from scengen.sim.embodiment import hands
 
 ARM = ("dx", "dy", "dz", "rx", "ry", "rz", "gripper")
 """Entries of the action of one arm."""

@@ -16,7 +16,7 @@ from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.observations import proprioception
 from scengen.envs.pools import rows_of
 from scengen.errors import BadConfig
-from scengen.sim.world import action_size
+from scengen.sim.embodiment import action_size
 
 
 class ScengenBenchmark(StepBenchmark):

@@ -14,7 +14,8 @@ from ..envs.gym import Observation, PoolEnv
 from ..envs.object_state import xyzw
 from ..geometry import Vec3
 from ..sim.boxes import box_around
-from ..sim.world import World, hands
+from ..sim.embodiment import hands
+from ..sim.world import World
 from .calls import Calls
 from .models import Call, Turn
 from .primitives import DONE, BadCall, Primitive, next_action, primitive, tools

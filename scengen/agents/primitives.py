@@ -19,7 +19,8 @@ from ..errors import GaveUp, ScengenError, cut
 from ..geometry import Mat3, Vec3
 from ..robots.panda import BASE, REACH, SHOULDER, bases
 from ..scenario import Action, Plan
-from ..sim.world import Arm, World
+from ..sim.arm import Arm
+from ..sim.world import World
 from ..skills.motion import CLOSED, OPEN, Pace, alone, go_to, hold
 from .models import Call, Tool
 

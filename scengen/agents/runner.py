@@ -13,10 +13,11 @@ from typing import Any
 from .. import compose
 from ..control.teleop import TELEOP
 from ..envs.gym import PoolEnv
-from ..errors import BadConfig, UnknownName, at_least, cut
+from ..errors import BadConfig, UnknownName, cut
 from ..pool import Pool, PoolRow, collection
 from ..samplers.split import ID
 from ..samplers.task import Task
+from ..settings import at_least
 from ..typed import typed
 from ..work.log import Log
 from ..work.targets import try_folder, write

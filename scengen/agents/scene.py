@@ -14,7 +14,7 @@ from ..envs.gym import Observation, PoolEnv
 from ..envs.observations import cameras_of, streams_of
 from ..pictures.render import encode
 from ..robots.jaw import OPENING
-from ..sim.world import JAW, SUCTION, hands
+from ..sim.embodiment import JAW, SUCTION, hands
 
 READINGS = ("eef_pos", "eef_quat", "gripper_qpos", "force_torque")
 """Streams whose readings are told, as endings of their names."""

@@ -20,7 +20,7 @@ from ..episode import Episode
 from ..errors import Infeasible, Unstable
 from ..params import values
 from ..samplers.task import Task
-from ..sim.world import hands
+from ..sim.embodiment import hands
 from ..validate.rebuilt import world_of
 from ..work.parallel import Limits, Workers, each
 

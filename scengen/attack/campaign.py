@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from ..episode import STRICT, Actions, Rules, check_rules
-from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, at_least
+from ..errors import BadConfig, Infeasible, ScengenError, UnknownName
 from ..pool import Pool, PoolRow
 from ..pool.files import sha256, why_not_plain
 from ..pool.names import Name
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
+from ..settings import at_least
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors

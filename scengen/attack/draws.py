@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import accumulate
 
 from ..samplers.keyed import spread, unit
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .macros import Macro
 from .player import Player
 from .solids import TABLE, Solid, handles, sides

@@ -41,7 +41,8 @@ from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, heading, rotation
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import suction
 from ..skills.jaw import grasp, release
 from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hold, push, retreat, turn_to

@@ -12,7 +12,8 @@ from ..control.teleop import ALPHA, MOTION
 from ..episode import Actions, Episode
 from ..geometry import Mat3, Vec3, between, rotation
 from ..scenario import Plan, Scenario
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.motion import STEP, STIFFNESS, go_to, together
 from .macros import APPROACH, Macro
 from .signature import ContactPair, Signature, pairs, robots, signature, starts

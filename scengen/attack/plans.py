@@ -17,7 +17,7 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, heading, rotation
 from ..robots.jaw import TIP_BELOW
 from ..scenario import Plan
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from ..skills.jaw import RELEASE_TIME, carry, grasp, release
 from ..skills.motion import (
     CLOSED,

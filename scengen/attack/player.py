@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import zip_longest
-from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import BadConfig, GaveUp
 from ..geometry import Vec3
 from ..scenario import Plan, Scenario
+from ..sim.recording import RecordingWorld
 from ..sim.world import World
 from ..skills.motion import alone
 from ..validate.rollout import Stillness
@@ -183,18 +183,11 @@ class Player:
         """Contacts since the start that the goal or its rules ask for, as pairs of names: those that they look up where
         the witness has reached the goal, and that have occurred."""
         self.rewind(len(self.trace.stages) - 1)
-        asked = set[ContactPair]()
-        touched = self.world.touched
-
-        def asking(one: str, other: str) -> bool:
-            if found := touched(one, other):
-                asked.add((one, other))
-            return found
-
-        with mock.patch.object(self.world, "touched", asking):
-            self.scenario.success(self.world)
-            self.scenario.failure(self.world)
-        return frozenset(asked)
+        world = RecordingWorld.twin(self.world)
+        self.scenario.success(world)
+        self.scenario.failure(world)
+        occurred = (question.names for question in world.asked if question.kind == "touched" and question.answer)
+        return frozenset((one, other) for one, other in occurred)
 
     def rewind(self, k: int | None = None) -> None:
         """Put the world at stage `k` of the witness, or at the start, so that a plan can be made for it."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..geometry import UP, Vec3
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .macros import Macro
 from .player import Attempt, Player, in_turn
 from .solids import TABLE, Solid, handles, sides

@@ -12,7 +12,7 @@ from itertools import product, zip_longest
 import numpy as np
 
 from ..geometry import Vec3
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .macros import Macro
 from .player import Attempt, Player, in_turn
 from .retries import picks

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import Vec3
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 
 MIN_MOVE = 0.005
 """Displacement of its centre of mass above which a body counts as moved [m]."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..geometry import UP, Mat3, Outline, Vec3, corners, gap
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ABOVE, SPAN
-from ..sim.world import Arm, World
+from ..sim.arm import Arm
+from ..sim.world import World
 
 TABLE = "table"
 """Name of the body of the table."""

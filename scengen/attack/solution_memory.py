@@ -18,7 +18,8 @@ from ..episode import Actions, Episode
 from ..errors import GaveUp
 from ..geometry import Mat3, Vec3, about_z, between
 from ..scenario import Plan, Scenario
-from ..sim.world import Arm, World
+from ..sim.arm import Arm
+from ..sim.world import World
 from ..skills.motion import STEP, STIFFNESS, Pace, go_to, together
 from .solids import held
 

@@ -7,9 +7,10 @@ from rich.table import Table
 
 from ..drift import speed as by_version
 from ..drift.environment import environment, versions_of
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..evaluate.certificate_cost import certificates
 from ..evaluate.speed import bench
+from ..settings import at_least
 from ..work.targets import try_file
 from . import OK, Arguments, out, remark, say, write_json
 from .settings import read

@@ -11,9 +11,10 @@ from ..analysis.distance import MAX_ENERGY_SCENARIOS, MAX_PAIRS, NearDuplicate, 
 from ..analysis.redraw import batch_of, first_scenarios, redrawn, sampled_indices, task_of
 from ..analysis.space import Batch, of_features
 from ..analysis.tables import SHOWN_PAIRS, pairs_table
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..pool import Pool
 from ..samplers.task import Task
+from ..settings import at_least
 from ..task_files import search_path
 from ..work.targets import try_file
 from . import FAILED, OK, Arguments, filled, names, out, say, several, write_json

@@ -5,9 +5,10 @@ from dataclasses import asdict, dataclass
 
 from rich.table import Table
 
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..task_files import search_path
 from ..work.parallel import Limits, Workers
 from ..work.targets import try_file

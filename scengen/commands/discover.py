@@ -4,11 +4,12 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ..errors import UnknownName, at_least
+from ..errors import UnknownName
 from ..ood.discovery.proposal import Finding
 from ..ood.discovery.search import METHODS, MIN_BUDGET, DiscoverSettings, SearchResult, discover
 from ..runs.progress import ProgressBar
 from ..samplers.axis import spell
+from ..settings import at_least
 from ..work.targets import try_folder
 from . import OK, Arguments, err, out, say, write
 from .settings import read_task

@@ -7,9 +7,10 @@ from typing import Any
 from ..drift.environment import Environment, environment, versions_of
 from ..drift.matrix import FLIPPED, UNKNOWN, flipped, matrix, remarks, tables, under
 from ..drift.tracks import parted
-from ..errors import BadConfig, ScengenError, at_least
+from ..errors import BadConfig, ScengenError
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..work.targets import try_file

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
-from ..errors import UnknownName, at_least
+from ..errors import UnknownName
 from ..runs.edition import Edition, chosen_sets, differences, make_pool, path_of
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..work.parallel import Workers
 from ..work.targets import try_file
 from . import FAILED, OK, Arguments, err, say, warn

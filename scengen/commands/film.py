@@ -11,7 +11,7 @@ from ..analysis.redraw import task_of
 from ..attack.evidence import OTHER_SCENARIO, Hit
 from ..envs.observations import ALL, cameras_of
 from ..episode import check_rules
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ..pictures.render import check_pictures, encode
 from ..pool import Pool
@@ -19,6 +19,7 @@ from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.directory import Directory
 from ..pool.row import DemonstrationRow
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..attack.check import attacked
-from ..errors import BadConfig, PoolError, at_least, cut
+from ..errors import BadConfig, PoolError, cut
 from ..export.hub import DatasetCard, PublishedPool, check_pools, check_target, own_license, publish
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..task_files import search_path
 from ..validate.recheck import LEVELS
 from ..validate.verify import LIMITS, Options, Report

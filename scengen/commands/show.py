@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..analysis.redraw import task_of
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..pictures import film, render, report
 from ..pictures.sheet import contact_sheet
 from ..pool import Pool
 from ..runs.progress import ProgressBar
+from ..settings import at_least
 from ..task_files import search_path
 from ..validate.playable import check_row
 from ..work.targets import try_file

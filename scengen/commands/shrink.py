@@ -8,12 +8,13 @@ from ..analysis.space import scale
 from ..analysis.tables import shrunk_table
 from ..attack.check import attacked
 from ..certificate import Check
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
 from ..params import Value, values, with_values
 from ..pool.names import Name
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..scenario import Scenario
+from ..settings import at_least
 from ..validate.certify import certify
 from ..validate.settings import CertifySettings
 from ..work.targets import try_file

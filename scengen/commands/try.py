@@ -12,13 +12,15 @@ import numpy as np
 from .. import compose
 from ..analysis.redraw import task_of
 from ..envs.observations import ALL, cameras_of
-from ..errors import BadConfig, GaveUp, UnknownName, at_least, cut
+from ..errors import BadConfig, GaveUp, UnknownName, cut
 from ..pictures.film import WITNESS, Take, movie, strip
 from ..pictures.render import check_pictures, encode
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..scenario import Plan, Planner, Scenario
-from ..sim.world import ROBOT, World
+from ..settings import at_least
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..task_files import search_path
 from ..typed import typed
 from ..validate.playable import check_row

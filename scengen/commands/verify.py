@@ -15,11 +15,12 @@ from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..demos.verify import verify_demonstrations
-from ..errors import BadConfig, at_least, cut
+from ..errors import BadConfig, cut
 from ..pool import Pool
 from ..pool.demonstrations import Demonstrations, demonstration_folders, is_demonstrations
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
+from ..settings import at_least
 from ..task_files import search_path
 from ..validate.examine import Verdict
 from ..validate.junit import junit

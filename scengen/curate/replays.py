@@ -21,7 +21,8 @@ from ..export.streams import ENVIRONMENT
 from ..pictures.render import Camera, NoPictures, Picture
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.world import World, hands
+from ..sim.embodiment import hands
+from ..sim.world import World
 from ..validate.rebuilt import rebuild
 from .findings import Finding
 from .videos import Probe, compared, stands_still

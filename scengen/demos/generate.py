@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.distance import NEAR_DUPLICATE_DISTANCE, near_duplicates
 from ..analysis.space import Batch
 from ..certificate import Check
-from ..errors import BadConfig, Infeasible, at_least, cut
+from ..errors import BadConfig, Infeasible, cut
 from ..pool import Pool, collection
 from ..pool.demonstrations import (
     DEMONSTRATIONS,
@@ -28,6 +28,7 @@ from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, reje
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
+from ..settings import at_least
 from ..validate.certify import Trial
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.rollout import Rollout, run

@@ -10,8 +10,9 @@ from ..control.teleop import MOTION
 from ..errors import UnknownName
 from ..samplers.keyed import normals, unit
 from ..scenario import Plan, Planner
+from ..sim.arm import ROBOT
 from ..sim.style import Style
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 
 NOMINAL = "nominal"
 """Style of certificates: straight moves, no noise."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..episode import Actions, Outcome
+from ..geometry import Vec3
 from ..pool import Pool, PoolRow
-from ..sim.world import Vec3, World
+from ..sim.world import World
 from ..validate.playable import scene_errors
 from ..validate.rollout import replay
 from ..work.parallel import Limits, Workers, each

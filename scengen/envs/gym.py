@@ -29,7 +29,8 @@ from ..pool import PoolRow
 from ..pool.library import Library
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.world import World, action_size, hands
+from ..sim.embodiment import action_size, hands
+from ..sim.world import World
 from ..validate.playable import stored_world
 from .object_state import ObjectState, bodies_of
 from .observations import (

@@ -22,7 +22,9 @@ from ..errors import UnknownName
 from ..orientation import Orientation
 from ..robots.panda import JOINTS, MAX_ARMS, Names
 from ..scenario import Scenario
-from ..sim.world import JAW, Arm, World, hands
+from ..sim.arm import Arm
+from ..sim.embodiment import JAW, hands
+from ..sim.world import World
 from .object_state import NAME, POSE, ObjectState, quats, rounded, xyzw
 
 Reading = NDArray[np.float32] | NDArray[np.uint8]

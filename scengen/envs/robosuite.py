@@ -30,7 +30,8 @@ from ..pool.library import Library
 from ..pool.row import SceneRow
 from ..robots import panda
 from ..scenario import Scenario
-from ..sim.world import JAW, SUCTION, World, action_size, all_hands, hands
+from ..sim.embodiment import JAW, SUCTION, action_size, all_hands, hands
+from ..sim.world import World
 from ..validate.identity import check_versions
 from ..validate.playable import scene_errors
 from .object_state import ObjectState, bodies_of, rounded

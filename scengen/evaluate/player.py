@@ -18,7 +18,8 @@ from ..pool import Pool
 from ..pool.library import Library
 from ..samplers.keyed import unit
 from ..samplers.split import ID
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from .policies import REPLAY, Policy, find_policy, identity, make_policy, policy_errors
 from .settings import EvaluateSettings, RolloutId
 

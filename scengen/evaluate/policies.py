@@ -27,7 +27,8 @@ from ..learn.store import StoredPolicy
 from ..params import Value
 from ..pool.library import Library
 from ..samplers.task import Task
-from ..sim.world import IDLE, hands
+from ..sim.arm import IDLE
+from ..sim.embodiment import hands
 from ..work.foreign import at_fault, factory_of, is_factory
 from .remote.client import ClientSettings, is_address
 from .remote.policy import RemotePolicy

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import ndtr
 
-from ..errors import BadConfig, at_least
+from ..errors import BadConfig
+from ..settings import at_least
 from ..statistics import ORDERINGS
 
 EXPERIMENTS = 1000

@@ -26,7 +26,8 @@ from ..pool import Pool, PoolRow
 from ..robots import panda
 from ..runs.generate import GenerateSettings, generate
 from ..scenario import Scenario
-from ..sim.world import JAW, World
+from ..sim.embodiment import JAW
+from ..sim.world import World
 from ..validate.playable import stored_world
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run

@@ -12,7 +12,7 @@ from ..errors import BadConfig
 from ..pool import PoolRow
 from ..robots import panda
 from ..sim import scene_text
-from ..sim.world import compose
+from ..sim.embodiment import compose
 from ..validate.playable import scene_errors
 from ..work.targets import write
 

@@ -31,7 +31,8 @@ from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
 from ..pool.row import DemonstrationRow
 from ..robots.panda import Names
-from ..sim.world import World, hands
+from ..sim.embodiment import hands
+from ..sim.world import World
 from ..versions import versions
 from .hdf5 import Output
 from .replay import Snapshot, WitnessReplay

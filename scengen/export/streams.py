@@ -8,7 +8,7 @@ from ..envs.observations import Stream, cameras_of, privileged, proprioception, 
 from ..errors import BadConfig, UnknownName
 from ..orientation import UPRIGHT, Orientation
 from ..samplers.task import Task
-from ..sim.world import hands
+from ..sim.embodiment import hands
 from .lerobot import Feature
 
 ENVIRONMENT = "observation.environment_state"

@@ -10,8 +10,8 @@ from ..assets.mesh_prop import MeshProp
 from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, heading
 from ..pictures.render import VIEWS, Picture, camera
+from ..sim.embodiment import JAW
 from ..sim.scene_text import emit
-from ..sim.world import JAW
 
 SIZE = 480
 """Edge of each half of the picture [pixels]."""

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from ..control.loop import ACTION
 from ..control.osc import STEP, TURN
 from ..robots.panda import Names
-from ..sim.world import hands
+from ..sim.embodiment import hands
 
 
 def pose_streams(embodiment: str) -> tuple[str, ...]:

@@ -11,9 +11,10 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 from matplotlib.figure import Figure
 
-from ..errors import BadConfig, UnknownName, at_least, cut
+from ..errors import BadConfig, UnknownName, cut
 from ..pictures.plots import svg_bytes
 from ..pool.files import sha256
+from ..settings import at_least
 from ..versions import versions
 from ..work.targets import refused, try_folder, write
 from .data import MIN_EPISODES, TrainingData

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.distance import Energy
-from ..errors import BadConfig, UnknownName, at_least, cut
+from ..errors import BadConfig, UnknownName, cut
 from ..samplers.axis import Proof
 from ..samplers.task import Task
+from ..settings import at_least
 from ..statistics import Rate
 from ..work.parallel import Workers
 from . import behaviour, boundary, features

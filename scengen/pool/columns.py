@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ..certificate import StoredCertificate, as_json
-from ..sim.world import EMBODIMENTS, action_size
+from ..sim.embodiment import EMBODIMENTS, action_size
 from .untrusted import (
     HASH,
     MAX_HORIZON,

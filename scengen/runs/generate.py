@@ -10,12 +10,13 @@ from pathlib import Path
 from ..attack import campaign as attacks
 from ..attack.check import attacked
 from ..certificate import CHECKS, STAGES, StoredCertificate
-from ..errors import BadConfig, Infeasible, at_least
+from ..errors import BadConfig, Infeasible
 from ..pool import Pool, PoolRow, writing
 from ..pool.files import replace_file, sha256
 from ..pool.manifest import PROCESS, Manifest, RunConfig
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
+from ..settings import at_least
 from ..validate import lock
 from ..validate.certify import Certified, certify
 from ..validate.labels import labels_of_draw, labels_of_task, made_with

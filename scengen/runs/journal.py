@@ -17,7 +17,7 @@ from ..errors import PoolError
 from ..pool import PoolRow
 from ..pool.manifest import MANIFEST, FileEntry
 from ..pool.row import SceneRow
-from ..sim.world import action_size
+from ..sim.embodiment import action_size
 from ..work.log import different
 from ..work.targets import refused, try_folder
 

@@ -15,7 +15,7 @@ from ..assets.ycb import Scan, Ycb, by_name
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
-from ..sim.world import EMBODIMENTS
+from ..sim.embodiment import EMBODIMENTS
 from ..task_files import EMBODIMENT, paper_source
 from . import designs
 from .axis import Axis, Proof

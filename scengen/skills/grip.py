@@ -11,7 +11,8 @@ from ..errors import GaveUp
 from ..geometry import UP, Vec3
 from ..robots.jaw import PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan
-from ..sim.world import Arm, World
+from ..sim.arm import Arm
+from ..sim.world import World
 from .jaw import pick
 from .motion import OPEN, go_to, hand_yaw
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..geometry import Mat3, Vec3, rotation
 from ..robots.jaw import PALM_ALONG
 from ..scenario import Plan
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .jaw import grasp
 from .motion import OPEN, STEADY, Pace, alone, go_to, hold
 

@@ -13,7 +13,7 @@ from ..geometry import about_y, about_z, polar
 from ..robots.jaw import TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Plan
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .jaw import carry, pick, release
 from .motion import STEADY, go_to, retreat
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..geometry import UP, Mat3, Vec3
 from ..scenario import Action, Plan
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .motion import (
     CLOSED,
     COARSE,

@@ -18,7 +18,8 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from .pace import COARSE as COARSE
 from .pace import FINE as FINE
 from .pace import STEADY as STEADY

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..control.loop import Loop
 from ..geometry import Vec3
-from ..sim.world import Arm
+from ..sim.arm import Arm
 
 CONTACT_DISTANCE = 0.03
 """Distance from both ends of a move, where contact may begin or end, within which it is not displaced [m]."""

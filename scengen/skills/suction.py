@@ -8,7 +8,7 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
-from ..sim.world import Arm
+from ..sim.arm import Arm
 from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, hold, retreat, steer
 
 FIRMLY = 0.15

@@ -41,8 +41,9 @@ from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import OPEN_GAP, pinch
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.jaw import carry, pick, release
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, wait
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge

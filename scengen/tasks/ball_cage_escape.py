@@ -40,7 +40,8 @@ from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills.jaw import pick, poke
 from ..skills.motion import CLOSED, Pace, can_turn, go_to, hold, retreat, turn_about_vertical, turn_to, wait
 

@@ -50,8 +50,9 @@ from ..physics import GRAVITY, SPIN, slipping
 from ..robots import jaw
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.motion import Condition
 from .launched_ball import (
     EDGE_MARGIN,

@@ -51,7 +51,8 @@ from ..robots import panda
 from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import jaw, motion, suction
 from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, turn_to, until, with_arm

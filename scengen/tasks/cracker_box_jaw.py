@@ -39,7 +39,8 @@ from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import jaw
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from ..skills.suction import carry_to

@@ -39,7 +39,8 @@ from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills.jaw import poke
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, push, retreat, turn_to, until
 from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright

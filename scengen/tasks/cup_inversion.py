@@ -44,7 +44,8 @@ from ..robots import panda
 from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
 from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import jaw, motion, suction
 from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing, facing_down, go_to, together, turn_to, with_arm

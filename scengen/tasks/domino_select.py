@@ -46,7 +46,8 @@ from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import come_beside, pick, poke, step_back
 from ..skills.motion import Condition, go_to, push, retreat, wait
 

@@ -27,7 +27,8 @@ from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import come_beside, grasp, pick, poke, step_back
 from ..skills.motion import COARSE, FINE, Condition, go_to, push, wait
 

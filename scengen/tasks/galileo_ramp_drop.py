@@ -39,7 +39,8 @@ from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
 from ..params import param
 from ..robots import jaw
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import carry, grasp, lower, pick, release
 from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
 

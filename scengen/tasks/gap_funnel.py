@@ -46,7 +46,8 @@ from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills import motion
 from ..skills.jaw import carry, come_down, grasp, pick, release
 from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait

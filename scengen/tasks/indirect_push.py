@@ -52,7 +52,8 @@ from ..robots import ik
 from ..robots.jaw import TIP_BELOW
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import carry, pick, release
 from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, retreat, steer
 

@@ -46,8 +46,9 @@ from ..params import param
 from ..predicates import fallen
 from ..robots import panda
 from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, require
+from ..sim.arm import Arm
 from ..sim.memory import remember
-from ..sim.world import Arm, World
+from ..sim.world import World
 from ..skills import motion
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, until, wait
 

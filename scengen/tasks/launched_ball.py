@@ -26,7 +26,8 @@ from ..predicates import fallen, held
 from ..robots import jaw
 from ..robots.panda import BASE
 from ..scenario import Plan, Scenario, Strict
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import grasp, pick
 from ..skills.motion import COARSE, OPEN, Condition, closing_along, go_to, hold, retreat, stay, steer, until
 

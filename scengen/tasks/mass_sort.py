@@ -50,8 +50,9 @@ from ..scenario import (
     require,
     within_reach,
 )
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.jaw import pick, put, release, weigh
 from ..skills.motion import STEADY, push, retreat
 

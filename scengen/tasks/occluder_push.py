@@ -43,7 +43,8 @@ from ..params import check_bounds, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, STEADY, closing_along, go_to, push, retreat
 

@@ -54,8 +54,9 @@ from ..predicates import fallen, inside
 from ..robots.panda import WRIST_MIDDLE
 from ..robots.suction import CUP_HALF_WIDTH, PULL
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, facing_down, go_to, retreat, until
 from ..skills.suction import carry, let_go, suck
 

@@ -48,8 +48,9 @@ from ..predicates import still
 from ..robots import jaw
 from ..robots.panda import BASE
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.jaw import grasp
 from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing, go_to, hold, steer, until
 

@@ -27,7 +27,8 @@ from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
 from ..predicates import fallen
 from ..robots.jaw import PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Scenario, Strict
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import jaw, motion
 from ..skills.handover import CLOSING, LEFT, OVERLAP, STAND_OFF, sideways, steepness, take_rim
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, retreat, turn_to

@@ -46,7 +46,8 @@ from ..robots import panda
 from ..robots.jaw import PAD, PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TUBE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
-from ..sim.world import Arm, World
+from ..sim.arm import Arm
+from ..sim.world import World
 from ..skills import jaw, motion, suction
 from ..skills.handover import FORWARDS, LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over, steepness
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, together, until, with_arm

@@ -46,7 +46,8 @@ from ..physics import GRAVITY
 from ..robots import panda
 from ..robots.jaw import FINGER_ACROSS, PAD, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, Arm, World
+from ..sim.arm import ROBOT, Arm
+from ..sim.world import World
 from ..skills import jaw
 from ..skills.handover import OVERLAP, STAND_OFF, steepness, take_rim
 from ..skills.motion import CLOSED, OPEN, STEADY, Pace, alone, facing_down, go_to, steer, together, until

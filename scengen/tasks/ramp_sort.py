@@ -42,7 +42,8 @@ from ..params import param
 from ..physics import GRAVITY
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import pick, release
 from ..skills.motion import COARSE, Pace, closing_along, go_to, push, wait
 

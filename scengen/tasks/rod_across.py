@@ -35,7 +35,8 @@ from ..predicates import fallen, rests_on
 from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
 from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import pick, release, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge

@@ -39,7 +39,8 @@ from ..predicates import fallen, still
 from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import pick, put
 from ..skills.motion import OPEN, Pace, closing_along, go_to, hand_yaw, retreat
 

@@ -45,7 +45,8 @@ from ..params import check_bounds, param
 from ..physics import slid, slip_angle
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.jaw import pick, release
 from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
 

@@ -50,8 +50,9 @@ from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..skills.grip import extent, take
 from ..skills.jaw import carry, grasp, poke, put, release
 from ..skills.motion import Pace, go_to, retreat

@@ -39,7 +39,8 @@ from ..robots import ik
 from ..robots.jaw import OPENING
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require
-from ..sim.world import ROBOT, World
+from ..sim.arm import ROBOT
+from ..sim.world import World
 from ..skills.hook import (
     HOOK_CLEARANCE,
     Leg,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..demos.generate import FAILED, GIVEN_UP, KEPT, DemosSummary, finish, first_failed, row_of
 from ..episode import STRICT, check_rules
-from ..errors import BadConfig, Infeasible, at_least, cut
+from ..errors import BadConfig, Infeasible, cut
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, OPERATOR, TELEOP, DemonstrationConfig
 from ..pool.row import DemonstrationRow
@@ -18,6 +18,7 @@ from ..runs.attempts import infeasible
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
+from ..settings import at_least
 from ..validate.certify import Trial
 from ..validate.labels import made_with
 from ..validate.settings import CertifySettings

@@ -16,7 +16,8 @@ from ..errors import BadConfig, ScengenError
 from ..geometry import Mat3, Vec3
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
-from ..sim.world import JAW, World, action_size
+from ..sim.embodiment import JAW, action_size
+from ..sim.world import World
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
@@ -49,7 +50,7 @@ def certify(
         scenario: an instance of a family that has an oracle.
         horizon: time limit for reaching the goal [s].
         settings: settings of the checks.
-        embodiment: the robot, one of `scengen.sim.world.EMBODIMENTS`.
+        embodiment: the robot, one of `scengen.sim.embodiment.EMBODIMENTS`.
         last: the check after which to stop, if only this check is of interest; nothing is certified then.
         adversary: attacks the scenario if the settings ask for it: `scengen.attack.check.attacked`.
 

@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import BadConfig, cut
 from ..scenario import Scenario
 from ..sim import scene_text
-from ..sim.world import JAW, World
+from ..sim.embodiment import JAW
+from ..sim.world import World
 
 MAX_RELATIVE_DIFFERENCE = 1e-9
 """Largest relative difference of equal numbers on machines with different rounding."""

@@ -21,7 +21,7 @@ from scengen.cli.program import run
 from scengen.control.teleop import Filter
 from scengen.predicates import touched_only
 from scengen.scenario import Answer
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.validate.rollout import replay
 
 TASK = load_task("domino_single")

@@ -123,7 +123,7 @@ class Draft:
 
     def idle(self) -> None:
         """Solve the first scenario by doing nothing."""
-        from scengen.sim.world import action_size
+        from scengen.sim.embodiment import action_size
 
         self.played(np.zeros((0, action_size(self.row["embodiment"]))))
 
@@ -165,7 +165,7 @@ class Draft:
 
 @cache
 def _read(path: Path) -> Any:
-    from scengen.sim.world import action_size
+    from scengen.sim.embodiment import action_size
 
     rows = pq.read_table(path).to_pylist()
     for row in rows:

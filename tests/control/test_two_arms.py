@@ -11,7 +11,9 @@ from scengen.control.loop import Loop
 from scengen.control.teleop import Filter
 from scengen.errors import NoEvent, UnknownName
 from scengen.robots import panda
-from scengen.sim.world import EMBODIMENTS, HANDS, IDLE, ROBOT, SCRIPTED, World, action_size, all_hands, hands
+from scengen.sim.arm import IDLE, ROBOT
+from scengen.sim.embodiment import EMBODIMENTS, HANDS, SCRIPTED, action_size, all_hands, hands
+from scengen.sim.world import World
 
 PERIODS = 150
 PARKED = np.tile(np.array([0, 0, 0, 0, 0, 0, -1], np.float32), (PERIODS, 1))

@@ -17,7 +17,7 @@ from scengen.envs import observations
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 
 EVERYTHING = (*observations.streams_of("panda_jaw"),)
 

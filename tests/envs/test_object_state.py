@@ -16,7 +16,8 @@ from scengen.geometry import between
 from scengen.params import values, with_values
 from scengen.pool import Pool
 from scengen.samplers.split import ID
-from scengen.sim.world import World, hands
+from scengen.sim.embodiment import hands
+from scengen.sim.world import World
 from scengen.validate.rebuilt import rebuild, world_of
 
 HIDING = [name for name in list_tasks() if any(p.hidden for p in load_task(name).known.values())]

@@ -26,7 +26,9 @@ from scengen.export.recording import RecordSettings, record
 from scengen.export.stats import QUANTILES, Shades
 from scengen.pool import Pool
 from scengen.pool.writing import write_pool
-from scengen.sim.world import IDLE, SUCTION, World
+from scengen.sim.arm import IDLE
+from scengen.sim.embodiment import SUCTION
+from scengen.sim.world import World
 
 PAPER = {
     "robot0_eef_pos": (3,),

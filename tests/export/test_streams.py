@@ -12,7 +12,7 @@ from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.envs.observations import proprioception
 from scengen.pool import Pool
-from scengen.sim.world import JAW
+from scengen.sim.embodiment import JAW
 
 TABLES = {100: "native/100hz", 50: "native/50hz"}
 MIRRORED = Path(__file__).parents[1] / "checker" / "base" / "mirror_id"

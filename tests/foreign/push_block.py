@@ -17,7 +17,8 @@ from scengen.geometry import UP
 from scengen.params import param
 from scengen.predicates import fallen
 from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import poke
 
 

@@ -17,7 +17,8 @@ from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.params import param
 from scengen.predicates import fallen
 from scengen.scenario import Plan, Refutation, Scenario, Shortcut, on_table
-from scengen.sim.world import Arm, World
+from scengen.sim.arm import Arm
+from scengen.sim.world import World
 from scengen.skills.jaw import poke
 from scengen.skills.motion import alone, together
 

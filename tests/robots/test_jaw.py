@@ -11,7 +11,8 @@ from scengen.control.loop import Loop
 from scengen.control.osc import JAW_SPEED
 from scengen.robots import jaw, panda
 from scengen.sim import scene_text
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import GRASP_TIME, RELEASE_TIME, grasp, release
 
 NAMES = panda.Names()

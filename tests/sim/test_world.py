@@ -7,7 +7,8 @@ import pytest
 
 from scengen.errors import NoEvent, UnknownName, Unstable
 from scengen.geometry import between
-from scengen.sim.world import IDLE, ROBOT, World
+from scengen.sim.arm import IDLE, ROBOT
+from scengen.sim.world import World
 from scengen.skills.motion import ANGLE_TOLERANCE, FINE, facing_down, go_to
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.rebuilt import rebuild

@@ -12,7 +12,8 @@ from scengen.errors import GaveUp
 from scengen.geometry import UP, about_z, heading
 from scengen.predicates import held
 from scengen.sim import scene_text
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import carry, pick, poke, put
 from scengen.skills.motion import (
     ANGLE_TOLERANCE,

@@ -15,7 +15,9 @@ from scengen.physics import GRAVITY
 from scengen.robots import suction
 from scengen.robots.suction import CUP_HALF_WIDTH, LENGTH, PAD, PITCH, PULL, TORQUE
 from scengen.sim import scene_text
-from scengen.sim.world import ROBOT, SUCTION, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.embodiment import SUCTION
+from scengen.sim.world import World
 from scengen.skills.jaw import release
 from scengen.skills.motion import CLOSED, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from scengen.skills.suction import carry, let_go, suck

@@ -3,7 +3,7 @@
 from controls import load
 
 from scengen.control.loop import Loop
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 
 
 def on_ridge(family, off, **changes):

@@ -10,7 +10,7 @@ from controls import ablated, each_refuted_for_its_own_reason, load, play, play_
 from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.enclosure import Enclosure
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.tasks.bounce_intercept import BounceIntercept
 from scengen.tasks.launched_ball import place_on, way_at
 

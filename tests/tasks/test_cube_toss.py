@@ -25,7 +25,7 @@ from scengen.assets.box import Cube
 from scengen.episode import Episode
 from scengen.params import values, with_values
 from scengen.physics import GRAVITY, flight
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.skills.grip import take
 from scengen.tasks.cube_toss import RAIL, ROBOT_AXIS, CubeToss
 

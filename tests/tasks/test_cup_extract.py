@@ -21,7 +21,7 @@ from scengen.geometry import UP, heading, quat
 from scengen.params import with_values
 from scengen.physics import GRAVITY
 from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW, pinch
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.tasks.cup_extract import FINGER_TAPER, MIN_CLEARANCE, CupExtract
 
 TASK = load_task("cup_extract")

@@ -22,7 +22,7 @@ from controls import (
 from scengen import load_task
 from scengen.assets.board import Board
 from scengen.assets.prop import TABLE_TOP
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.tasks.edge_slide import MIN_LIFT, MIN_OVERHANG, TIPPING_MARGIN, EdgeSlide
 from scengen.validate.rollout import AT_REST
 

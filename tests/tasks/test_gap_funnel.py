@@ -21,7 +21,7 @@ from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.gap_wall import GapWall, Kerb
 from scengen.attack.priors import fit
-from scengen.sim.world import IDLE, ROBOT
+from scengen.sim.arm import IDLE, ROBOT
 from scengen.tasks.gap_funnel import GapFunnel
 
 TASK = load_task("gap_funnel")

@@ -23,7 +23,7 @@ from scengen.geometry import UP
 from scengen.robots import ik
 from scengen.robots.jaw import TIP_BELOW
 from scengen.robots.panda import BASE
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.tasks.indirect_push import END_MARGIN, MAX_COAST_SPEED, MAX_PUSH_DISTANCE, ZONE_SIZE, IndirectPush, Spot
 
 TASK = load_task("indirect_push")

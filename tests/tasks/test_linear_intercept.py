@@ -17,7 +17,7 @@ from controls import (
 from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.predicates import displaced
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.tasks.launched_ball import CATCHING_TIME
 from scengen.tasks.linear_intercept import NEAR_DISTANCE, LinearIntercept
 

@@ -22,7 +22,7 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.attack.priors import fit
 from scengen.episode import Episode
 from scengen.params import parameters
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.skills import jaw
 from scengen.tasks.mass_sort import MIN_MASS_DIFFERENCE, ORDERS, PROBE_HEIGHT, MassSort, Spot
 from scengen.validate.rebuilt import world_of

@@ -28,7 +28,7 @@ from scengen.orientation import VIEW_CENTRE
 from scengen.pool import Pool
 from scengen.pool.writing import write_pool
 from scengen.runs.generate import row_of
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.skills.jaw import release
 from scengen.tasks.mirror_pick_place import LIFT_HEIGHT, MIN_PICTURE_OFFSET, VIEWS, MirrorPickPlace
 from scengen.validate.certify import Certified

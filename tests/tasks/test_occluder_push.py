@@ -22,7 +22,7 @@ from scengen.assets.prop import CAMERAS, TABLE_TOP
 from scengen.attack.priors import fit
 from scengen.geometry import UP
 from scengen.params import parameters
-from scengen.sim.world import IDLE, ROBOT
+from scengen.sim.arm import IDLE, ROBOT
 from scengen.tasks.occluder_push import CUBE_COUNT, OTHER_COLOURS, RED, OccluderPush, Spot
 
 TASK = load_task("occluder_push")

@@ -19,7 +19,7 @@ from controls import (
 
 from scengen import load_task
 from scengen.assets.pendulum import Pendulum
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.skills.motion import CLOSED, OPEN, hold
 from scengen.tasks.pendulum_grasp import APEX_SHARE, BOB, HINGE, PendulumGrasp
 

@@ -21,7 +21,7 @@ from scengen import load_task
 from scengen.assets.crowned_ramp import CrownedRamp
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.tasks.ramp_sort import BARRIER_START, BIN_FLOOR, RampSort
 
 TASK = load_task("ramp_sort")

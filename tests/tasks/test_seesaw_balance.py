@@ -15,7 +15,8 @@ from scengen.assets.prop import place, table
 from scengen.assets.seesaw import Seesaw
 from scengen.attack.priors import fit
 from scengen.params import parameters, with_values
-from scengen.sim.world import IDLE, World
+from scengen.sim.arm import IDLE
+from scengen.sim.world import World
 from scengen.tasks.seesaw_balance import BEAM, MAX_TILT, TARGET_TOLERANCE, SeesawBalance
 from scengen.validate.rebuilt import rebuild
 

@@ -19,7 +19,7 @@ from scengen import load_task
 from scengen.assets.shape import FRUSTUM, KINDS, Shape
 from scengen.attack.priors import fit
 from scengen.geometry import UP, heading
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.tasks.shape_stack import FALL_ANGLE, Place, ShapeStack
 
 TASK = load_task("shape_stack")

@@ -27,7 +27,8 @@ from scengen.pictures import opengl
 from scengen.pictures.render import hide_hulls
 from scengen.robots.jaw import PALM_ACROSS, PALM_ALONG
 from scengen.sim import scene_text
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.tasks.sheltered_grasp import (
     EYES,
     GRIP_HEIGHT,

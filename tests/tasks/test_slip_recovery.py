@@ -23,7 +23,7 @@ from scengen.control.loop import Loop
 from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.skills.grip import extent, take
 from scengen.skills.motion import go_to
 from scengen.tasks.slip_recovery import (

@@ -24,7 +24,7 @@ from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.physics import GRAVITY
 from scengen.robots.jaw import TIP_BELOW
-from scengen.sim.world import IDLE
+from scengen.sim.arm import IDLE
 from scengen.skills.motion import FINE, OPEN, go_to, hold
 from scengen.tasks.stack_collapse_recovery import GUARD_CLEARANCE, NAMES, Blow, StackCollapseRecovery
 

@@ -26,7 +26,7 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.params import with_values
 from scengen.robots.panda import BASE
-from scengen.sim.world import ROBOT
+from scengen.sim.arm import ROBOT
 from scengen.skills.hook import nearest_pull, put_down, slide
 from scengen.tasks.tool_retrieve import MAX_DISTANCE, MIN_LIFT, PULL_END_DISTANCE, ToolRetrieve
 

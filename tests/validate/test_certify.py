@@ -10,7 +10,8 @@ from helpers import shift
 from scengen import load_task
 from scengen.certificate import CHECKS
 from scengen.geometry import UP, compound, quat
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
 from scengen.validate.certify import certify, lower_bound

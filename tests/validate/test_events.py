@@ -17,8 +17,9 @@ from scengen.geometry import UP
 from scengen.params import param
 from scengen.scenario import Scenario
 from scengen.sim import scene_text
+from scengen.sim.embodiment import SUCTION
 from scengen.sim.memory import remember
-from scengen.sim.world import SUCTION, World
+from scengen.sim.world import World
 from scengen.skills.motion import facing_down, go_to, hold
 from scengen.skills.suction import suck
 from scengen.validate.certify import Trial

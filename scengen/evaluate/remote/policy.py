@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...envs.gym import Observation, PoolEnv
 from ...errors import UnknownName, cut
-from ...sim.world import hands
+from ...sim.embodiment import hands
 from .client import INSTRUCTION, ClientSettings, address_of
 from .servers import SERVERS, Server
 

@@ -5,7 +5,8 @@ from hand import Hand
 from scengen.geometry import UP
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import grasp, pick, release
 from scengen.skills.motion import OPEN, hold, push
 from scengen.tasks.balance import GRIP_DEPTH, LIFT_HEIGHT, MAX_TILT, RIDGE, UprightRod

@@ -7,7 +7,8 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
-from scengen.sim.world import ROBOT, World
+from scengen.sim.arm import ROBOT
+from scengen.sim.world import World
 from scengen.skills.jaw import weigh
 from scengen.skills.motion import CLOSED, COARSE, STEADY, closing_along, go_to, push
 from scengen.tasks.mass_sort import CARRY_HEIGHT, CUBE_COUNT, MassSort

@@ -10,7 +10,8 @@ from scengen.errors import GaveUp
 from scengen.geometry import UP, Mat3, about_z, polar, shortest
 from scengen.robots.jaw import PALM_ABOVE, TIP_BELOW
 from scengen.scenario import Plan, Scenario
-from scengen.sim.world import Arm, World
+from scengen.sim.arm import Arm
+from scengen.sim.world import World
 from scengen.skills.handover import CLOSING, GENTLY, LEFT, STAND_OFF, steepness
 from scengen.skills.jaw import grasp
 from scengen.skills.motion import OPEN, STEADY, Pace, alone, facing_down, go_to, together, turn_to, until

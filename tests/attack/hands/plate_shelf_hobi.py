@@ -11,7 +11,8 @@ from scengen.geometry import UP, Mat3, Vec3, between, rotation
 from scengen.params import values, with_values
 from scengen.robots.jaw import FINGER_ACROSS, OPEN_GAP, TIP_BELOW
 from scengen.scenario import Plan, Scenario
-from scengen.sim.world import Arm, World
+from scengen.sim.arm import Arm
+from scengen.sim.world import World
 from scengen.skills.handover import CLOSING, STAND_OFF, sideways
 from scengen.skills.jaw import grasp, release
 from scengen.skills.motion import CLOSED, OPEN, STEADY, Pace, alone, facing_down, go_to, steer
