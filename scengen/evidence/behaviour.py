@@ -320,11 +320,9 @@ def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Beh
             states[answer] = world.state()
 
     stage.on_change = keep
-    played = rollouts(stage, lambda name: True)
+    played = rollouts(stage, lambda name: True, steady)
     stage.on_change = None
     found = explored(stage, rules.chosen(states))
-    if steady:
-        played = rollouts(stage, lambda name: True, steady=True)
     starts = [task.draw(ID, SEED, index).scenario for index in range(TRAINING_DRAWS)]
     return Behaviour(
         task.name,
@@ -354,3 +352,18 @@ def oracles(task: Task) -> dict[str, list[Any]]:
 def made(task: Task) -> dict[str, Any]:
     """With what a behaviour is observed."""
     return {"fingerprint": fingerprint(), "versions": versions(), "text": source_sha256(task.family)}
+
+
+def played_afresh(task: Task, seed: int, count: int) -> dict[str, Any]:
+    """Fresh training draws and their core rollouts, to be compared with those of another state of the code."""
+    found: dict[str, Any] = {}
+    for index in range(count):
+        try:
+            draw = task.draw(ID, seed, index)
+        except Infeasible as error:
+            found[str(index)] = sorted(error.reasons)
+            continue
+        found[f"{index} draw"] = described(draw)
+        stage = Stage(draw.scenario, task.embodiment, task.horizon)
+        found |= {f"{index} {name}": result for name, result in rollouts(stage, is_core).items()}
+    return found

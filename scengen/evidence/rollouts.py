@@ -16,7 +16,7 @@ from ..pool.manifest import without_numbers
 from ..samplers.keyed import normals
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
-from ..sim.world import ROBOT, World
+from ..sim.world import World
 from ..validate.rollout import Jitter, Rollout, replay, run, try_shortcut
 from ..validate.settings import Robust
 
@@ -26,7 +26,7 @@ NOISES = (0.1, 0.3, 1.0)
 """Standard deviations of the noise that is added to the oracle's actions, in the range of an action."""
 JITTERED = 2
 """Number of jittered runs: one with the latency of a certificate, one without."""
-NUDGE = Robust(runs=2, position=1e-6, turn=1e-4, mass=1e-6, friction=1e-6, noise=1e-6, latency=0)
+NUDGE = Robust(runs=1, position=1e-6, turn=1e-4, mass=1e-6, friction=1e-6, noise=1e-6, latency=0)
 """Disturbance so small that a verdict that changes with it is decided by rounding."""
 
 Observer = Callable[[World], None]
@@ -34,31 +34,9 @@ Observer = Callable[[World], None]
 
 
 class Watched(World):
-    """A world that calls an observer after each control period, and records questions about contact."""
+    """A world that calls an observer after each control period."""
 
     observer: Observer | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.asked: set[tuple[str, str, str]] = set()
-        """Table and names of every question about contact since the set was cleared."""
-
-    def touching(self, a: str, b: str) -> bool:
-        self._ask("touching", a, b)
-        return super().touching(a, b)
-
-    def touched(self, a: str, b: str) -> bool:
-        self._ask("touched", a, b)
-        return super().touched(a, b)
-
-    def touching_bodies(self, body: str) -> set[str]:
-        found = super().touching_bodies(body)
-        for other in found | {ROBOT}:
-            self._ask("touching", body, other)
-        return found
-
-    def _ask(self, table: str, a: str, b: str) -> None:
-        self.asked.add((table, min(a, b), max(a, b)))
 
     def apply(self, filtered: NDArray[np.float32]) -> None:
         super().apply(filtered)

@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from ..robots.panda import arms, fingers
 from ..samplers.keyed import unit
 from ..scenario import Scenario
+from ..sim.arm import ROBOT, Arm
+from ..sim.recording import Question, RecordingWorld
 from ..sim.world import World
-from .rollouts import Watched, answer_of, whole
+from .rollouts import answer_of, whole
 
 MAX_STATES = 12
 """Largest number of stored states."""
@@ -76,7 +78,7 @@ class Coordinate:
 class Probe:
     """A world in a stored state, in which the rules are asked about changes of it."""
 
-    def __init__(self, scenario: Scenario, world: Watched, state: NDArray[np.float64]):
+    def __init__(self, scenario: Scenario, world: World, state: NDArray[np.float64]):
         self.scenario, self.world = scenario, world
         world.restore(state)  # later probes of the same world may change it: `answers` sets all that rules read
         data, loop = world.data, world.loop
@@ -167,7 +169,7 @@ def _answered(ask: Callable[[], str]) -> str:
         return type(error).__name__
 
 
-def _all_arms(world: World) -> tuple:
+def _all_arms(world: World) -> tuple[Arm, ...]:
     return (*world.arms, *world.partners)
 
 
@@ -292,13 +294,24 @@ def chosen(states: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.float64
     return [states[answer] for answer in order[:MAX_STATES]]
 
 
-def contacts_asked(scenario: Scenario, world: Watched, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
+def contacts_asked(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
     """Questions about contact that the rules ask in some states."""
-    world.asked.clear()
+    recording = RecordingWorld.twin(world)
     for state in states:
-        Probe(scenario, world, state).answers()
-    found = sorted({Contact(*asked) for asked in world.asked})
+        Probe(scenario, recording, state).answers()
+    found = sorted({contact for question in recording.asked for contact in _about(question)})
     return found if len(found) <= MAX_TOGGLES else [found[k * len(found) // MAX_TOGGLES] for k in range(MAX_TOGGLES)]
+
+
+def _about(question: Question) -> Iterator[Contact]:
+    """Entries of the contact tables on which the answer to a question depends. Of all bodies that a body may touch,
+    the robot and those that it touches count."""
+    if question.kind == "touching_bodies":
+        (body,) = question.names
+        assert isinstance(question.answer, frozenset)
+        yield from (Contact("touching", *sorted((body, other))) for other in question.answer | {ROBOT})
+    else:
+        yield Contact(question.kind, *sorted(question.names))
 
 
 def under_contacts(probe: Probe, contacts: Sequence[Contact]) -> tuple[str, str]:

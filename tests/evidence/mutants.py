@@ -24,10 +24,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "attack"), str(ROOT)]
-
-from scengen import list_tasks, load_task
-from scengen.compose import load_task as load_again
+from scengen import compose, list_tasks, load_task
 from scengen.evidence import comparison
 from scengen.evidence.behaviour import Behaviour, path_of
 
@@ -152,7 +149,8 @@ def judged(mutant: Mutant) -> dict[str, Any]:
         del sys.modules[name]
     sys.meta_path.insert(0, loader)
     try:
-        task = load_again(mutant.task)
+        compose._loaded_once.cache_clear()
+        task = load_task(mutant.task)
         for wanted in (lambda name: name == "oracle", lambda name: name != "oracle"):
             found = comparison.compare(task, stored, wanted)
             if found.differences:
@@ -170,7 +168,6 @@ def apart(mutant: Mutant) -> dict[str, Any]:
     if (child := os.fork()) == 0:
         os.close(reader)
         signal.alarm(LIMIT)
-        sys.stderr = open(os.devnull, "w")
         os.write(writer, json.dumps(judged(mutant)).encode())
         os._exit(0)
     os.close(writer)
