@@ -36,7 +36,7 @@ ci:
 	$(MAKE) certify N=1 SPLITS="$(OOD_SPLITS)" TASKS="$(OOD_TASKS)"
 
 test: setup
-	$(BIN)/scengen verify pool=generated/reference workers=2 expired=report
+	$(BIN)/scengen verify pool=generated/reference workers=2
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # Builds the wheel, installs it with all extras into an environment of its own, and tries it outside this folder. Needs a C

@@ -121,8 +121,10 @@ class StoredCertificate:
     """Hash of the physics state at the end of the witness."""
     fingerprint: str
     """Fingerprint of the machine's rounding, see `scengen.fingerprint`."""
+    task_version: int
+    """Version of the task on which the certificate was made, see `Scenario.VERSION`."""
     source_sha256: str
-    """Hash of the code that gives the family its meaning."""
+    """Hash of the code of the family when the certificate was made. It decides nothing."""
     versions: Mapping[str, str]
     """Versions of every package that the physics depends on, and the platform."""
 

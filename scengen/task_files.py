@@ -110,6 +110,18 @@ def facts_file(name: str, search: Sequence[str] = ()) -> Path | None:
     return found if found and found.is_file() else None
 
 
+def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
+    """The file with the stored behaviour of a task, `behaviour/<task>.json` beside the folder of its task file.
+
+    Raises:
+        UnknownName: there is no such task.
+    """
+    files = _files(tuple(search))
+    if name not in files:
+        raise UnknownName("task", name, files)
+    return files[name].parents[1] / "behaviour" / f"{name}.json"
+
+
 @dataclass(frozen=True)
 class About:
     """Description of a task in its file; fields as in `samplers.task.Task`."""

@@ -171,7 +171,7 @@ def test_an_evaluation_reads_the_scenarios_that_it_plays(large, touched, capsys,
 
 
 def test_a_sample_is_verified_without_the_others(large, touched, capsys):
-    asked = ["level=replay", "sample=3", "others=skip", "seed=1", "expired=report"]
+    asked = ["level=replay", "sample=3", "others=skip", "seed=1"]
     assert cli.run(["verify", f"pool={large}", *asked]) == 1  # its scenes are borrowed
     told = capsys.readouterr()
     assert touched.rows("witness") <= 3 * 40 and touched.rows("scene_xml") <= 3 * 40

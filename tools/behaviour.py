@@ -4,11 +4,11 @@
     python tools/behaviour.py check [changed] [TASK ...]
     python tools/behaviour.py against COMMIT [n=10] [TASK ...]
 
-`write` stores the behaviour of a new task, or of a task whose VERSION has risen. If the version is the stored one, only
-bits may differ; if verdicts, draws, scenes or rules differ, nothing is written, and VERSION has to rise. `check` plays
-all stored rollouts of all splits, kept cheats included; with `changed` only of tasks whose code has another hash than at
-the last check, which it then updates. `against` plays N fresh training draws, whose seed is the commit, here and in a
-work tree of that commit, and compares verdicts and bits.
+`write` stores the behaviour of a new task, or of a task whose VERSION has risen. If the version is the stored one,
+only bits may differ; if verdicts, draws, scenes or rules differ, nothing is written, and VERSION has to rise. `check`
+plays all stored rollouts of all splits, kept cheats included; with `changed` only of tasks whose code has another hash
+than at the last check, which it then updates. `against` plays N fresh training draws, whose seed is the commit, here
+and in a work tree of that commit, and compares verdicts and bits.
 """
 
 import json
@@ -26,9 +26,10 @@ from arguments import parted
 
 from scengen import list_tasks, load_task
 from scengen.errors import ScengenError
-from scengen.evidence.behaviour import Behaviour, Cheat, made, observe, path_of
+from scengen.evidence.behaviour import Behaviour, Cheat, made, observe
 from scengen.evidence.comparison import Compared, compare, merged
 from scengen.samplers.task import Task
+from scengen.task_files import behaviour_file
 
 ROOT = Path(__file__).parent.parent
 
@@ -43,14 +44,16 @@ def cheats(task: str) -> dict[str, Cheat]:
 
 def compared(task: Task) -> Compared:
     """Compare everything that is stored."""
-    return compare(task, Behaviour.read(path_of(task.name)), lambda name: True, cheats(task.name), every_split=True)
+    return compare(
+        task, Behaviour.read(behaviour_file(task.name)), lambda name: True, cheats(task.name), every_split=True
+    )
 
 
 def write(*names: str) -> int:
     """Store behaviour; returns the number of tasks that were refused."""
     refused = 0
     for task in map(load_task, names or list_tasks()):
-        path = path_of(task.name)
+        path = behaviour_file(task.name)
         stored = Behaviour.read(path) if path.is_file() else None
         if stored is None or stored.version < task.version:
             observe(task, cheats(task.name)).write(path)
@@ -73,7 +76,7 @@ def check(*arguments: str) -> int:
     """Play all that is stored; returns the number of tasks that differ."""
     changed, names, wrong = "changed" in arguments, [name for name in arguments if name != "changed"], 0
     for task in map(load_task, names or list_tasks()):
-        path = path_of(task.name)
+        path = behaviour_file(task.name)
         stored = Behaviour.read(path)
         text = made(task)["text"]
         if changed and stored.made["text"] == text:

@@ -30,7 +30,7 @@ COMMANDS = {
     "subset n=100": "subset pool={pool} n=100 to={to}",
     "evaluate, 5 scenarios": "evaluate pool={pool} policy=idle seeds=5 rollouts=1 to={to}",
     "record n=2": "record pool={pool} n=2 cameras=none to={to}",
-    "verify sample=10 others=skip": "verify pool={pool} level=replay sample=10 others=skip expired=report",
+    "verify sample=10 others=skip": "verify pool={pool} level=replay sample=10 others=skip",
 }
 ROWS = 100
 """Number of rows that are read one by one."""

@@ -17,7 +17,7 @@ from ..work.parallel import Workers
 from ..work.printed import printable
 from . import OK, Arguments, err, say, several
 from .settings import read
-from .verify import EXPIRED, verified
+from .verify import verified, without_expired
 
 MAX_FAULT = 300
 """Largest length of a fault in a message [characters]."""
@@ -33,15 +33,13 @@ class PublishSettings:
     license: str | None
     level: str
     sample: int | None
-    expired: str
     workers: Workers
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("publish", arguments, PublishSettings)
-    for name, known in (("expired", EXPIRED), ("level", LEVELS)):
-        if getattr(settings, name) not in known:
-            raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    settings = read("publish", without_expired(arguments), PublishSettings)
+    if settings.level not in LEVELS:
+        raise BadConfig(f"level = {settings.level}; it must be {' or '.join(LEVELS)}")
     at_least(settings, workers=1, sample=1)
     for name in ("title", "license"):
         if (text := getattr(settings, name)) is not None and (not text.strip() or printable(text) != text):
@@ -49,8 +47,8 @@ def command(arguments: Arguments) -> int:
     check_target(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_pools(pools)
-    strict, seed = settings.expired == "fail", secrets.randbelow(2**32)
-    options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, strict, attacked)
+    seed = secrets.randbelow(2**32)
+    options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, attacked)
     published = []
     for pool in pools:
         with ProgressBar(err, f"verify {pool.folder}", len(pool), settings.workers) as progress_bar:
@@ -73,4 +71,4 @@ def command(arguments: Arguments) -> int:
 def _verification(report: Report) -> str:
     """The verification of a pool in words."""
     sample = f", {report.sample['size']} simulated" if report.sample else ""
-    return f"level {report.level}{sample}{', certificates expired' if report.expired else ''}"
+    return f"level {report.level}{sample}"

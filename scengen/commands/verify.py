@@ -3,7 +3,7 @@
 import secrets
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,16 @@ from ..attack.campaign import wrong_hits
 from ..attack.check import attacked
 from ..attack.evidence import Hit, unsound
 from ..demos.verify import verify_demonstrations
-from ..errors import BadConfig, cut
+from ..errors import BadConfig, UnknownName, cut
+from ..evidence.reproduction import LIMITS as REPRODUCTION_LIMITS
+from ..evidence.reproduction import reproduced
 from ..pool import Pool
 from ..pool.demonstrations import Demonstrations, demonstration_folders, is_demonstrations
 from ..runs.progress import ProgressBar
 from ..samplers.task import Task
 from ..settings import at_least
 from ..task_files import search_path
+from ..task_files import tasks as list_tasks
 from ..validate.examine import Verdict
 from ..validate.junit import junit
 from ..validate.recheck import LEVELS
@@ -32,10 +35,10 @@ from ..work.targets import try_file
 from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
 from .settings import read
 
+ALL = "all"
+"""Value of `task` for all tasks."""
 MAX_PRINTED = 20
 """Largest number of differences and faults to print; the files hold all."""
-EXPIRED = ("fail", "report")
-"""Values of `expired`."""
 SKIP = "skip"
 """Value of `others` for a run that checks only its sample."""
 OTHERS = ("check", SKIP)
@@ -52,6 +55,7 @@ class VerifySettings:
 
     pool: str | list[str] | None
     hits: str | None
+    task: str | None
     level: str
     sample: int | None
     others: str
@@ -62,12 +66,16 @@ class VerifySettings:
     workers: Workers
     limit_seconds: float
     limit_mb: int
-    expired: str
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("verify", arguments, VerifySettings)
-    for name, known in (("expired", EXPIRED), ("level", LEVELS), ("others", OTHERS)):
+    arguments = without_expired(arguments)
+    # Hydra would look for a file of this name in conf/task, and find none for `all`.
+    tasks = [argument.partition("=")[2] for argument in arguments if argument.startswith("task=")]
+    settings = read("verify", [a for a in arguments if not a.startswith("task=")], VerifySettings)
+    if tasks:
+        return _reproduce(tasks[-1], settings, search_path(arguments))
+    for name, known in (("level", LEVELS), ("others", OTHERS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
     if settings.others == SKIP and settings.sample is None:
@@ -78,7 +86,7 @@ def command(arguments: Arguments) -> int:
     if settings.hits is not None:
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
     if settings.pool is None:
-        raise BadConfig("verify needs either pool=FOLDER or hits=FILE; see scengen verify --help")
+        raise BadConfig("verify needs pool=FOLDER, hits=FILE or task=NAME; see scengen verify --help")
     demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
     if demonstrated:
         return _replay_demonstrations(demonstrated, settings, search_path(arguments))
@@ -95,7 +103,6 @@ def command(arguments: Arguments) -> int:
         secrets.randbelow(2**32) if settings.seed is None else settings.seed,
         settings.workers,
         limits,
-        settings.expired == "fail",
         attacked,
     )
     reports: dict[str, Report] = {}
@@ -116,6 +123,14 @@ def command(arguments: Arguments) -> int:
     if len(folders) > 1:
         say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def without_expired(arguments: Arguments) -> Arguments:
+    """Arguments without the setting `expired`, which has no meaning any more; a hint says so."""
+    kept = [argument for argument in arguments if not argument.startswith("expired=")]
+    if len(kept) < len(arguments):
+        warn("expired= has no meaning any more: certificates belong to a version of their task, which verify compares")
+    return kept
 
 
 def verified(pool: Pool, options: Options, search: Sequence[str], progress: Callable[[int], None]) -> Report:
@@ -166,6 +181,53 @@ def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
 
 def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
     return list(wrong_hits(*of))
+
+
+def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> int:
+    """Compare tasks with their stored behaviour, and print a table.
+
+    Returns:
+        Exit status: 1 if a task has another verdict, draw, scene or rule than stored, 2 if one could not be compared.
+
+    Raises:
+        BadConfig: a setting is given that is for pools.
+        UnknownName: there is no such task.
+    """
+    for name in ("pool", "hits", "sample", "ycb", "junit"):
+        if getattr(settings, name) is not None:
+            raise BadConfig(
+                f"{name} is for pools; task={chosen} compares tasks with their stored behaviour: leave it out"
+            )
+    known = list_tasks(search)
+    names = known if chosen == ALL else [name.strip() for name in chosen.strip("[]").split(",")]
+    for name in names:
+        if name not in known:
+            raise UnknownName("task", name, [*known, ALL])
+    limits = Limits(max(settings.limit_seconds, REPRODUCTION_LIMITS.seconds), settings.limit_mb)
+    with ProgressBar(err, "verify tasks", len(names), settings.workers) as progress_bar:
+        found = sorted(reproduced(names, settings.workers, search, limits, progress_bar.show), key=lambda r: r.task)
+    table = Table("task", "version", "reproduces", "rollouts")
+    for one in found:
+        compared = one.compared
+        table.add_row(
+            one.task,
+            *(
+                (str(compared.version), compared.reproduces, str(compared.rollouts))
+                if compared
+                else ("", "unknown", "")
+            ),
+        )
+    out.print(table)
+    differences = [difference for one in found if one.compared for difference in one.compared.differences]
+    for text in [*(f"{one.task}: {one.why}" for one in found if one.why), *map(str, differences)][:MAX_PRINTED]:
+        warn(text)
+    if (more := len(differences) - MAX_PRINTED) > 0:
+        warn(f"and {more} more differences; json=FILE writes all")
+    if settings.json:
+        write_json(settings.json, [asdict(one) for one in found])
+    counts = Counter(one.compared.reproduces if one.compared else "unknown" for one in found)
+    say(f"{len(found)} tasks: {', '.join(f'{count} {what}' for what, count in counts.items())}")
+    return FAILED if counts["no"] else BAD_INPUT if counts["unknown"] else OK
 
 
 def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
@@ -247,11 +309,14 @@ def _print_report(pool: Pool, report: Report) -> None:
             (report.rechecked, "checked again without an oracle"),
             (report.certified_again, "certified again"),
             (report.left_out, "left out and certified again"),
-            (report.expired, "expired"),
+            (report.claimed, "claimed against another version of the task"),
             (report.drifted, "end in other bits"),
         )
         if n
     ]
+    if report.claimed_checks:
+        told = f"not made again at level {report.level}, and claimed: {', '.join(report.claimed_checks)}"
+        say(f"{told}; level=full makes them again")
     say(f"settings: {report.settings or 'unknown'}")
     if pool.manifest.is_subset:
         say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")

@@ -18,9 +18,9 @@ from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.claims import comparable, passed_filter
+from ..validate.claims import OfCode, another_version, comparable, passed_filter
 from ..validate.examine import Verdict
-from ..validate.identity import check_versions, source_sha256
+from ..validate.identity import check_versions
 from ..validate.labels import labels_of_draw, labels_of_task
 from ..validate.rebuilt import difference, rebuild
 from ..validate.rollout import replay, run
@@ -75,6 +75,8 @@ class Judge:
     """Whether the rounding of this machine is that of the author's."""
     oracle: bool
     """Whether the oracle plays again, too."""
+    other_version: str = ""
+    """Versions in words if the demonstrations were made on another one, see `claims.another_version`."""
 
     def __call__(self, row: DemonstrationRow) -> Examined:
         try:
@@ -83,8 +85,10 @@ class Judge:
             if not faults:
                 faults, exact = self._wrong_replay(row)
         except (ScengenError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:
-            faults, exact = [" ".join(str(error).split())[:300] or type(error).__name__], False
-        return Examined(_name(row), tuple(faults), exact=exact)
+            faults, exact = [OfCode(" ".join(str(error).split())[:300] or type(error).__name__)], False
+        hard = [fault for fault in faults if not (self.other_version and isinstance(fault, OfCode))]
+        declined = f"{self.other_version}, where {'; '.join(faults)}" if faults and not hard else ""
+        return Examined(_name(row), tuple(hard), declined, exact)
 
     @cached_property
     def _labels(self) -> dict[str, object]:
@@ -99,7 +103,7 @@ class Judge:
             return
         scenario = self.task.scenario(row.params)
         if row.id != scenario.id or as_json(row.params) != canonical(scenario):
-            yield "the id does not belong to the parameters"
+            yield OfCode("the id does not belong to the parameters")
         if sha256(row.scene_xml) != row.scene_sha256:
             yield "the scene has another sha256 than its row says"
         if sha256(row.witness.tobytes()) != row.witness_sha256:
@@ -113,7 +117,7 @@ class Judge:
         if row.style != (style := self._style(row)):
             yield f"the style is {row.style}, that of this run is {style}"
         if difference_ := difference(row.scene_xml, rebuild(scenario), self.same_machine, row.embodiment):
-            yield difference_
+            yield OfCode(difference_)
         yield from self._wrongly_drawn(row)
 
     def _style(self, row: DemonstrationRow) -> str:
@@ -126,11 +130,11 @@ class Judge:
         try:
             draw = self.task.draw(self.config.split, self.config.seed, row.index, design)
         except Infeasible:
-            yield f"drawn again, index {row.index} gives no feasible scenario"
+            yield OfCode(f"drawn again, index {row.index} gives no feasible scenario")
             return
         for name, there in labels_of_draw(draw).items():
             if comparable(getattr(row, name)) != comparable(there):
-                yield f"the {name} is not that of the scenario that is drawn for index {row.index}"
+                yield OfCode(f"the {name} is not that of the scenario that is drawn for index {row.index}")
 
     def _wrong_replay(self, row: DemonstrationRow) -> tuple[list[str], bool]:
         """Faults of the replay, and whether it ended in the same bits."""
@@ -150,7 +154,7 @@ class Judge:
             played = run(scenario, world, planner, self.task.horizon, self.config.settle)
             if played.actions.tobytes() != row.witness.tobytes():
                 faults.append("the oracle plays other actions in this style")
-        return faults, exact
+        return list(map(OfCode, faults)), exact
 
 
 def _lost(row: DemonstrationRow, reason: str) -> Examined:
@@ -192,14 +196,14 @@ def verify_demonstrations(
     except ScengenError as error:
         report.faults.append(f"{DEMONSTRATIONS}: {error}")
         return report
-    if manifest.source_sha256 != source_sha256(task.family):
-        report.remarks.append("code of the family has changed since; what replays is sound all the same")
+    if other := another_version("made", manifest.task_version, task):
+        report.remarks.append(f"{other}: what differs between the versions cannot be checked here")
     same = manifest.fingerprint == fingerprint()
     if not same:
         report.remarks.append("made on a machine with different rounding: final states are not compared")
     if oracle and manifest.source != SCRIPTED:
         report.remarks.append(f"source {manifest.source}: there is no oracle to play them again")
-    judge = Judge(task, manifest.config, manifest.indices, same, oracle and manifest.source == SCRIPTED)
+    judge = Judge(task, manifest.config, manifest.indices, same, oracle and manifest.source == SCRIPTED, other)
     order = _Order(manifest.config.runs)
 
     def rows() -> Iterator[DemonstrationRow]:

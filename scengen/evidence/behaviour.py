@@ -26,7 +26,6 @@ from ..samplers.task import Draw, Task
 from ..scenario import Plan, Scenario
 from ..sim import scene_text
 from ..sim.world import World
-from ..task_files import conf_dir
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import portable_sha256
 from ..versions import versions
@@ -103,11 +102,6 @@ class Behaviour:
                 parts.append(f'"{name}": {json.dumps(value)}')
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("{\n" + ",\n".join(parts) + "\n}\n")
-
-
-def path_of(task: str) -> Path:
-    """The file of a task's behaviour."""
-    return conf_dir() / "behaviour" / f"{task}.json"
 
 
 # --- what does not need a rollout -------------------------------------------------------------------------------------

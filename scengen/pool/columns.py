@@ -24,6 +24,7 @@ from .untrusted import (
     check_horizon,
     check_match,
     check_settling,
+    check_task_version,
     check_text,
     check_versions,
     check_whole,
@@ -138,6 +139,7 @@ def certificate(name: str, value: Any) -> StoredCertificate:
     demand(found.verdict in VERDICTS, f"{name} has the verdict {found.verdict[:40]!r}; known: {', '.join(VERDICTS)}")
     check_match(f"{name}.fingerprint", found.fingerprint, SHORT_HASH)
     check_match(f"{name}.source_sha256", found.source_sha256, HASH)
+    check_task_version(found.task_version)
     if found.final_state:
         check_text(f"{name}.final_state", found.final_state, 100)
     check_versions(found.versions)

@@ -40,7 +40,7 @@ DEMONSTRATIONS = "demonstrations.json"
 """File with what a folder of demonstrations says of itself."""
 FAILED = "failed.parquet"
 """File of the failed attempts, if they were kept."""
-DEMONSTRATIONS_FORMAT = 1
+DEMONSTRATIONS_FORMAT = 2
 """Version of the format, which changes with the columns, the names of files and the entries of the manifest."""
 SCRIPTED = "scripted"
 """Source of demonstrations that an oracle has played."""
@@ -97,8 +97,10 @@ class DemonstrationManifest:
     """Versions of the packages that the physics depends on, and the platform."""
     fingerprint: str
     """Rounding of the machine; see `scengen.fingerprint`."""
+    task_version: int
+    """Version of the task on which the demonstrations were made, see `Scenario.VERSION`."""
     source_sha256: str
-    """Hash of the code that gives the family its meaning."""
+    """Hash of the code of the family when the demonstrations were made. It decides nothing."""
     shards: tuple[FileEntry, ...] = ()
     """Files of the demonstrations, in the order of the attempts."""
     failed: FileEntry | None = None

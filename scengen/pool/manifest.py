@@ -19,6 +19,7 @@ from .untrusted import (
     check_mapping,
     check_match,
     check_settling,
+    check_task_version,
     check_text,
     check_versions,
     check_whole,
@@ -26,7 +27,7 @@ from .untrusted import (
 )
 
 MANIFEST = "manifest.json"
-FORMAT = 3
+FORMAT = 4
 """Version of the format of pools, which changes with the columns, the names of files and the entries of a manifest."""
 REJECTED = "rejected.parquet"
 """File of the scenarios that were kept although they were not certified."""
@@ -84,8 +85,10 @@ class Manifest:
     """Versions of the packages that the pool was certified with, and the platform."""
     fingerprint: str
     """Rounding of the machine that made the pool; see `scengen.fingerprint`."""
+    task_version: int
+    """Version of the task on which the pool was made, see `Scenario.VERSION`."""
     source_sha256: str
-    """Hash of the code that gives the family its meaning."""
+    """Hash of the code of the family when the pool was made. It decides nothing."""
     shards: tuple[FileEntry, ...]
     """Files of the certified scenarios, in the order of their indices."""
     rejected: FileEntry | None = None
@@ -225,6 +228,7 @@ def check_origin(manifest: Any) -> None:
     """Entries that say with what something was made."""
     check_versions(manifest.versions)
     check_match("fingerprint", manifest.fingerprint, SHORT_HASH)
+    check_task_version(manifest.task_version)
     check_match("source_sha256", manifest.source_sha256, HASH)
 
 

@@ -143,6 +143,12 @@ def _check_seconds(name: str, value: Any, most: float) -> None:
     demand(0 < value <= most, f"{name} = {value:g} s; it must lie in (0, {most:g}] s")
 
 
+def check_task_version(value: Any) -> None:
+    """Version of a task: a whole number from 1 on."""
+    check_whole("task_version", value)
+    demand(value >= 1, f"task_version is {value}; versions of tasks begin with 1")
+
+
 def check_versions(value: Any) -> None:
     """Versions by package, MuJoCo and robosuite among them."""
     demand(len(check_mapping("versions", value)) <= MAX_VERSIONS, f"more than {MAX_VERSIONS} versions")

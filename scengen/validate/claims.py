@@ -27,10 +27,25 @@ from .rebuilt import MAX_ABSOLUTE_DIFFERENCE, MAX_RELATIVE_DIFFERENCE, rebuild
 from .rollout import AT_REST
 from .settings import CertifySettings
 
+OF_FAMILY = ("feasible", "shortcuts", "ablations")
+"""Checks whose numbers have names that the family gives."""
 NUMERICS = ("half_time_step", "twice_the_iterations")
 """Variations of the check `numerics`."""
 ROUNDING = 1e-6
 """Largest excess of an action over the filter's range, from single precision."""
+
+
+class OfCode(str):
+    """Difference that rests on the code of the task. It is a fault only if the pool was certified on the version of the
+    task that is installed; otherwise the author's claim is about other code, and cannot be decided here."""
+
+
+def another_version(made: str, version: int, task: Task) -> str:
+    """The version on which something was `made`, and the installed one, in words; empty if they are the same."""
+    if version == task.version:
+        return ""
+    remedy = "; a newer scengen can check it" if version > task.version else ""
+    return f"{made} against version {version} of {task.name}, installed: {task.version}{remedy}"
 
 
 @dataclass(frozen=True)
@@ -57,6 +72,11 @@ class Claims:
         _ = claims.design
         return claims
 
+    @property
+    def of_another_version(self) -> str:
+        """The versions of the task in words, if the pool was certified on another one; empty if not."""
+        return another_version("certified", self.manifest.task_version, self.task)
+
     @cached_property
     def design(self) -> Design:
         """Design that the numbers came from."""
@@ -76,7 +96,7 @@ def wrong_labels(row: PoolRow, claims: Claims) -> Iterator[str]:
     certificate, manifest = row.certificate, claims.manifest
     told = {name: (getattr(row, name), value) for name, value in _labels(claims).items()}
     told["settings"] = (certificate.settings, claims.settings.name)
-    for name in ("versions", "source_sha256", "fingerprint"):
+    for name in ("versions", "task_version", "source_sha256", "fingerprint"):
         told[name] = (getattr(certificate, name), getattr(manifest, name))
     for name, (here, there) in told.items():
         if here != there:
@@ -94,9 +114,9 @@ def wrong_names(row: PoolRow, scenario: Scenario) -> Iterator[str]:
     certificate = row.certificate
     scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
     if row.id != scenario.id:
-        yield "the id does not belong to the parameters"
+        yield OfCode("the id does not belong to the parameters")
     if as_json(row.params) != canonical(scenario):
-        yield "the parameters are incomplete, or not as the family writes them"
+        yield OfCode("the parameters are incomplete, or not as the family writes them")
     if {scene} != {row.scene_sha256, certificate.scene_sha256}:
         yield "the scene has another sha256 than its row or certificate says"
     if {witness} != {row.witness_sha256, certificate.witness_sha256}:
@@ -110,15 +130,16 @@ def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
     try:
         draw = claims.draw(row.index)
     except Infeasible:
-        yield f"drawn again, index {row.index} gives no feasible scenario"
+        yield OfCode(f"drawn again, index {row.index} gives no feasible scenario")
         return
     if row.id != draw.scenario.id:
-        yield f"the parameters are not those that are drawn for index {row.index}, which gives {draw.scenario.id}"
+        told = f"the parameters are not those that are drawn for index {row.index}, which gives {draw.scenario.id}"
+        yield OfCode(told)
         return
     for name, there in labels_of_draw(draw).items():
         here = getattr(row, name)
         if name != "params" and comparable(here) != comparable(there):  # the id covers params
-            yield f"the {name} is {_short(comparable(here))}; drawn again it is {_short(comparable(there))}"
+            yield OfCode(f"the {name} is {_short(comparable(here))}; drawn again it is {_short(comparable(there))}")
 
 
 def comparable(value: Any) -> Any:
@@ -140,9 +161,10 @@ def wrong_certificate(row: PoolRow, scenario: Scenario, claims: Claims) -> Itera
     nothing = _nothing_to_check(scenario, claims.settings)
     for check in checks:
         if check.name in nothing and (check.passed is not None or check.reason != nothing[check.name]):
-            yield f"check {check.name} has nothing to check here, but does not say so"
+            yield OfCode(f"check {check.name} has nothing to check here, but does not say so")
         elif check.name not in nothing and not check.passed:
-            yield f"the certificate is not complete: {check.name} has not passed"
+            told = f"the certificate is not complete: {check.name} has not passed"
+            yield OfCode(told) if check.waived else told
         elif check.name not in nothing and check.reason:
             yield f"check {check.name} has passed, but gives a reason against it: {check.reason[:80]}"
     yield from _other_settings(checks, claims)
@@ -252,10 +274,8 @@ def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenari
         except (TypeError, KeyError, AttributeError, ValueError):
             fine = False
         if not fine:
-            yield (
-                f"check {name} cannot have passed with its numbers, or they are not those of this family; "
-                "if the family has changed since, certify the pool again"
-            )
+            told = f"check {name} cannot have passed with its numbers, or they are not those of this family"
+            yield OfCode(told) if name in OF_FAMILY else told
     if not passed_filter(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
 

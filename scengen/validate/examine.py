@@ -1,5 +1,6 @@
 """Examination of a scenario of a pool, or of a piece of its run, in a process that can be ended: static facts first."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +12,7 @@ from . import survey
 from .certify import Adversary
 from .claims import (
     Claims,
+    OfCode,
     compiles,
     scene_or_nothing,
     wrong_certificate,
@@ -20,7 +22,7 @@ from .claims import (
     wrongly_drawn,
 )
 from .rebuilt import difference, rebuild
-from .recheck import Simulated, fails_again, simulate, why_not_certified
+from .recheck import Simulated, certified_here, fails_again, simulate, why_not_certified
 
 Verdict = Literal["sound", "refuted", "declined"]
 """`declined` says nothing about the claim: the check died, was too large or too slow, or belongs to another version."""
@@ -37,8 +39,8 @@ class Examination:
     rebuilt: bool = False
     """Whether its scene and its draw were made again."""
     simulated: bool = False
-    expired: bool = False
-    """Whether the family's code has changed since the certificate was made."""
+    claimed: bool = False
+    """Whether it is declined because it was certified against another version of the task, where something differs."""
     drifted: bool = False
     """Whether the replay reaches the goal, but ends in other bits than on the machine of the certificate."""
 
@@ -71,7 +73,6 @@ class Examiner:
 
     claims: Claims
     level: str
-    expired: bool
     adversary: Adversary | None = None
 
     def __call__(self, job: Job) -> Answer:
@@ -84,31 +85,44 @@ class Examiner:
         except (ScengenError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:
             why = " ".join(str(error).split())[:300] or type(error).__name__
             if isinstance(job, tuple):
-                return Examination(job[0].id, "refuted", (why,), expired=self.expired)
-            return Examination(MANIFEST, "refuted", (f"{_described(job)} cannot be made again: {why}",))
+                return self._judged(job[0], [OfCode(why)])
+            verdict: Verdict = "declined" if self.claims.of_another_version else "refuted"
+            return Examination(MANIFEST, verdict, (f"{_described(job)} cannot be made again: {why}",))
+
+    def _judged(self, row: PoolRow, reasons: Sequence[str], *flags: bool) -> Examination:
+        """The examination of a row with reasons against it. Those of other code are no faults of another version."""
+        other = self.claims.of_another_version
+        faults = [reason for reason in reasons if not (other and isinstance(reason, OfCode))]
+        if faults or not reasons:
+            return Examination(row.id, "refuted" if faults else "sound", tuple(faults), *flags)
+        told = [f"{other}, where {'; '.join(reasons)}"]
+        if self.level == "full":
+            told.append(certified_here(row, self.claims, self.adversary))
+        return Examination(row.id, "declined", tuple(told), *(flags or (False, False)), claimed=True)
 
     def _examined(self, row: PoolRow, simulated: bool, certified: bool) -> Examination:
         claims = self.claims
         reasons = list(wrong_labels(row, claims))
         if row.task != claims.task.name:
-            return Examination(row.id, "refuted", tuple(reasons), expired=self.expired)
+            return Examination(row.id, "refuted", tuple(reasons))
         scenario = claims.task.scenario(row.params)
         reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]
         reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
         text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)
-        reasons += filter(
-            None, [difference(row.scene_xml, text, row.certificate.fingerprint == fingerprint(), row.embodiment)]
-        )
+        exact = row.certificate.fingerprint == fingerprint()
+        if other := difference(row.scene_xml, text, exact, row.embodiment):
+            reasons.append(OfCode(other))
         if reasons or not simulated:
-            verdict: Verdict = "refuted" if reasons else "sound"
-            return Examination(row.id, verdict, tuple(reasons), True, expired=self.expired)
+            return self._judged(row, reasons, True)
         if certified:
             done = simulate(row, scenario, text, claims.settings, self.level, self.adversary)
         else:
             found = fails_again(row, scenario, claims.settings, self.level, self.adversary)
             done = Simulated(tuple(found), False)
-        verdict = "refuted" if done.reasons else "declined" if done.doubts else "sound"
-        return Examination(row.id, verdict, done.reasons + done.doubts, True, True, self.expired, done.drifted)
+        if done.reasons:
+            return self._judged(row, list(map(OfCode, done.reasons)), True, True)
+        verdict: Verdict = "declined" if done.doubts else "sound"
+        return Examination(row.id, verdict, done.doubts, True, True, drifted=done.drifted)
 
 
 def lost_examination(job: Job, reason: str) -> Examination:

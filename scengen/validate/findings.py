@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..certificate import CHECKS
 from ..errors import PoolError, cut
 from ..fingerprint import fingerprint
 from ..pool.manifest import MANIFEST
@@ -13,7 +14,7 @@ from ..versions import versions
 from . import lock
 from .claims import Claims
 from .examine import Examination, Verdict
-from .identity import source_sha256
+from .recheck import MADE_AGAIN
 from .settings import CertifySettings
 
 
@@ -38,7 +39,13 @@ class Report:
     """Number of scenarios that the run had drawn and not certified, and that were certified again."""
     failed: list[dict[str, str]]
     """`id`, `verdict` and `reason` of everything that is not sound; a fault of the whole pool under manifest.json."""
-    expired: int
+    claimed: int
+    """Number of scenarios that were certified against another version of the task, and that differ from it here. They
+    are among the declined ones."""
+    versions: list[int]
+    """Version of the task on which the pool was certified, and the installed one."""
+    claimed_checks: list[str]
+    """Checks of the certificates that were not made again at this level."""
     drifted: int
     settings: str
     """Settings of the certificates: `quick`, `full`, or `own settings` and the names of those that differ."""
@@ -61,8 +68,10 @@ class Report:
 class Findings:
     """Collects findings."""
 
-    def __init__(self, level: str, strict: bool):
-        self.level, self.strict = level, strict
+    def __init__(self, level: str):
+        self.level = level
+        self.task_versions: list[int] = []
+        self.claimed_checks: list[str] = []
         self.failed: list[dict[str, str]] = []
         self.examinations: list[Examination] = []
         self.differences: list[dict[str, str]] = []
@@ -71,7 +80,6 @@ class Findings:
         self.sample: dict[str, Any] | None = None
         self.left_out: dict[int, str] = {}
         """Reasons why indices without a scenario are not certified."""
-        self.expired = False
         self.names: dict[str, str] = {}
         """Names of the scenarios that were looked at, by id."""
 
@@ -120,10 +128,11 @@ class Findings:
                 self.of_pool(MANIFEST, "declined", told)
             elif made != here:
                 self.remarks.append(f"certified with {package} {made}, this is {here}")
-        self.expired = manifest.source_sha256 != source_sha256(claims.task.family)
-        if self.expired and self.strict:
-            told = "expired: code that it depends on has changed since; certify the pool again"
-            self.of_pool(MANIFEST, "declined", told)
+        self.task_versions = [manifest.task_version, claims.task.version]
+        made = [check for check in CHECKS if check != "attack" or claims.settings.attack]
+        self.claimed_checks = [check for check in made if check not in MADE_AGAIN[self.level]]
+        if other := claims.of_another_version:
+            self.remarks.append(f"{other}: what differs between the versions cannot be checked here")
         if manifest.fingerprint != fingerprint():
             told = "certified on a machine with different rounding: final states and numbers are not compared"
             self.remarks.append(told)
@@ -169,7 +178,9 @@ class Findings:
             certified_again=simulated if self.level == "full" else 0,
             left_out=len(self.left_out),
             failed=failed,
-            expired=sum(e.expired for e in self.examinations),
+            claimed=sum(e.claimed for e in self.examinations),
+            versions=self.task_versions,
+            claimed_checks=self.claimed_checks,
             drifted=sum(e.drifted for e in self.examinations),
             settings=self.settings,
             differences=self.differences,

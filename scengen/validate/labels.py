@@ -39,4 +39,9 @@ def labels_of_draw(draw: Draw) -> dict[str, Any]:
 
 def made_with(task: Task) -> dict[str, Any]:
     """Fields of a manifest and of its certificates that say what they were made with."""
-    return {"versions": versions(), "fingerprint": fingerprint(), "source_sha256": source_sha256(task.family)}
+    return {
+        "task_version": task.version,
+        "versions": versions(),
+        "fingerprint": fingerprint(),
+        "source_sha256": source_sha256(task.family),
+    }

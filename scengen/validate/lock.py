@@ -37,13 +37,15 @@ def needed(family: type[Scenario], made: Mapping[str, str]) -> dict[str, str]:
     return dict(sorted({**packages(family), **named}.items(), key=lambda item: item[0].lower()))
 
 
-def lock_text(family: type[Scenario], versions: Mapping[str, str], fingerprint: str, source_sha256: str) -> str:
+def lock_text(
+    family: type[Scenario], versions: Mapping[str, str], fingerprint: str, source_sha256: str, task_version: int
+) -> str:
     """Content of the file, given the entries of the manifest."""
     cpu = binding.get_host_cpu_features()
     able = " ".join(name for name in ROUNDING_FEATURES if cpu.get(name))
     about = [
         f"What the verdicts of this pool rest on; beside scengen, pip install --no-deps -r {LOCK_FILE} gives it again.",
-        f"scengen {versions['scengen']}, code {source_sha256}",
+        f"scengen {versions['scengen']}, version {task_version} of the task, code {source_sha256}",
         f"python {platform.python_version()}",
         f"platform {versions['platform']}, {' '.join(platform.libc_ver())}",
         f"processor {binding.get_host_cpu_name()}: {able}",
@@ -65,7 +67,7 @@ def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -
     """Content of the file for the pool of a run, which is kept in the run's folder from its beginning on.
 
     Args:
-        made: `versions`, `fingerprint` and `source_sha256` of the run.
+        made: entries of `labels.made_with` of the run.
 
     Raises:
         PoolError: the run is continued with other packages than it was begun with.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..certificate import CHECKS, Check, as_json
-from ..errors import NoOracle
+from ..errors import NoOracle, ScengenError
 from ..fingerprint import fingerprint
 from ..pool import PoolRow
 from ..pool.manifest import without_numbers
@@ -22,6 +22,12 @@ BEFORE_WITNESS = ("feasible", "compiles", "overlap", "rest", "unsolved", "idle")
 """Checks that need neither oracle nor witness, in order: each needs those before it."""
 OF_ORACLE = ("solved", "robust")
 """Checks whose numbers belong to the oracle, and not to the witness."""
+MADE_AGAIN = {
+    "replay": ("feasible", "compiles", "witness"),
+    "recheck": (*BEFORE_WITNESS, "numerics", "ablations", "witness"),
+    "full": tuple(CHECKS),
+}
+"""Checks that are made again at each level. The others are the author's claim."""
 WITH_WITNESS = ("numerics", "ablations")
 """Checks that need the witness. If the witness fails under other numerics, the certificate and its verification let the
 oracle try: only then verification needs an oracle."""
@@ -99,6 +105,21 @@ def fails_again(
         if not alike(check.numbers, stored.numbers):
             yield f"check {check.name} of this reject has other numbers when it is made again"
             return
+
+
+def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) -> str:
+    """What the installed version of the task makes of a scenario that was certified against another one.
+
+    Args:
+        adversary: see `certify`.
+    """
+    task = claims.task
+    try:
+        scenario = task.scenario(row.params)
+        again = certify(scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary).certificate
+    except (ScengenError, ValueError, ArithmeticError) as error:
+        return f"certified again against version {task.version} it cannot be: {' '.join(str(error).split())[:200]}"
+    return f"certified again against version {task.version} it is {again.verdict} {again.reason}".strip()
 
 
 def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -> str:

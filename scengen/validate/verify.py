@@ -16,7 +16,7 @@ from ..samplers.task import Task
 from ..work.parallel import Limits, Workers, each
 from . import survey
 from .certify import Adversary
-from .claims import Claims
+from .claims import Claims, OfCode
 from .examine import Answer, Examination, Examiner, Failed, Job, LeftOut, lost_examination
 from .findings import Findings, Report
 from .settings import CertifySettings
@@ -46,8 +46,6 @@ class Options:
     workers: Workers = 1
     limits: Limits | None = LIMITS
     """Limits of one scenario; None to work in this process."""
-    strict: bool = True
-    """Whether a certificate that is older than the family's code is declined."""
     adversary: Adversary | None = None
     """The adversary at level full, if the certificates ask for an attack; see `certify.certify`."""
 
@@ -66,22 +64,23 @@ def verify(
         levels: the settings that belong to a name such as `quick`, for this task.
         progress: called with the number of scenarios that have been checked.
     """
-    found = Findings(options.level, options.strict)
+    found = Findings(options.level)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
     try:
         task, settings = task_of_manifest(pool, installed), settings_of_manifest(pool.manifest)
         claims = Claims.of(pool, task, settings)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:
-        found.of_pool(MANIFEST, "refuted", str(error))
+        other = pool.manifest.task_version != installed.version
+        found.of_pool(MANIFEST, "declined" if other else "refuted", str(error))
         return found.report()
     found.compare_tasks(installed, task)
     found.name_settings(settings, levels)
     found.compare_versions(claims)
     found.compare_lock(pool.folder, claims)
     if found.pool_verdict != "declined":
-        run = _Run(pool, options, found, _sample(pool, options, found))
-        examiner = Examiner(claims, options.level, found.expired, options.adversary)
+        run = _Run(pool, options, found, _sample(pool, options, found), claims.of_another_version)
+        examiner = Examiner(claims, options.level, options.adversary)
         run.examine(examiner, progress)
         run.count()
         if options.level == "full" and found.pool_verdict == "sound":
@@ -99,6 +98,8 @@ class _Run:
     found: Findings
     sample: set[int] | None
     """Places of the rows that are simulated; None for all."""
+    other_version: str = ""
+    """See `Claims.of_another_version`."""
     indices: "array[int]" = field(default_factory=lambda: array("q"))
     """Indices of the rows, in the order of the rows."""
     places: dict[str, int] = field(default_factory=dict)
@@ -232,7 +233,7 @@ class _Run:
         if certified := sum(not why for why in reasons.values()):
             told = f"{certified} of {len(left_out)} scenarios that the run left out are certified here"
             self.found.remarks.append(told)
-        if len(reasons) == len(left_out) and self.manifest.fingerprint == fingerprint():
+        if len(reasons) == len(left_out) and self.manifest.fingerprint == fingerprint() and not self.other_version:
             for what in survey.wrong_losses(self.manifest, reasons):
                 self.found.of_pool(MANIFEST, "refuted", what)
 
@@ -270,7 +271,10 @@ class _Run:
             told = f"{self.manifest.n} scenarios were asked for, and the run ended with {len(self.pool)}"
             self.found.remarks.append(f"{told}: this number is the author's word")
         for what in self._miscounted():
-            self.found.of_pool(MANIFEST, "refuted", what)
+            if isinstance(what, OfCode) and self.other_version:
+                self.found.of_pool(MANIFEST, "declined", f"{self.other_version}, where {what}")
+            else:
+                self.found.of_pool(MANIFEST, "refuted", what)
 
     def _miscounted(self) -> Iterator[str]:
         if not self.complete:
@@ -282,7 +286,8 @@ class _Run:
         yield from survey.wrong_attack(self.manifest)
         yield from survey.wrong_rejects(self.manifest, self.rejected, self.certified)
         if self.drawn.indices == self.manifest.indices:
-            yield from survey.wrong_funnel(self.manifest, len(self.indices), self.first, self.drawn)
+            wrong = survey.wrong_funnel(self.manifest, len(self.indices), self.first, self.drawn)
+            yield from map(OfCode, wrong)
 
 
 def _sample(pool: Pool, options: Options, found: Findings) -> set[int] | None:

@@ -215,8 +215,8 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
     "versions_of_a_row": ("single_quick", r"version", lambda d: d.certificate["versions"].update(mujoco="3.4.9")),
     "versions_of_the_manifest": ("single_quick", r"version", _versions("manifest", numpy="2.0.0")),
     "versions_lack_mujoco": ("single_quick", r"version", lambda d: d.certificate["versions"].pop("mujoco")),
-    "source_of_a_row": ("single_quick", r"source|expired|code", _certificate(source_sha256="0" * 64)),
-    "source_of_the_manifest": ("single_quick", r"source|expired|code", _manifest(source_sha256="0" * 64)),
+    "source_of_a_row": ("single_quick", r"source", _certificate(source_sha256="0" * 64)),
+    "source_of_the_manifest": ("single_quick", r"source", _manifest(source_sha256="0" * 64)),
     "fingerprint_of_a_row": ("single_quick", r"fingerprint", _certificate(fingerprint=ELSEWHERE)),
     "fingerprint_of_the_manifest": ("single_quick", r"fingerprint", _manifest(fingerprint=ELSEWHERE)),
     "final_state": ("single_quick", r"another state|final", _certificate(final_state="0" * 16)),
@@ -243,10 +243,6 @@ EVERY: dict[str, tuple[str, Change]] = {
     "code": (r"code", _row(code="T99")),
 }
 """What is claimed for each of the other tasks too."""
-
-
-def _expired(draft: Draft) -> None:
-    draft.everywhere(source_sha256="0" * 64)
 
 
 def _older_mujoco(draft: Draft) -> None:
@@ -292,6 +288,5 @@ CASES = [
         _split("high_patch", ("ramp.level",)),
     ),
     Case("packing_axis__called_training", "packing_axis", "reject", r"parameters|redraw|drawn|id ", _split("id")),
-    Case("single_quick__expired", "single_quick", "refuse", r"expired|source|code", _expired),
     Case("single_quick__older_mujoco", "single_quick", "refuse", r"mujoco", _older_mujoco, quick=True),
 ]

@@ -10,7 +10,6 @@ changes what its scenarios are. The others are made when the whole corpus is, in
 that their certificates depend on changes.
 """
 
-import json
 import shutil
 import subprocess
 import sys
@@ -137,16 +136,17 @@ def make(name: str, folder: Path) -> None:
         shutil.copytree(made, folder)
 
 
-def expired(folder: Path) -> bool:
-    """Whether a pool is not there, or its certificates rest on other code than there is now."""
+def outdated(folder: Path) -> bool:
+    """Whether a pool is not there, cannot be read, or belongs to another version of its task than the installed one."""
     from scengen import load_task
-    from scengen.validate.identity import source_sha256
+    from scengen.errors import PoolError
+    from scengen.pool import Pool
 
-    path = folder / "manifest.json"
-    if not path.is_file():
+    try:
+        pool = Pool.open(folder)
+    except PoolError:
         return True
-    manifest = json.loads(path.read_text())
-    return manifest["source_sha256"] != source_sha256(load_task(manifest["config"]["task"]["name"]).family)
+    return pool.manifest.task_version != load_task(pool.task).version
 
 
 if __name__ == "__main__":

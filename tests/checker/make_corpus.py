@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import accepted
+import ages
 import certificates
 import hostile_data
 import hostile_files
@@ -23,13 +24,13 @@ import losses
 import make_base
 import scenes
 import witnesses
-from forgery import Case, Draft
+from forgery import Case
 
 
 def cases() -> list[Case]:
     """The whole corpus."""
     found = []
-    for module in (accepted, scenes, labels, losses, certificates, witnesses, hostile_data, hostile_files):
+    for module in (accepted, scenes, labels, ages, losses, certificates, witnesses, hostile_data, hostile_files):
         found += [replace(case, kind=module.__name__) for case in module.CASES]
     names = [case.name for case in found]
     twice = {name for name in names if names.count(name) > 1}
@@ -54,28 +55,11 @@ def write(chosen: Sequence[Case], folder: Path, others: Path) -> None:
 
 
 def _base(name: str, others: Path, target: Path) -> None:
-    """Put a base pool in its place.
-
-    The pools of the repository say that they were made with the code of today: what is tested is the checker, and not
-    whether a family has changed in a way that matters. If it has, sound pools are refused, and `make_base.py` helps.
-    """
+    """Put a base pool in its place."""
     source = make_base.found(name, others)
-    if name not in make_base.KEPT and make_base.expired(source):
+    if name not in make_base.KEPT and make_base.outdated(source):
         make_base.make(name, source)
-    sealed(source, target)
-
-
-def sealed(source: Path, target: Path) -> None:
-    """Copy a pool; if its certificates rest on other code than there is now, it says that they do not."""
-    if make_base.expired(source):
-        from scengen import load_task
-        from scengen.validate.identity import source_sha256
-
-        draft = Draft.of(source)
-        draft.everywhere(source_sha256=source_sha256(load_task(draft.task["name"]).family))
-        draft.write(target)
-    else:
-        shutil.copytree(source, target)
+    shutil.copytree(source, target)
 
 
 def _told(case: Case) -> dict[str, object]:

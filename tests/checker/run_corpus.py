@@ -105,15 +105,14 @@ def _apart(work: Callable[[], None]) -> None:
 
 
 def warm() -> None:
-    """Import and compute once, here, what every child would need anew: how this machine rounds, what code there is."""
+    """Import and compute once, here, what every child would need anew: the machine's fingerprint, and the tasks."""
     from scengen import cli, compose, list_tasks, load_task  # noqa: F401
     from scengen.commands import verify  # noqa: F401
     from scengen.fingerprint import fingerprint
-    from scengen.validate.identity import source_sha256
 
     fingerprint()
     for name in list_tasks():
-        source_sha256(load_task(name).family)
+        load_task(name)
 
 
 def _tables(scores: Sequence[Score], outcomes: Sequence[Outcome]) -> Iterable[str]:

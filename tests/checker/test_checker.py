@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from checkers import CONTROLS, EASY
 from helpers import of_stored_pools
-from make_base import BASE, KEPT, POOLS, expired
+from make_base import BASE, KEPT, POOLS, outdated
 from make_corpus import cases, write
 
 from scengen import list_tasks, load_task
@@ -45,7 +45,7 @@ def test_the_pools_in_the_repository_are_those_of_the_families_as_they_are(name)
     pool = Pool.open(BASE / name)
     task = load_task(pool.task)
     remedy = "make checker-base"
-    assert not expired(BASE / name), remedy
+    assert not outdated(BASE / name), remedy
     for row in pool.rows():
         scenario = task.scenario(row.params)
         assert (scenario.id, alike(scenario.features(), row.certificate.checks[0].numbers)) == (row.id, True), remedy

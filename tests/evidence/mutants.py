@@ -26,7 +26,8 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 from scengen import compose, list_tasks, load_task
 from scengen.evidence import comparison
-from scengen.evidence.behaviour import Behaviour, path_of
+from scengen.evidence.behaviour import Behaviour
+from scengen.task_files import behaviour_file
 
 RULES = ("success", "failure", "events", "pending", "build", "constraints")
 """Methods whose changes must all be noticed."""
@@ -141,7 +142,7 @@ class Loader(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 def judged(mutant: Mutant) -> dict[str, Any]:
     """Whether a change is noticed, and by which kinds of differences."""
-    stored = Behaviour.read(path_of(mutant.task))
+    stored = Behaviour.read(behaviour_file(mutant.task))
     module = load_task(mutant.task).family.__module__
     loader = Loader(module, mutant)
     told = {**vars(mutant), "what": loader.changer.what}
@@ -180,7 +181,7 @@ def apart(mutant: Mutant) -> dict[str, Any]:
 
 
 def main(n: str, seed: str = "0", *names: str) -> None:
-    known = [task for task in names or list_tasks() if path_of(task).is_file()]
+    known = [task for task in names or list_tasks() if behaviour_file(task).is_file()]
     every = [mutant for task in known for mutant in mutants(task)]
     random.Random(int(seed)).shuffle(every)
     chosen = every[: int(n)]

@@ -24,7 +24,7 @@ POOLS = (BASE / "single_severity", BASE / "mirror_id")
 
 
 def card(*pools, to, **settings):
-    given = [f"{name}={value}" for name, value in {"expired": "report", **settings}.items()]
+    given = [f"{name}={value}" for name, value in settings.items()]
     return cli.run(["publish", f"pool={','.join(map(str, pools))}", f"to={to}", *given])
 
 

@@ -25,19 +25,20 @@ from scengen.pool.files import sha256
 from scengen.pool.manifest import FORMAT
 from scengen.pool.row import SCHEMAS
 from scengen.pool.writing import write_pool
+from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.settings import CertifySettings
 from scengen.validate.verify import Options, verify
 
 ROOT = Path(__file__).parents[2]
 
 
-def examined(folder, strict=True, workers=1):
-    options = Options("replay", workers=workers, strict=strict, limits=None)
+def examined(folder, workers=1, level="replay"):
+    options = Options(level, workers=workers, limits=None)
     return verify(Pool.open(folder), load_task("domino_single"), {"quick": CertifySettings()}, options)
 
 
-def failures(folder, strict=True, workers=1):
-    return examined(folder, strict, workers).failed
+def failures(folder, workers=1):
+    return examined(folder, workers).failed
 
 
 @pytest.fixture(scope="module")
@@ -381,11 +382,46 @@ def made_with(folder, **changed):
     return write_pool(folder, replace(opened.manifest, **manifest), rows)
 
 
-def test_a_certificate_expires_with_the_code_of_its_family(mine):
+def test_the_code_that_made_a_pool_decides_nothing(mine):
     made_with(mine, source_sha256="0" * 64)
-    assert [(f["verdict"], "expired" in f["reason"]) for f in failures(mine)] == [("declined", True)]
-    report = examined(mine, strict=False)
-    assert report.holds and report.expired == 3
+    assert examined(mine).holds
+
+
+def test_a_pool_of_another_version_that_reproduces_is_sound_and_says_so(mine):
+    made_with(mine, task_version=2)
+    report = examined(mine)
+    assert (report.verdict, report.sound, report.claimed, report.versions) == ("sound", 3, 0, [2, 1])
+    assert any("certified against version 2 of domino_single, installed: 1" in remark for remark in report.remarks)
+
+
+def test_what_differs_from_another_version_is_a_claim(mine, monkeypatch):
+    """A rule has changed since: the witness fails now. On the same version that refutes the scenario."""
+    monkeypatch.setattr(DominoSingle, "success", lambda self, world: False)
+    assert {f["verdict"] for f in failures(mine)} == {"refuted"}
+    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    report = examined(mine)
+    assert (report.verdict, report.sound, report.declined, report.claimed) == ("declined", 0, 3, 3)
+    reason = report.failed[0]["reason"]
+    assert reason.startswith("certified against version 1 of domino_single, installed: 2, where the witness fails")
+    again = examined(mine, level="full")
+    assert again.claimed == 3
+    assert "certified again against version 2 it is unknown solved: the oracle failed" in again.failed[0]["reason"]
+
+
+def test_faults_that_need_no_code_stay_faults_of_another_version(mine):
+    made_with(mine, task_version=2, scene_sha256="0" * 64)
+    assert {f["verdict"] for f in failures(mine)} == {"refuted"}
+
+
+@pytest.mark.parametrize("level", ["replay", "recheck", "full"])
+def test_a_report_names_the_checks_that_it_did_not_make_again(mine, level):
+    claimed = examined(mine, level=level).claimed_checks
+    left = {
+        "replay": {"overlap", "rest", "shortcuts", "robust"},
+        "recheck": {"shortcuts", "solved", "robust"},
+        "full": set(),
+    }
+    assert left[level] <= set(claimed) and bool(claimed) == (level != "full")
 
 
 def test_on_a_machine_that_rounds_otherwise_the_verdict_counts_and_not_the_bits(mine):

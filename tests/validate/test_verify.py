@@ -330,7 +330,7 @@ def mine(tmp_path):
 
 def report(folder, **options):
     of = Pool.open(folder)
-    asked = {"level": "replay", "limits": None, "strict": False, "sample": 1, **options}
+    asked = {"level": "replay", "limits": None, "sample": 1, **options}
     return verify(of, task(of.task), compose.certify_levels(task(of.task)), Options(**asked))
 
 
@@ -576,7 +576,7 @@ def test_own_settings_are_told(mine):
 
 def test_what_takes_too_long_is_declined_and_the_others_are_not():
     found = verify(opened("single"), task("domino_single"), compose.certify_levels(task("domino_single")),
-                   Options("full", sample=1, limits=Limits(0.5, 4000), strict=False))  # fmt: skip
+                   Options("full", sample=1, limits=Limits(0.5, 4000)))  # fmt: skip
     assert (found.verdict, found.declined, found.sound) == ("declined", 1, 5)
     assert "took longer than 0.5 s" in found.failed[0]["reason"]
 

@@ -34,7 +34,7 @@ def changed(folder, **entries):
 def report(folder, **options):
     of = Pool.open(folder)
     task = load_task(of.task)
-    settings = {"level": "replay", "strict": False, "limits": None, "sample": 1, **options}
+    settings = {"level": "replay", "limits": None, "sample": 1, **options}
     return verify.verify(of, task, compose.certify_levels(task), verify.Options(**settings))
 
 

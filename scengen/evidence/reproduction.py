@@ -1,0 +1,59 @@
+"""Self-test of an installation: whether this machine reproduces the stored behaviour of tasks."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from .. import compose
+from ..errors import ScengenError
+from ..task_files import behaviour_file
+from ..work.parallel import Limits, Workers, each
+from .behaviour import Behaviour
+from .comparison import Compared, compare
+
+LIMITS = Limits(600.0, 4000)
+"""Time [s] and memory [MB] of one task: the slowest takes 30 s, and 500 MB."""
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """Result for one task."""
+
+    task: str
+    compared: Compared | None
+    """Comparison with the stored behaviour; None if there is none."""
+    why: str = ""
+    """Reason why there is none."""
+
+
+@dataclass(frozen=True)
+class Reproducer:
+    """Compares tasks with their stored behaviour."""
+
+    search: tuple[str, ...] = ()
+    """Overrides that add folders of other packages, see `task_files.search_path`."""
+
+    def __call__(self, name: str) -> Reproduced:
+        try:
+            stored = Behaviour.read(behaviour_file(name, self.search))
+            return Reproduced(name, compare(compose.load_task(name, self.search), stored))
+        except ScengenError as error:
+            return Reproduced(name, None, str(error))
+
+
+def reproduced(
+    names: Sequence[str],
+    workers: Workers,
+    search: Sequence[str] = (),
+    limits: Limits | None = LIMITS,
+    progress: Callable[[int], None] = lambda done: None,
+) -> Iterator[Reproduced]:
+    """Compare tasks with their stored behaviour, in the order in which they are done.
+
+    Args:
+        search: see `Reproducer`.
+        progress: called with the number of tasks that have been compared.
+    """
+    found = each(Reproducer(tuple(search)), names, workers, limits, lambda name, why: Reproduced(name, None, why))
+    for done, one in enumerate(found, 1):
+        progress(done)
+        yield one
