@@ -310,7 +310,7 @@ def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Beh
     stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats)
 
     def keep(world: World, answer: str) -> None:
-        if answer not in states:
+        if answer not in states and world is stage.world:  # other scenes have other states
             states[answer] = world.state()
 
     stage.on_change = keep

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ScengenError
 from ..robots.panda import arms, fingers
 from ..samplers.keyed import unit
 from ..scenario import Scenario
@@ -165,7 +166,7 @@ def _answered(ask: Callable[[], str]) -> str:
     """An answer; the kind of error if the state is one that no episode reaches, such as half a letter typed."""
     try:
         return ask()
-    except (ArithmeticError, LookupError, ValueError) as error:
+    except (ScengenError, ArithmeticError, LookupError, ValueError) as error:
         return type(error).__name__
 
 

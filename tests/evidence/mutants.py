@@ -23,12 +23,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[2]
 from scengen import compose, list_tasks, load_task
 from scengen.evidence import comparison
 from scengen.evidence.behaviour import Behaviour
 from scengen.task_files import behaviour_file
 
+ROOT = Path(__file__).parents[2]
 RULES = ("success", "failure", "events", "pending", "build", "constraints")
 """Methods whose changes must all be noticed."""
 PLANS = ("oracle", "shortcuts", "steps")
