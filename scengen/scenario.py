@@ -126,6 +126,9 @@ class Scenario(abc.ABC):
     `shortcuts`, `ablations`, `constraints`, `features`, `facts`, geometry.
     """
 
+    VERSION: ClassVar[int] = 1
+    """Version of the family's behaviour, declared in the class of the family itself. Figures that were measured on one
+    version say nothing of another one."""
     HOLD: ClassVar[float] = 0.0
     """Time for which the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()

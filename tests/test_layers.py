@@ -22,6 +22,7 @@ LAYERS = (
     ("tasks",),
     ("samplers",),
     ("validate",),
+    ("evidence",),
     ("compose",),
     ("attack",),
     ("runs",),

@@ -102,6 +102,11 @@ class Task:
     scans: Mapping[str, Scan] = field(default_factory=dict, repr=False)
     """Solids that replace the proxies of YCB objects, by `Ycb.called`."""
 
+    @property
+    def version(self) -> int:
+        """Version of the task's behaviour, which its family declares."""
+        return self.family.VERSION
+
     @cached_property
     def nominal(self) -> Scenario:
         """The family with its nominal parameters, and with scans instead of proxies."""
