@@ -48,12 +48,12 @@ size. {verdicts}
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).
-* **verdict**: what the axis breaks of what was right in training: *motion memory* (replay, any replay),
-  *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the first kind
-  that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each baseline, how
-  many of its control scenarios within training and how many OOD twins it solves, and the excess with its 95 % interval.
-  Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its control, and
-  is inconclusive.
+* **verdict**: what the axis breaks of what was right in training, among what was measured: *motion memory* (replay, any
+  replay), *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the
+  first kind that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each
+  baseline, how many of its control scenarios within training and how many OOD twins it solves, and the excess with its
+  95 % interval. Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its
+  control, and is inconclusive.
   * **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
     hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control
     is the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has
