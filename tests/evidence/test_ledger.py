@@ -11,6 +11,7 @@ import baselines_page
 import cluster_page
 import drift_all
 import kept_cheats
+import predictors
 import pytest
 
 from scengen import list_tasks, load_task, task_files
@@ -166,10 +167,12 @@ def of_another_version(empty):
     for row in ROWS:
         if row.task == TASK.name:
             ledger.write(replace(row, version=7))
-    for of in (baselines_page._rates, baselines_page._measured, baselines_page._trainings):
+    pages = (baselines_page._rates, baselines_page._measured, baselines_page._trainings)
+    cached = (*pages, predictors.ranking, predictors._trials)
+    for of in cached:
         of.cache_clear()
     yield
-    for of in (baselines_page._rates, baselines_page._measured, baselines_page._trainings):
+    for of in cached:
         of.cache_clear()
 
 
