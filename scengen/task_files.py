@@ -4,6 +4,7 @@ This is the fast path for commands that must answer quickly. Task files are in c
 offer tasks, and in folders that a command line names.
 """
 
+import ast
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -174,15 +175,37 @@ def category(name: str) -> str:
     return str(_head(name).get("category"))
 
 
-def certified() -> dict[str, dict[str, dict[str, Any]]]:
-    """Certification rates measured for the tasks: conf/certified.yaml.
+def version(name: str, search: Sequence[str] = ()) -> int:
+    """Version of a task that its family declares as `VERSION`, read from the family's file without an import of it.
 
-    Returns:
-        By task and split: `indices` tried, `certified` among them at level quick, `cpu` [s] per certified scenario, and
-        the other columns that the head of the file lists.
+    Raises:
+        UnknownName: there is no such task file.
+        BadConfig: the file of the family is not found.
     """
-    found: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((conf_dir() / "certified.yaml").read_text())
-    return found
+    module, _, family = str(_head(name, tuple(search)).get("family")).rpartition(".")
+    path = _source(module)
+    if path is None:
+        raise BadConfig(f"{name}.family: there is no module {cut(module)}; give the dotted path of the family")
+    return _declared(path.read_text(), family)
+
+
+def _source(module: str) -> Path | None:
+    """The file of a module; None if there is none. Packages above the module are imported, the module is not."""
+    try:
+        spec = find_spec(module)
+    except (ImportError, ValueError):
+        spec = None
+    return Path(spec.origin) if spec and spec.origin else None
+
+
+def _declared(source: str, family: str) -> int:
+    """The version that a class declares in a source text; 1 if it declares none."""
+    if "VERSION" not in source:  # parsing takes milliseconds, and most families have no second version
+        return 1
+    own = (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef) and node.name == family)
+    lines = (line for node in own for line in node.body if isinstance(line, ast.AnnAssign))
+    found = (line.value for line in lines if isinstance(line.target, ast.Name) and line.target.id == "VERSION")
+    return next((int(value.value) for value in found if isinstance(value, ast.Constant)), 1)  # type: ignore[arg-type]
 
 
 def paper_lengths() -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Records of what was measured on the axes, and the pages that are written from them."""
+"""What the ledger says of axes, and the pages that are written from it."""
 
 import json
 
@@ -10,6 +10,7 @@ import pytest
 
 from scengen import load_task
 from scengen.errors import BadConfig
+from scengen.evidence import ledger, measuring
 from scengen.ood.axis_card import FORMAT, read_card
 from scengen.ood.baseline import Baseline
 
@@ -25,62 +26,54 @@ def test_each_axis_on_which_card_and_learner_disagree_is_explained():
     told = predictors.page().partition("## Exceptions")[2]
     assert "not looked into" not in told
     listed = {tuple(line.split(" | ")[:2]) for line in told.splitlines() if line.startswith("| ")}
-    assert {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS} == listed - {("| task", "axis")}
+    explained = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS}
+    cards = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS if axis in axis_records.cards(load_task(task))}
+    assert cards <= listed - {("| task", "axis")} <= explained, "an explanation may wait for a card"
 
 
 def found(name, training, here, of=8):
     return Baseline.of(name, "moved within training", [(i < training, i < here) for i in range(of)])
 
 
-def test_a_record_counts_until_its_axis_is_changed(tmp_path):
-    for axis in ("wide_gaps", "diagonal"):
-        axis_records.store(tmp_path, TASK, axis, {"n": 8, "baselines": [found("belief", 8, 2).record]})
-    lines = axis_records.lines(tmp_path / "domino_single.jsonl")
-    assert [line["axis"] for line in lines] == ["diagonal", "wide_gaps"], "in the order of the task's file"
-    wider = {name: f"{spelled} or wider" for name, spelled in lines[1]["shifts"].items()}
-    (tmp_path / "domino_single.jsonl").write_text(
-        "".join(json.dumps(line) + "\n" for line in (lines[0], {**lines[1], "shifts": wider}))
-    )
-    assert list(axis_records.read(tmp_path, TASK)) == ["diagonal"]
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    """A ledger without rows."""
+    monkeypatch.setattr(ledger, "folder", lambda: tmp_path)
 
 
-def test_the_measurement_with_more_twins_counts(tmp_path, monkeypatch):
-    for name, of in (("CARDS", 20), ("BELIEFS", 8)):
-        monkeypatch.setattr(axis_records, name, tmp_path / name)
-        axis_records.store(tmp_path / name, TASK, "diagonal", {"baselines": [found("belief", 5, 2, of).record]})
+def test_the_measurement_with_more_twins_counts(empty):
+    for kind, of in (("axis", 20), ("belief", 8)):
+        value = {"baselines": [found("belief", 5, 2, of).record]}
+        measuring.keep(TASK, "diagonal", kind, of, value, {"n": of})
     assert axis_records.baselines(TASK)["diagonal"]["belief"].twins == 20
 
 
 def learned(policy, split, solved, seed=0, first=0):
-    """The record of a policy that solved the first scenarios of ten."""
-    moved = {} if split == "id" else axis_records.shifts(TASK, split)
+    """Store the row of a policy that solved the first scenarios of ten."""
     outcomes = [[first + i, i < solved] for i in range(10)]
-    return {"policy": policy, "seed": seed, "split": split, "shifts": moved, "outcomes": outcomes}
+    measuring.keep(TASK, split, "baseline", 10, {"outcomes": outcomes}, {"policy": policy, "seed": seed})
 
 
-def test_the_learner_is_the_policy_that_works_best_in_training_and_paired_by_twins(tmp_path, monkeypatch):
-    def learner(*records):
-        (tmp_path / "domino_single.jsonl").write_text("".join(json.dumps(record) + "\n" for record in records))
-        return axis_records.learners(TASK)["diagonal"]
-
-    monkeypatch.setattr(axis_records, "LEARNED", tmp_path)
-    records = [
-        learned(policy, split, solved)
-        for policy, *both in (("knn", 5, 0), ("mip", 9, 2), ("bc", 9, 1))
-        for split, solved in zip(("id", "diagonal"), both, strict=True)
-    ]
-    best = learner(*records)
+def test_the_learner_is_the_policy_that_works_best_in_training(empty):
+    for policy, *both in (("knn", 5, 0), ("mip", 9, 2), ("bc", 9, 1)):
+        for split, solved in zip(("id", "diagonal"), both, strict=True):
+            learned(policy, split, solved)
+    best = axis_records.learners(TASK)["diagonal"]
     assert (best.name, best.twins, best.finding) == ("bc", 10, "breaks"), "of equals, the first one"
-    apart = learner(learned("bc", "id", 9), learned("bc", "diagonal", 1, first=10))
+
+
+def test_a_learner_that_has_played_no_twins_is_not_paired(empty):
+    learned("bc", "id", 9)
+    learned("bc", "diagonal", 1, first=10)
+    apart = axis_records.learners(TASK)["diagonal"]
     assert apart.twins == 0 and apart.excess.value == pytest.approx(0.8)
     assert all_axes._baseline(apart).endswith("unpaired")
 
 
-def test_a_learner_is_judged_by_all_its_trainings(tmp_path, monkeypatch):
-    monkeypatch.setattr(axis_records, "LEARNED", tmp_path)
-    records = [learned("bc", split, 9 if split == "id" else solved, seed)
-               for seed, solved in enumerate((0, 3, 6)) for split in ("id", "diagonal")]  # fmt: skip
-    (tmp_path / "domino_single.jsonl").write_text("".join(json.dumps(record) + "\n" for record in records))
+def test_a_learner_is_judged_by_all_its_trainings(empty):
+    for seed, solved in enumerate((0, 3, 6)):
+        learned("bc", "id", 9, seed)
+        learned("bc", "diagonal", solved, seed)
     best = axis_records.learners(TASK)["diagonal"]
     assert (best.twins, best.training.value, best.here.value) == (10, 0.9, pytest.approx(0.3))
     assert best.here.rollouts == 30, "clusters of three"
@@ -114,8 +107,9 @@ def test_the_best_predictor_orders_axes_as_the_learner_does_and_few_axes_decide_
         assert predictors.score("belief").auc == 1.0 and predictors.score("belief").correlation > 0.8
         assert predictors.score("replay").correlation is None, "the same everywhere"
         assert ("not decided" in predictors.sentence()) == (not best)
-        assert predictors.cell({"belief": LEARNERS[True]}).endswith("belief predicts: breaks") == bool(best)
-        assert predictors.cell({"nearest_belief": LEARNERS[True]}) == "not measured", "not known on enough axes"
+        assert predictors.cell(TASK.name, {"belief": LEARNERS[True]}).endswith("belief predicts: breaks") == bool(best)
+        unknown = predictors.cell(TASK.name, {"nearest_belief": LEARNERS[True]})
+        assert unknown == "not measured on version 1", "not known on enough axes"
     predictors.ranking.cache_clear()
 
 

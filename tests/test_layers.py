@@ -23,6 +23,7 @@ LAYERS = (
     ("samplers",),
     ("validate",),
     ("compose", "settings"),
+    ("evidence",),
     ("attack",),
     ("runs",),
     ("pictures",),

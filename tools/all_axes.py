@@ -1,8 +1,8 @@
 """The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
 
-Cards are stored in generated/axes, and what the page shows of them in records/axes. A repeated call continues. `python
-tools/all_axes.py page` only writes the page: from these records, those of tools/beliefs.py and of tools/baselines.py,
-and from conf/certified.yaml.
+Cards are stored in generated/axes, and what the page shows of them in records/axis. A repeated call continues. `python
+tools/all_axes.py page` only writes the page, from the ledger: these rows, and those of tools/certified.py,
+tools/beliefs.py and tools/baselines.py.
 """
 
 import sys
@@ -15,9 +15,12 @@ import predictors
 
 from scengen import cli, list_tasks, load_task, task_files
 from scengen.analysis.distance import Energy
+from scengen.evidence import ledger
+from scengen.evidence.ledger import Evidence
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.ood.behaviour import HELD_OUT
 from scengen.ood.belief import moves_hidden
+from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.statistics import Rate
 from scengen.validate.certify import lower_bound
@@ -25,8 +28,9 @@ from scengen.validate.certify import lower_bound
 PAGE = Path(__file__).parent.parent / "docs" / "axes.md"
 HEAD = """# Every split, measured
 
-Written by `make axes` and `make docs`. The figures of certification are those of conf/certified.yaml, which
-`tools/certified.py` measures:
+Written by `make axes` and `make docs`. Figures count for the version of a task that they were measured on. *Not
+measured on version N* says that there are none yet for the task as it is. The figures of certification are measured by
+`tools/certified.py`:
 
 * **certified**: scenarios certified at level `quick`, of the first draws. The rejected ones are listed at the end.
 * **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its
@@ -44,12 +48,12 @@ size. {verdicts}
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).
-* **verdict**: what the axis breaks of what was right in training: *motion memory* (replay, any replay),
-  *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the first kind
-  that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each baseline, how
-  many of its control scenarios within training and how many OOD twins it solves, and the excess with its 95 % interval.
-  Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its control, and
-  is inconclusive. *not measured* says that nobody has tried it yet, *no card* the same of a whole card.
+* **verdict**: what the axis breaks of what was right in training, among what was measured: *motion memory* (replay, any
+  replay), *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the
+  first kind that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each
+  baseline, how many of its control scenarios within training and how many OOD twins it solves, and the excess with its
+  95 % interval. Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its
+  control, and is inconclusive.
   * **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
     hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control
     is the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has
@@ -98,10 +102,8 @@ COLUMNS = (
     "energy",
 )
 """Titles of the table of axes."""
-NO_CARD = "no card"
-"""Cell of an axis without a card."""
-NOT_MEASURED = "not measured"
-"""Cell of a figure that was not measured."""
+N = "50"
+"""Default number of twins of a card."""
 
 
 def main(*arguments: str) -> None:
@@ -109,33 +111,34 @@ def main(*arguments: str) -> None:
     if arguments == ("page",):
         PAGE.write_text(page())
         return
-    settings = [argument for argument in arguments if "=" in argument]
+    given = dict(argument.split("=", 1) for argument in arguments if "=" in argument)
+    settings = [f"{name}={value}" for name, value in ({"n": N, "workers": "2"} | given).items()]
     tasks = [argument for argument in arguments if "=" not in argument]
     failed = []
-    for task in tasks or list_tasks():
-        for axis in load_task(task).axes:
-            if cli.run(("probe", f"task={task}", f"axis={axis}", "workers=2", *settings)):
-                failed.append(f"{task}/{axis}")
+    for task in map(load_task, tasks or list_tasks()):
+        for axis in task.axes:
+            if cli.run(("probe", f"task={task.name}", f"axis={axis}", *settings)):
+                failed.append(f"{task.name}/{axis}")
             else:
-                axis_records.store_card(load_task(task), axis)
+                axis_records.store_card(task, axis, int(given.get("n", N)))
     PAGE.write_text(page())
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
 
 def page() -> str:
     """The whole page."""
-    told = task_files.certified()
-    rows = _axes(told)
+    certified = {task: ledger.latest("certified", task) for task in list_tasks()}
+    rows = _axes(certified)
     training = [
-        [f"[{task}](tasks/{task}.md)", *_certification(found), f"{found['cpu']:.1f}" if found else NOT_MEASURED]
-        for task in list_tasks()
-        for found in [told.get(task, {}).get(task_files.ID, {})]
+        [f"[{task}](tasks/{task}.md)", *_certification(task, found.get(ID)), _cpu(task, found.get(ID))]
+        for task, found in certified.items()
     ]
     lost = [
         f"* {task}, {split}: {times} {reason}"
-        for task in list_tasks()
-        for split, found in told.get(task, {}).items()
-        for reason, times in found.get("lost", {}).items()
+        for task, found in certified.items()
+        for split in task_files.splits(task)
+        if split in found
+        for reason, times in found[split].value.get("lost", {}).items()
     ]
     return HEAD.format(
         training=_table(("task", *CERTIFIED, "CPU s"), training),
@@ -146,23 +149,22 @@ def page() -> str:
     )
 
 
-def _axes(told: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+def _axes(certified: Mapping[str, Mapping[str, Evidence]]) -> list[list[str]]:
     """The cells of each axis, in the order of the task files."""
     rows = []
     for task in map(load_task, list_tasks()):
-        cards, found = axis_records.read(axis_records.CARDS, task), axis_records.baselines(task)
-        for axis in task.axes:
-            rows.append(_row(task, axis, cards.get(axis), found[axis], told.get(task.name, {}).get(axis, {})))
+        cards, found = axis_records.cards(task), axis_records.baselines(task)
+        rows += [_row(task, axis, cards.get(axis), found[axis], certified[task.name].get(axis)) for axis in task.axes]
     return rows
 
 
 def _verdicts(rows: Sequence[Sequence[str]]) -> str:
     """How many axes have each kind of verdict, in words."""
     words = [row[COLUMNS.index("verdict")] for row in rows]
-    broken, solved = (sum(word.startswith(start) for word in words) for start in ("breaks", "solved"))
+    broken, solved, missing = (sum(word.startswith(start) for word in words) for start in ("breaks", "solved", "not "))
     return (
         f"Of {len(words)} axes, {broken} break what was right in training, {solved} are solved by it, "
-        f"{words.count(INCONCLUSIVE)} are inconclusive, and {words.count(NOT_MEASURED)} were not measured."
+        f"{words.count(INCONCLUSIVE)} are inconclusive, and {missing} were not measured."
     )
 
 
@@ -171,41 +173,46 @@ def _row(
     axis: str,
     card: Mapping[str, Any] | None,
     found: Mapping[str, Baseline],
-    certified: Mapping[str, Any],
+    certified: Evidence | None,
 ) -> list[str]:
     """The cells of an axis."""
-    outside, physics, replay_ends, oracle_ends, energy = [NO_CARD] * 5
+    none = ledger.not_measured(task.name)
+    outside, physics, replay_ends, oracle_ends, energy = [none] * 5
     if card:
         outside = "another value" if card["outside"] is None else f"{card['outside']:.2g}"
         physics = ", ".join(card["leaving"]) or "stays"
         replay_ends, oracle_ends, energy = *card["boundaries"].values(), str(Energy(**card["energy"]))
-    missing = {name: NO_CARD for name in (*MOTION, *OBJECT_CENTRIC) if not card}
+    cells = [_baseline(found[name]) if name in found else none for name in BASELINES]
     if not moves_hidden(task, axis):
-        missing["hidden_belief"] = "nothing hidden"
-    cells = [_baseline(found[name]) if name in found else NOT_MEASURED for name in BASELINES]
-    cells = [missing.get(name, cell) for name, cell in zip(BASELINES, cells, strict=True)]
-    judged = verdict(found.values()) if found else NOT_MEASURED
-    learner = _learner(found)
+        cells[BASELINES.index("hidden_belief")] = "nothing hidden"
+    judged = verdict(found.values()) if found else none
     return [
-        *(task.name, axis, outside, physics, *_certification(certified), judged, *cells, learner),
-        *(replay_ends, oracle_ends, energy),
+        *(task.name, axis, outside, physics, *_certification(task.name, certified), judged, *cells),
+        *(_learner(task.name, found), replay_ends, oracle_ends, energy),
     ]
 
 
-def _learner(found: Mapping[str, Baseline]) -> str:
+def _learner(task: str, found: Mapping[str, Baseline]) -> str:
     """The cell of the learner that solves most in training; of two, that with the first name in `LEARNERS`."""
     tried = [found[name] for name in LEARNERS if name in found]
     best = max(tried, key=lambda one: one.training.value if one.training else 0.0, default=None)
-    return f"{best.name}: {_baseline(best)}" if best else predictors.cell(found)
+    return f"{best.name}: {_baseline(best)}" if best else predictors.cell(task, found)
 
 
-def _certification(found: Mapping[str, Any]) -> list[str]:
-    """The figures of certification of a split."""
-    if "draws" not in found:
-        return [NOT_MEASURED] * len(CERTIFIED)
-    oracle = f"{found['solved']} of {found['draws']} (> {100 * lower_bound(found['solved'], found['draws']):.0f}%)"
-    same = f"{found['same']} of {found['replays']}" if found.get("replays") else "-"
+def _certification(task: str, row: Evidence | None) -> list[str]:
+    """The figures of certification of a split. Earlier rows have no draws for the oracle, or no replays."""
+    if row is None:
+        return [ledger.not_measured(task)] * len(CERTIFIED)
+    found, oracle, same = row.value, "-", "-"
+    if "draws" in found:
+        oracle = f"{found['solved']} of {found['draws']} (> {100 * lower_bound(found['solved'], found['draws']):.0f}%)"
+    if found.get("replays"):
+        same = f"{found['same']} of {found['replays']}"
     return [f"{found['certified']} of {found['indices']}", oracle, same]
+
+
+def _cpu(task: str, row: Evidence | None) -> str:
+    return f"{row.value['cpu']:.1f}" if row else ledger.not_measured(task)
 
 
 def _table(titles: Sequence[str], rows: Iterable[Iterable[str]]) -> str:

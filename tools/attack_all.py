@@ -2,15 +2,16 @@
 
     python tools/attack_all.py 500 [rules=paper] [workers=2] [TASK ...]
 
-Reports are stored in records/attacks, hits in generated/attack. A repeated call continues. With `rules=paper` the
-strict rules are lifted: hits are then no way around a task of ours, but tell what the paper's rules admit. Tasks
-without a strict rule are the same under both and are left out.
+Reports are stored in records/attack, hits in generated/attack. A repeated call continues. With `rules=paper` the strict
+rules are lifted: hits are then no way around a task of ours, but tell what the paper's rules admit. Tasks without a
+strict rule are the same under both and are left out.
 """
 
 import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import leaks_all
@@ -19,17 +20,19 @@ from paper_page import failures
 
 from scengen import cli, list_tasks, load_task
 from scengen.attack.adversary import TIERS
+from scengen.attack.campaign import GRAMMAR
 from scengen.attack.evidence import TierRate
 from scengen.episode import PAPER, STRICT, check_rules
+from scengen.evidence import ledger, measuring
+from scengen.samplers.split import ID
+from scengen.samplers.task import Task
 
 SCENARIOS = 10
 """Number of scenarios of each task."""
 SEED = 4242
 """Seed of the draws and of the attack."""
-FOLDERS = {STRICT: Path("records/attacks"), PAPER: Path("records/attacks/paper")}
-"""Folders of the reports, by the rules of the episodes."""
 HITS = {STRICT: Path("generated/attack"), PAPER: Path("generated/attack/paper")}
-"""Folders of the hits and logs, likewise."""
+"""Folders of the hits and logs, by the rules of the episodes."""
 PAGE = Path("docs/attacks.md")
 HEAD = f"""# Every task, attacked
 
@@ -88,55 +91,66 @@ def main(budget: str, *others: str) -> None:
     """Attack all tasks, or some, and write the page."""
     names, options = parted(others, "rules", "workers")
     rules, workers = check_rules(options.get("rules", STRICT)), options.get("workers", "2")
-    FOLDERS[rules].mkdir(parents=True, exist_ok=True)
     refuted = []
-    for task in names or list_tasks():
+    for task in map(load_task, names or list_tasks()):
         if rules == PAPER and not has_strict_rules(task):
             continue
-        target, folder = FOLDERS[rules] / f"{task}.json", HITS[rules] / task
-        tiers = f"tiers=[{','.join(TIERS)}]"  # without leaks, which tools/leaks_all.py searches in all splits
-        argv = (f"task={task}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", f"rules={rules}", tiers)
-        status = cli.run(("attack", *argv, f"workers={workers}", f"json={target}", f"to={folder}"))
-        if status and rules == STRICT:
-            refuted.append(task)
-        report = json.loads(target.read_text())
-        report["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
-        report["cpu"] = _cpu(folder / "attack.jsonl")
-        target.write_text(json.dumps(report, indent=1, sort_keys=True) + "\n")
+        if attacked(task, int(budget), rules, workers) and rules == STRICT:
+            refuted.append(task.name)
     PAGE.write_text(page())
     sys.exit(f"refuted, or not attacked: {', '.join(refuted)}" if refuted else 0)
 
 
-def has_strict_rules(task: str) -> bool:
+def has_strict_rules(task: Task) -> bool:
     """Whether a task has a rule that the paper lacks."""
-    return any(strict for _, strict in failures(load_task(task).family))
+    return any(strict for _, strict in failures(task.family))
+
+
+def attacked(task: Task, budget: int, rules: str, workers: str) -> int:
+    """Attack a task, unless the ledger has the result, and store it. Returns the status of the command."""
+    made_with = {"grammar": GRAMMAR, "rules": rules, "budget": budget, "seed": SEED}
+    if known := measuring.measured(task, ID, "attack", made_with):
+        return int(bool(known.value["hits"]))
+    folder = HITS[rules] / f"{task.name}-v{task.version}"
+    tiers = f"tiers=[{','.join(TIERS)}]"  # without leaks, which tools/leaks_all.py searches in all splits
+    argv = (f"task={task.name}", f"n={SCENARIOS}", f"budget={budget}", f"seed={SEED}", f"rules={rules}", tiers)
+    with TemporaryDirectory() as temporary:
+        target = Path(temporary, "report.json")
+        status = cli.run(("attack", *argv, f"workers={workers}", f"json={target}", f"to={folder}"))
+        if target.is_file():
+            report = json.loads(target.read_text())
+            value = {name: report[name] for name in ("lost", "not_tried", "priors", "rates", "rollouts")}
+            value["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
+            value["cpu"] = _cpu(folder / "attack.jsonl")
+            measuring.keep(task, ID, "attack", len(report["scenarios"]), value, made_with)
+    return status
 
 
 def page() -> str:
-    """The whole page, from the reports."""
+    """The whole page, from the ledger."""
     reports = _reports(STRICT)
-    hours = sum(report["cpu"] for report in reports) / 3600
+    hours = sum(report["cpu"] for report in reports.values()) / 3600
     told = f"The rollouts of {len(reports)} tasks took {hours:.1f} hours of one core."
-    if missing := sorted({*list_tasks()} - {report["task"] for report in reports}):
-        told += f" Not attacked by this adversary yet: {', '.join(f'`{task}`' for task in missing)}."
+    for missing in sorted({*list_tasks()} - {*reports}):
+        told += f" `{missing}`: {ledger.not_measured(missing)}."
     text = HEAD + told + "\n\n" + _table(reports) + _observed()
     if relaxed := _reports(PAPER):
-        text += UNDER_PAPER + _table([report | {"task": f"`{report['task']}`"} for report in relaxed])
+        text += UNDER_PAPER + _table({f"`{task}`": report for task, report in relaxed.items()})
     return text
 
 
 def _observed() -> str:
     """What the observations of all splits tell; nothing if none has been searched."""
     splits = {
-        (task, split): found
+        (task, split): row
         for task in list_tasks()
-        for split, found in leaks_all.stored(load_task(task)).get("splits", {}).items()
-        if found["hidden"]
+        for split, row in leaks_all.searched(task).items()
+        if row.value["hidden"]
     }
     if not splits:
         return ""
-    count = sum(len(found["hidden"]) for found in splits.values())
-    told = [(*name, leak) for name, found in splits.items() for leak in found["found"]]
+    count = sum(len(row.value["hidden"]) for row in splits.values())
+    told = [(*name, leak) for name, row in splits.items() for leak in row.value["found"]]
     tasks = len({task for task, _ in splits})
     text = f"Searched: {count} varying hidden parameters in {len(splits)} splits of {tasks} tasks. Told: {len(told)}.\n"
     for task, split, leak in told:
@@ -144,20 +158,27 @@ def _observed() -> str:
     return OBSERVED + text + ("\n" if told else "")
 
 
-def _reports(rules: str) -> list[dict[str, Any]]:
-    paths = [FOLDERS[rules] / f"{task}.json" for task in list_tasks()]
-    return [json.loads(path.read_text()) for path in paths if path.is_file()]
+def _reports(rules: str) -> dict[str, Mapping[str, Any]]:
+    """The report on each task that was attacked, by the newest grammar of plans and with the most rollouts."""
+    known = {task: [row for row in ledger.current("attack", task) if row.has(rules=rules)] for task in list_tasks()}
+    newest = {
+        task: max(rows, key=lambda row: (row.made_with["grammar"], row.value["rollouts"]))
+        for task, rows in known.items()
+        if rows
+    }
+    return {task: row.value for task, row in newest.items()}
 
 
-def _table(reports: list[dict[str, Any]]) -> str:
-    return f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n" + "".join(map(line, reports))
+def _table(reports: Mapping[str, Mapping[str, Any]]) -> str:
+    lines = [line(task, report) for task, report in reports.items()]
+    return f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n" + "".join(lines)
 
 
-def line(report: Mapping[str, Any]) -> str:
+def line(task: str, report: Mapping[str, Any]) -> str:
     """The line of one task in the table."""
     fixed = {len(prior["values"]): _share(prior) for prior in report["priors"]}
     cells = [
-        report["task"],
+        task,
         *(_counted(report, tier) for tier in ("random", "foreign", "shortcut", "servo", "clock")),
         *(_counted(report, tier) for tier in ("memory_1", "memory_2")),
         *(fixed.get(count, "-") for count in (1, 2, 3)),

@@ -1,15 +1,11 @@
-"""Records of what was measured on the axes, from which docs/axes.md is written: a file for each task in every folder.
+"""What the ledger says of axes, from which docs/axes.md is written: cards, planners with beliefs, trained policies."""
 
-records/axes holds what the cards of `scengen probe` say, records/beliefs the planners with beliefs of training alone,
-and records/baselines the trained policies. A record counts as long as its axis has the distributions that it was
-measured with.
-"""
-
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from scengen.evidence import ledger, measuring
+from scengen.evidence.ledger import Evidence
 from scengen.ood.axis_card import NOT_SEARCHED, read_card
 from scengen.ood.baseline import LEARNERS, Baseline
 from scengen.samplers.split import ID
@@ -18,44 +14,15 @@ from scengen.statistics import difference, paired, rate
 from scengen.typed import typed
 
 ROOT = Path(__file__).parent.parent
-CARDS = ROOT / "records" / "axes"
-"""Folder of what the cards say."""
-BELIEFS = ROOT / "records" / "beliefs"
-"""Folder of the planners with beliefs of training."""
-LEARNED = ROOT / "records" / "baselines"
-"""Folder of the trained policies."""
 MADE = ROOT / "generated" / "axes"
 """Folder of the cards."""
 
-Record = dict[str, Any]
 
+def store_card(task: Task, axis: str, n: int) -> None:
+    """Write the row of a card.
 
-def lines(path: Path) -> list[Record]:
-    """The records of a file; none if there is no file."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
-
-
-def shifts(task: Task, axis: str) -> dict[str, str]:
-    """The distributions of an axis, as a record tells them."""
-    return {name: str(dist) for name, dist in task.shifts(axis).items()}
-
-
-def read(folder: Path, task: Task) -> dict[str, Record]:
-    """The records of a task that still count, by axis."""
-    known = {record["axis"]: record for record in lines(folder / f"{task.name}.jsonl")}
-    return {axis: known[axis] for axis in task.axes if axis in known and known[axis]["shifts"] == shifts(task, axis)}
-
-
-def store(folder: Path, task: Task, axis: str, record: Mapping[str, Any]) -> None:
-    """Write the record of an axis, in the order of the task's file. Records of axes that have changed are dropped."""
-    records = read(folder, task) | {axis: {"axis": axis, "shifts": shifts(task, axis), **record}}
-    folder.mkdir(parents=True, exist_ok=True)
-    text = "".join(json.dumps(records[name]) + "\n" for name in task.axes if name in records)
-    (folder / f"{task.name}.jsonl").write_text(text)
-
-
-def store_card(task: Task, axis: str) -> None:
-    """Write the record of a card.
+    Args:
+        n: number of twins that were asked for.
 
     Raises:
         ScengenError: there is no card, or one of an earlier format.
@@ -63,14 +30,14 @@ def store_card(task: Task, axis: str) -> None:
     card = read_card(MADE / f"{task.name}-{axis}" / "card.json")
     gaps = [proof["relative"] for proof in card["proofs"] if proof["relative"]]
     told = [{name: value for name, value in one.items() if name != "finding"} for one in card["baselines"]]
-    record = {
+    value = {
         "outside": min(gaps, default=None),
         "leaving": [departure["feature"] for departure in card["features"] if departure["inside"] == 0],
         "baselines": [typed("baseline", Baseline, one).record for one in told],
         "boundaries": {who: _boundary(card, who) for who in ("replay", "oracle")},
         "energy": card["energy"],
     }
-    store(CARDS, task, axis, record)
+    measuring.keep(task, axis, "axis", n, value, {"n": n})
 
 
 def _boundary(card: Mapping[str, Any], who: str) -> str:
@@ -80,15 +47,19 @@ def _boundary(card: Mapping[str, Any], who: str) -> str:
     return found["told"] + "".join(f", {name} {value:.3g}" for name, value in found["values"].items())
 
 
+def cards(task: Task) -> dict[str, Mapping[str, Any]]:
+    """Figures of the card of each axis that has one."""
+    return {axis: row.value for axis, row in ledger.latest("axis", task.name).items()}
+
+
 def baselines(task: Task) -> dict[str, dict[str, Baseline]]:
-    """The baselines of every axis by name: of two records of one, that with more twins; and the task's learner."""
+    """The baselines of every axis by name: of two rows about one, that with more twins; and the task's learner."""
     found: dict[str, dict[str, Baseline]] = {axis: {} for axis in task.axes}
-    for folder in (CARDS, BELIEFS):
-        for axis, record in read(folder, task).items():
-            for one in map(Baseline.of_record, record["baselines"]):
-                known = found[axis].get(one.name)
-                if known is None or one.twins >= known.twins:
-                    found[axis][one.name] = one
+    for row in (*ledger.current("axis", task.name), *ledger.current("belief", task.name)):
+        for one in map(Baseline.of_record, row.value["baselines"]):
+            known = found[row.split].get(one.name)
+            if known is None or one.twins >= known.twins:
+                found[row.split][one.name] = one
     for axis, learner in learners(task).items():
         found[axis][learner.name] = learner
     return found
@@ -100,14 +71,11 @@ def learners(task: Task) -> dict[str, Baseline]:
     It is the policy that solves most training scenarios, so that its failures elsewhere tell most; of several, the
     first one of `LEARNERS`.
     """
-    known = lines(LEARNED / f"{task.name}.jsonl")
-    splits = {ID: {}} | {axis: shifts(task, axis) for axis in task.axes}
+    known = ledger.current("baseline", task.name)
     played = {
-        (name, split): outcomes(
-            one for one in known if (one["policy"], one["split"], one["shifts"]) == (name, split, moved)
-        )
+        (name, split): outcomes(row for row in known if row.split == split and row.has(policy=name))
         for name in LEARNERS
-        for split, moved in splits.items()
+        for split in (ID, *task.axes)
     }
     training = {name: rate([*played[name, ID].values()]).value for name in LEARNERS if played[name, ID]}
     if not training:
@@ -116,11 +84,11 @@ def learners(task: Task) -> dict[str, Baseline]:
     return {axis: _learner(best, played[best, ID], played[best, axis]) for axis in task.axes if played[best, axis]}
 
 
-def outcomes(records: Iterable[Record]) -> dict[int, list[bool]]:
-    """Successes in each scenario, by its number: one for each record, which are those of several trainings."""
+def outcomes(rows: Iterable[Evidence]) -> dict[int, list[bool]]:
+    """Successes in each scenario, by its number: one for each row, which are those of several trainings."""
     found: dict[int, list[bool]] = {}
-    for record in records:
-        for index, success in record["outcomes"]:
+    for row in rows:
+        for index, success in row.value["outcomes"]:
             found.setdefault(index, []).append(success)
     return found
 

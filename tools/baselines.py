@@ -1,6 +1,6 @@
 """Train and evaluate small policies in training and on all axes: `python tools/baselines.py [TASK ...]`
 
-Pools, demonstrations and policies are made in generated/baselines. Results are stored in records/baselines, from which
+Pools, demonstrations and policies are made in generated/baselines. Results are stored in records/baseline, from which
 tools/baselines_page.py writes docs/baselines.md; docs/axes.md and docs/predictors.md read them, too. A repeated call
 continues.
 """
@@ -12,13 +12,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import axis_records
-
 from scengen import cli, list_tasks, load_task
+from scengen.evidence import measuring
 from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import read_settings
 from scengen.pool import Pool
 from scengen.samplers.split import ID
+from scengen.samplers.task import Task
 
 TASKS = (
     "domino_single",
@@ -51,10 +51,6 @@ MADE = Path("generated/baselines")
 """Folder of pools, demonstrations and policies."""
 RECORDING = "recording"
 """Name of the folder of the recording of a task."""
-RECORDS = Path("records/baselines")
-"""Folder of the results, one file for each task."""
-TRAININGS = Path("records/trainings")
-"""Folder of the results of tools/trainings.py, one file for each task."""
 Question = Literal["curves", "styles", "curation", "wrench"]
 """What tools/trainings.py can be asked."""
 MIXED = "mixed"
@@ -71,18 +67,16 @@ def main(*arguments: str) -> None:
     """Train and evaluate on some tasks, or on `TASKS`."""
     if unknown := set(arguments) - set(list_tasks()):
         sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(list_tasks())}")
-    for task in arguments or TASKS:
+    for task in map(load_task, arguments or TASKS):
         measure(task)
 
 
-def measure(task: str) -> None:
+def measure(task: Task) -> None:
     """Make what is missing for a task, and store its results after each policy."""
-    pools = make_pools(task, load_task(task).axes)
-    folder = MADE / task
+    pools = make_pools(task, task.axes)
+    folder = made_of(task)
     data = folder / RECORDING
     record(task, data, folder / "demos", pools.values())
-    found: list[dict[str, Any]] = []
-    RECORDS.mkdir(parents=True, exist_ok=True)
     first = [(policy, 0) for policy in (*POLICIES, REPLAY, *UNTRAINED)]
     for policy, seed in [*first, *((BC, seed) for seed in AGAIN)]:
         trained = folder / (f"{policy}-{seed}" if seed else policy)
@@ -91,21 +85,24 @@ def measure(task: str) -> None:
         own = {ID: pools[ID]} if policy in UNTRAINED else pools
         played = folder / f"{trained.name}-evaluation-{len(own) - 1}"  # an evaluation is bound to its pools
         play(str(trained) if policy in POLICIES else policy, [*own.values()], played)
-        found += _results(task, policy, trained, played, own)
-        lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in found)
-        (RECORDS / f"{task}.jsonl").write_text(lines)
+        _store(task, policy, trained, played, own)
 
 
-def make_pools(task: str, axes: Iterable[str]) -> dict[str, Path]:
+def made_of(task: Task) -> Path:
+    """Folder of what is made for a version of a task."""
+    return MADE / f"{task.name}-v{task.version}"
+
+
+def make_pools(task: Task, axes: Iterable[str]) -> dict[str, Path]:
     """Make the pools of a task in training and on some axes that are missing. Returns them by split."""
-    pools = {split: MADE / task / split for split in (ID, *axes)}
+    pools = {split: made_of(task) / split for split in (ID, *axes)}
     for split, pool in pools.items():
         if not (pool / "manifest.json").is_file():
-            run("generate", f"task={task}", f"split={split}", f"n={SCENARIOS}", f"pool={pool}")
+            run("generate", f"task={task.name}", f"split={split}", f"n={SCENARIOS}", f"pool={pool}")
     return pools
 
 
-def record(task: str, to: Path, demos: Path, apart: Iterable[Path], *settings: str) -> None:
+def record(task: Task, to: Path, demos: Path, apart: Iterable[Path], *settings: str) -> None:
     """Record demonstrations of a task, unless the recording is there.
 
     Args:
@@ -115,7 +112,7 @@ def record(task: str, to: Path, demos: Path, apart: Iterable[Path], *settings: s
     """
     if not to.exists():
         pools = ",".join(map(str, apart))
-        run("demos", f"task={task}", f"n={DEMONSTRATIONS}", f"to={demos}", f"apart=[{pools}]", *settings)
+        run("demos", f"task={task.name}", f"n={DEMONSTRATIONS}", f"to={demos}", f"apart=[{pools}]", *settings)
         run("record", f"pool={demos}", f"to={to}", "cameras=none")
 
 
@@ -147,21 +144,17 @@ def run(*argv: str) -> None:
         sys.exit(f"scengen {' '.join(argv)} failed")
 
 
-def _results(task: str, policy: str, trained: Path, played: Path, pools: dict[str, Path]) -> list[dict[str, Any]]:
-    """One record for each split."""
-    told: dict[str, Any] = {"task": task, "policy": policy}
+def _store(task: Task, policy: str, trained: Path, played: Path, pools: dict[str, Path]) -> None:
+    """Store one row for each split."""
+    made_with: dict[str, Any] = {"policy": policy}
     if policy in POLICIES:
         own = read_settings(trained)
-        names = ("demonstrations", "rows", "epochs", "seed", "data_sha256", "weights_sha256")
-        told |= {name: getattr(own, name) for name in names}
-    records = []
+        made_with |= {name: getattr(own, name) for name in ("demonstrations", "epochs", "seed")}
     for split, own in episodes(played, pools).items():
         reasons = Counter(episode["reason"] for episode in own if not episode["success"])
-        counts = {"scenarios": len(own), "solved": sum(episode["success"] for episode in own), "reasons": dict(reasons)}
-        made = Pool.open(pools[split])
-        moved = {"shifts": axis_records.shifts(load_task(task), split), "pool_sha256": made.sha256}
-        records.append({**told, "split": split, **moved, **counts, "outcomes": outcomes(own, made)})
-    return records
+        solved = sum(episode["success"] for episode in own)
+        value = {"solved": solved, "reasons": dict(reasons), "outcomes": outcomes(own, Pool.open(pools[split]))}
+        measuring.keep(task, split, "baseline", len(own), value, made_with)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
-"""Write docs/baselines.md and its plots from the records of small policies: `python tools/baselines_page.py`"""
+"""Write docs/baselines.md and its plots from the ledger: `python tools/baselines_page.py`"""
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -20,16 +21,18 @@ from baselines import (
     NOMINAL,
     POLICIES,
     RANDOM,
-    RECORDS,
     REPLAY,
     SCENARIOS,
-    TRAININGS,
+    TASKS,
     UNTRAINED,
     VARIED,
 )
 
 from scengen import list_tasks, load_task
+from scengen.evidence import ledger
+from scengen.evidence.ledger import Evidence
 from scengen.learn.models import BC, MIP
+from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
@@ -207,7 +210,7 @@ def main() -> None:
 
 
 def page() -> str:
-    """The whole page, from the records."""
+    """The whole page, from the ledger."""
     return (
         HEAD
         + _summary()
@@ -232,10 +235,10 @@ def _rates() -> dict[str, baseline_plots.Rates]:
     Tasks that not all of these policies have played are left out.
     """
     found = dict[str, baseline_plots.Rates]()
-    for task, records in _measured().items():
+    for task, rows in _measured().items():
         splits = (ID, *load_task(task).axes)
         rates = {
-            policy: {split: [_percent(one) for one in _chosen(records, policy, split)] for split in splits}
+            policy: {split: [_percent(one) for one in _chosen(rows, policy, split)] for split in splits}
             for policy in SHOWN
         }
         if all(solved for known in rates.values() for solved in known.values()):
@@ -244,18 +247,20 @@ def _rates() -> dict[str, baseline_plots.Rates]:
 
 
 @cache
-def _measured() -> dict[str, list[dict[str, Any]]]:
-    """The records of each task that has some."""
-    every = {task: axis_records.lines(RECORDS / f"{task}.jsonl") for task in list_tasks()}
-    return {task: records for task, records in every.items() if records}
+def _measured() -> dict[str, list[Evidence]]:
+    """The rows of each task that has some."""
+    every = {task: ledger.current("baseline", task) for task in list_tasks()}
+    return {task: rows for task, rows in every.items() if rows}
 
 
-def _chosen(records: Iterable[dict[str, Any]], policy: str, split: str) -> list[dict[str, Any]]:
-    return [one for one in records if (one["policy"], one["split"]) == (policy, split)]
+def _chosen(rows: Iterable[Evidence], policy: str, split: str) -> list[Evidence]:
+    """The rows of a policy on a split, one for each training, by seed."""
+    chosen = [row for row in rows if row.split == split and row.has(policy=policy)]
+    return sorted(chosen, key=lambda row: row.made_with.get("seed", 0))
 
 
-def _percent(record: dict[str, Any]) -> float:
-    return 100.0 * record["solved"] / record["scenarios"]
+def _percent(row: Evidence) -> float:
+    return 100.0 * row.value["solved"] / row.n
 
 
 def _summary() -> str:
@@ -275,13 +280,19 @@ def _arrow(means: Sequence[Any]) -> str:
     return " → ".join(f"{mean:.0f}" for mean in means)
 
 
+def _missing() -> list[str]:
+    """Tasks that are measured by default, and whose present version was not."""
+    return [task for task in TASKS if task not in _measured()]
+
+
 def _all_splits() -> str:
     """The section with a line for each split and policy."""
     lines: list[str] = []
-    for task, records in _measured().items():
+    for task, rows in _measured().items():
         for split, policy in product((ID, *load_task(task).axes), (*SHOWN, *UNTRAINED)):
-            own = _chosen(records, policy, split)
+            own = _chosen(rows, policy, split)
             lines += [_line(own)] if own else []
+    lines += [f"| [{task}](tasks/{task}.md) | {' | '.join([ledger.not_measured(task)] * 5)} |" for task in _missing()]
     return SPLITS + _table(COLUMNS, lines)
 
 
@@ -290,10 +301,13 @@ def _table(columns: Sequence[str], lines: Sequence[str]) -> str:
 
 
 @cache
-def _trainings(*sets: str) -> dict[str, list[dict[str, Any]]]:
-    """Records of trainings on some sets of demonstrations, by task."""
-    known = {task: axis_records.lines(TRAININGS / f"{task}.jsonl") for task in list_tasks()}
-    chosen = {task: [record for record in own if record["data"] in sets] for task, own in known.items()}
+def _trainings(*sets: str) -> dict[str, list[Evidence]]:
+    """Rows of trainings on some sets of demonstrations, as they are made today, by task."""
+    today = {"format": FORMAT, "epochs": TrainSettings().epochs}
+    known = {task: ledger.current("training", task) for task in list_tasks()}
+    chosen = {
+        task: [row for row in own if row.made_with["data"] in sets and row.has(**today)] for task, own in known.items()
+    }
     return {task: own for task, own in chosen.items() if own}
 
 
@@ -323,41 +337,44 @@ def _curves() -> dict[str, dict[str, list[baseline_plots.Point]]]:
 
 def _sizes() -> list[int]:
     """Numbers of demonstrations of the learning curves."""
-    return [*sorted({record["size"] for known in _trainings(MIXED).values() for record in known}), DEMONSTRATIONS]
+    return [*sorted({row.made_with["size"] for known in _trainings(MIXED).values() for row in known}), DEMONSTRATIONS]
 
 
 def _learned(task: str, split: str, policy: str, size: int) -> list[int]:
     """Solved scenarios of each training on so many demonstrations."""
     if size == DEMONSTRATIONS:
-        return [one["solved"] for one in _chosen(_measured().get(task, []), policy, split)]
-    known = _trainings(MIXED)[task]
-    return [one["solved"][split] for one in known if (one["policy"], one["size"]) == (policy, size)]
+        return [one.value["solved"] for one in _chosen(_measured().get(task, []), policy, split)]
+    rows = _chosen(_trainings(MIXED)[task], policy, split)
+    return [row.value["solved"] for row in rows if row.has(size=size)]
 
 
-def _splits(task: str, records: Iterable[dict[str, Any]]) -> list[str]:
+def _splits(task: str, rows: Iterable[Evidence]) -> list[str]:
     """The splits on which all trainings were evaluated, training first, in the order of the task's file."""
-    tried = [set(record["solved"]) for record in records]
-    return [split for split in (ID, *load_task(task).axes) if all(split in known for known in tried)]
+    tried = dict[str, set[str]]()
+    for row in rows:
+        tried.setdefault(json.dumps(row.made_with, sort_keys=True), set()).add(row.split)
+    return [split for split in (ID, *load_task(task).axes) if all(split in known for known in tried.values())]
 
 
 def _worth(head: str, *sets: str) -> str:
-    """A section that compares the last of some sets with the others; nothing if there is no record."""
+    """A section that compares the last of some sets with the others; nothing if there is no row."""
     *others, last = sets
     lines = []
-    records = _trainings(*sets)
-    for task, known in records.items():
-        own = {name: [record for record in known if record["data"] == name] for name in sets}
+    trained = _trainings(*sets)
+    for task, known in trained.items():
+        own = {name: [row for row in known if row.has(data=name)] for name in sets}
         if not all(own.values()):
             continue
         for split in _splits(task, known):
-            cells = [_spread([record["solved"][split] for record in own[name]]) for name in sets]
-            outcomes = {name: [*zip(*(one["outcomes"][split] for one in own[name]), strict=True)] for name in sets}
+            here = {name: _chosen(own[name], BC, split) for name in sets}
+            cells = [_spread([row.value["solved"] for row in here[name]]) for name in sets]
+            outcomes = {name: [*zip(*(row.value["outcomes"] for row in here[name]), strict=True)] for name in sets}
             for name in others:
                 gain = paired(outcomes[last], outcomes[name])
                 cells.append(f"{100 * gain.value:+.1f} [{100 * gain.low:.1f}, {100 * gain.high:.1f}]")
             lines.append(f"| [{task}](tasks/{task}.md) | {split} | {' | '.join(cells)} |")
     columns = ("task", "split", *sets, *(f"{last} - {name}" for name in others))
-    return head + _table(columns, lines) if records else ""
+    return head + _table(columns, lines) if trained else ""
 
 
 def _spread(solved: list[int]) -> str:
@@ -367,19 +384,19 @@ def _spread(solved: list[int]) -> str:
     return f"{sum(solved) / len(solved):.3g} [{min(solved)}, {max(solved)}]"
 
 
-def _line(records: list[dict[str, Any]]) -> str:
+def _line(rows: list[Evidence]) -> str:
     """The row of a policy on a split, over all its trainings."""
-    first = records[0]
-    interval = rate([*axis_records.outcomes(records).values()])
-    reasons = sum((Counter(record["reasons"]) for record in records), Counter[str]())
+    first = rows[0]
+    interval = rate([*axis_records.outcomes(rows).values()])
+    reasons = sum((Counter(row.value["reasons"]) for row in rows), Counter[str]())
     why = "; ".join(f"{number} x {reason}" for reason, number in reasons.most_common(2))
     shown = f"{100 * interval.value:.0f} [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
-    solved = ", ".join(str(record["solved"]) for record in records)
-    task = f"[{first['task']}](tasks/{first['task']}.md)"
-    policy, epochs = first["policy"], first.get("epochs")
+    solved = ", ".join(str(row.value["solved"]) for row in rows)
+    policy, epochs = first.made_with["policy"], first.made_with.get("epochs")
     if policy in (BC, MIP) and epochs != TrainSettings().epochs:
         policy += f", {epochs} epochs"
-    return f"| {task} | {first['split']} | {policy} | {solved} of {first['scenarios']} | {shown} | {why} |"
+    task = f"[{first.task}](tasks/{first.task}.md)"
+    return f"| {task} | {first.split} | {policy} | {solved} of {first.n} | {shown} | {why} |"
 
 
 if __name__ == "__main__":

@@ -1,27 +1,27 @@
-"""Play the planners with beliefs of training on the axes, without making cards, into records/beliefs.
+"""Play the planners with beliefs of training on the axes, without making cards, into records/belief.
 
     python tools/beliefs.py n=8 [workers=1] [TASK | TASK/AXIS ...]
 
-Axes that have a record with as many twins are left out, so that a repeated call continues; n=20 extends what n=8 has
-played. `fresh` plays all of them again, which is needed after a change of a family or its oracle. A twin takes 5 to 7
-rollouts, about a second of processor time. `python tools/all_axes.py page` writes docs/axes.md from the records.
+Axes of the same version of their task that have a row with as many twins are left out, so that a repeated call
+continues; n=20 extends what n=8 has played. `fresh` plays all of them again. A twin takes 5 to 7 rollouts, about a
+second of processor time. `python tools/all_axes.py page` writes docs/axes.md from the ledger.
 """
 
 import sys
 from collections.abc import Iterator
 
 from arguments import parted
-from axis_records import BELIEFS, ROOT, read, store
+from axis_records import ROOT
 
 from scengen import list_tasks, load_task
 from scengen.errors import ScengenError
+from scengen.evidence import ledger, measuring
 from scengen.ood.behaviour import Trials
 from scengen.ood.belief import measure_belief
 from scengen.samplers.task import Task
-from scengen.validate.identity import source_sha256
 
 MADE = ROOT / "generated" / "beliefs"
-"""Folder of the outcomes of single twins, by the hash of the code."""
+"""Folder of the outcomes of single twins, by the draws and the version of a task."""
 TWINS = 8
 """Default number of twins of an axis."""
 
@@ -42,27 +42,26 @@ def main(*arguments: str) -> None:
 
 
 def wanted(names: list[str], n: int, fresh: bool) -> Iterator[tuple[Task, str]]:
-    """The axes to play: of the named tasks, the named ones, or all; those without a record of n twins.
+    """The axes to play: of the named tasks, the named ones, or all; those without a row of n twins.
 
     Raises:
         ScengenError: there is no such task or axis.
     """
     for name, _, chosen in (text.partition("/") for text in names or list_tasks()):
         task = load_task(name)
-        known = read(BELIEFS, task)
+        known = [row for row in ledger.current("belief", name) if row.n >= n and not measuring.stale(task, row)]
         for axis in [task.axis(chosen).name] if chosen else task.axes:
-            if fresh or axis not in known or known[axis]["n"] < n:
+            if fresh or axis not in {row.split for row in known}:
                 yield task, axis
 
 
 def measure(task: Task, axis: str, n: int, workers: int, fresh: bool) -> str:
-    """Play the planners on an axis and store its record. Returns the result in words."""
-    source = source_sha256(task.family)
-    folder = MADE / source[:12] / f"{task.name}-{axis}"
+    """Play the planners on an axis and store the row. Returns the result in words."""
+    folder = MADE / f"{task.name}-{axis}" / f"v{task.version}-{measuring.draws_of(task, axis)}"
     if fresh:
         (folder / "beliefs.jsonl").unlink(missing_ok=True)
     found = measure_belief(task, axis, folder, Trials(n, belief_n=n, workers=workers))
-    store(BELIEFS, task, axis, {"n": n, "source": source, "baselines": [one.record for one in found]})
+    measuring.keep(task, axis, "belief", n, {"baselines": [one.record for one in found]}, {"n": n})
     counts = [f"{r['name']} {r['training']} -> {r['here']} of {r['twins']}" for r in (one.record for one in found)]
     return f"{', '.join(counts)}: {', '.join(one.finding for one in found)}"
 

@@ -1,9 +1,11 @@
-"""Writes the table of costs in docs/cluster.md from conf/certified.yaml. `make docs`"""
+"""Writes the table of costs in docs/cluster.md from the ledger. `make docs`"""
 
 import re
 from pathlib import Path
 
-from scengen import list_tasks, task_files
+from scengen import list_tasks
+from scengen.evidence import ledger
+from scengen.samplers.split import ID
 
 PAGE = Path(__file__).parent.parent / "docs" / "cluster.md"
 BEGIN, END = "<!-- costs: tools/cluster_page.py -->\n", "<!-- end of costs -->\n"
@@ -17,13 +19,18 @@ def page() -> str:
 
 def table() -> str:
     """Costs of pools of the training split, by task, as Markdown."""
-    each = {task: splits[task_files.ID]["cpu"] for task, splits in task_files.certified().items()}
+    rows = {task: ledger.latest("certified", task).get(ID) for task in list_tasks()}
+    each = {task: row.value["cpu"] for task, row in rows.items() if row}
     lines = [
         "| task | one [core s] | 10 thousand [core hours] | 1 million [core days] | 10 million [core days] |",
         "|---|---|---|---|---|",
         *(_line(f"[{task}](tasks/{task}.md)", cpu) for task, cpu in sorted(each.items(), key=lambda x: x[1])),
-        *(f"| [{task}](tasks/{task}.md) | not measured | - | - | - |" for task in list_tasks() if task not in each),
-        _line("mean over tasks", sum(each.values()) / len(each)),
+        *(
+            f"| [{task}](tasks/{task}.md) | {ledger.not_measured(task)} | - | - | - |"
+            for task in rows
+            if task not in each
+        ),
+        *([_line("mean over measured tasks", sum(each.values()) / len(each))] if each else []),
     ]
     return "".join(f"{line}\n" for line in lines)
 

@@ -3,13 +3,14 @@
     python tools/drift_all.py 2 POOLS 3.5.0,4.0.0 [task ...]
 
 N training scenarios of each task are compared, and two of an axis: the paper's where the task has one, else its first.
-Their pools are POOLS/<task> and POOLS/<task>-<axis>; missing ones are generated. Results are stored in records/drift,
-in one folder for each set of versions. A task whose pools have been compared is left out: the command can be
-interrupted and repeated. Tasks that were never compared have no line.
+Their pools are POOLS/<task>-v<version> and POOLS/<task>-v<version>-<axis>; missing ones are generated. Results are rows
+of records/drift, one for each pool and set of versions. A pool that has been compared is left out: the command can be
+interrupted and repeated.
 """
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,16 +18,16 @@ from typing import Any
 from scengen import cli, list_tasks, load_task
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
-from scengen.pool import Pool
+from scengen.evidence import ledger, measuring
+from scengen.evidence.ledger import Evidence
 from scengen.pool.manifest import MANIFEST
 from scengen.samplers.split import ID
+from scengen.samplers.task import Task
 
 OOD = 2
 """Number of scenarios of an axis."""
 LEVEL = "recheck"
 """Level of the checks."""
-FOLDER = Path("records/drift")
-"""Folder of the results: a folder for each set of versions, `3.5.0+4.0.0`, with a file for each task."""
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
@@ -63,82 +64,68 @@ requires packages that scengen does not use). A run that was begun with other pa
 
 def main(n: str, pools: str, versions: str, *tasks: str) -> None:
     """Compare all tasks, or some, and write the page."""
-    folder = FOLDER / versions.replace(",", "+")
-    folder.mkdir(parents=True, exist_ok=True)
     missing = []
-    for task in tasks or list_tasks():
-        if not compared(task, int(n), Path(pools), versions, folder / f"{task}.json"):
-            missing.append(task)
-        PAGE.write_text(page(stored()))
+    for task in map(load_task, tasks or list_tasks()):
+        for split, count in ((ID, int(n)), (axis_of(task), OOD)):
+            if not compared(task, split, count, Path(pools), versions.split(",")):
+                missing.append(f"{task.name}/{split}")
+        PAGE.write_text(page())
     sys.exit(f"not compared: {', '.join(missing)}" if missing else 0)
 
 
-def stored() -> dict[str, list[dict[str, Any]]]:
-    """All stored results, by the set of versions."""
-    return {
-        folder.name: [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
-        for folder in sorted(FOLDER.iterdir())
-    }
-
-
-def axis_of(task: str) -> str:
+def axis_of(task: Task) -> str:
     """The axis of a task that is compared."""
-    loaded = load_task(task)
-    return next((name for name, axis in loaded.axes.items() if loaded.of_paper(axis)), next(iter(loaded.axes)))
+    return next((name for name, axis in task.axes.items() if task.of_paper(axis)), next(iter(task.axes)))
 
 
-def compared(task: str, n: int, pools: Path, versions: str, record: Path) -> bool:
-    """Compare one task, and store the part of the result that the page needs, unless it is there.
+def compared(task: Task, split: str, n: int, pools: Path, versions: Sequence[str]) -> bool:
+    """Compare scenarios of a split, and store the part of the result that the page needs, unless it is there.
 
     Returns:
         Whether there is a result.
     """
-    axis = axis_of(task)
-    wanted = {pools / task: (ID, n), pools / f"{task}-{axis}": (axis, OOD)}
-    for pool, (split, count) in wanted.items():
-        if not (pool / MANIFEST).is_file():
-            cli.run(("generate", f"task={task}", f"split={split}", f"n={count}", f"pool={pool}"))
-        if not (pool / MANIFEST).is_file():
-            return False
-    known = json.loads(record.read_text()) if record.is_file() else {"pools": []}
-    if {Pool.open(pool).sha256 for pool in wanted} == {one["sha256"] for one in known["pools"]}:
+    made_with = {"mujoco": list(versions), "level": LEVEL, "n": n}
+    if measuring.measured(task, split, "drift", made_with):
         return True
+    pool = pools / "-".join([task.name, f"v{task.version}", *([] if split == ID else [split])])
+    if not (pool / MANIFEST).is_file():
+        cli.run(("generate", f"task={task.name}", f"split={split}", f"n={n}", f"pool={pool}"))
     with TemporaryDirectory() as folder:
         found = Path(folder, "drift.json")
-        both = ",".join(map(str, wanted))
-        cli.run(("drift", f"pool=[{both}]", f"mujoco=[{versions}]", f"level={LEVEL}", f"json={found}"))
+        cli.run(("drift", f"pool={pool}", f"mujoco=[{','.join(versions)}]", f"level={LEVEL}", f"json={found}"))
         if found.is_file():
-            told = json.dumps(shortened(json.loads(found.read_text())), indent=1, sort_keys=True)
-            record.write_text(f"{told}\n")
+            value = shortened(json.loads(found.read_text()))
+            measuring.keep(task, split, "drift", len(value["scenarios"]), value, made_with)
         return found.is_file()
 
 
 def shortened(result: dict[str, Any]) -> dict[str, Any]:
-    """A result without the checks that agree with the certificate, and without the folder of the pool."""
+    """The scenarios of a result with the checks that contradict the certificate, its counts, and who made the pool."""
     for one in result["scenarios"]:
         del one["pool"]
         for judgement in one["mujoco"].values():
             judgement["checks"] = [check for check in judgement["checks"] if check["flipped"]]
-    return {**result, "pools": list(result["pools"].values())}
+    [counts], [pool] = result["tasks"].values(), result["pools"].values()
+    return {"scenarios": result["scenarios"], "counts": counts, "control": pool["versions"]["mujoco"]}
 
 
-def page(told: dict[str, list[dict[str, Any]]]) -> str:
-    """The page on the results of some tasks, by the set of versions."""
-    return HEAD + "\n".join(table(results) for results in told.values() if results) + LOCK
+def page() -> str:
+    """The page on the results of all tasks, by the set of versions."""
+    rows = [row for task in list_tasks() for row in ledger.current("drift", task)]
+    sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
+    return HEAD + "\n".join(table(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets) + LOCK
 
 
-def table(told: list[dict[str, Any]]) -> str:
+def table(versions: Sequence[str], rows: Sequence[Evidence]) -> str:
     """The section on the results of some tasks under the same versions."""
-    rows = [(task, row, len(one["scenarios"])) for one in told for task, row in one["tasks"].items()]
-    versions = list(told[0]["mujoco"])
-    every = {version: total([row[version] for _, row, _ in rows]) for version in versions}
-    count = sum(n for *_, n in rows)
+    every = {version: total([row.value["counts"][version] for row in rows]) for version in versions}
+    count = sum(row.n for row in rows)
     lines = [
         f"## MuJoCo {', '.join(versions)}\n",
-        f"{count} scenarios of {len(rows)} tasks; `same bits / same verdict / flipped`:\n",
+        f"{count} scenarios of {len({row.task for row in rows})} tasks; `same bits / same verdict / flipped`:\n",
         f"| task | scenarios | {' | '.join(f'MuJoCo {version}' for version in versions)} |",
         "|---|---|" + "---|" * len(versions),
-        *(_row(task, n, [cell(row[version]) for version in versions]) for task, row, n in rows),
+        *(_line(task, versions, [row for row in rows if row.task == task]) for task in list_tasks()),
         _row("**all**", count, [cell(every[version]) for version in versions]),
         _row("flipped, 95 % bound", count, [f"< {_bound(every[version]):.1%}" for version in versions]),
     ]
@@ -151,9 +138,17 @@ def table(told: list[dict[str, Any]]) -> str:
             "reached the goal, and other numerics under which the witness failed.\n",
             "| MuJoCo | scenario | check | now | how it parts | the certificate |",
             "|---|---|---|---|---|---|",
-            *(f"| {' | '.join(each)} |" for one in told for each in flips(one)),
+            *(f"| {' | '.join(each)} |" for row in rows for each in flips(row.value)),
         ]
     return "\n".join(lines) + "\n"
+
+
+def _line(task: str, versions: Sequence[str], rows: Sequence[Evidence]) -> str:
+    """The row of a task: the sum of its pools."""
+    if not rows:
+        return _row(task, 0, [ledger.not_measured(task)] * len(versions))
+    counts = [total([row.value["counts"][version] for row in rows]) for version in versions]
+    return _row(task, sum(row.n for row in rows), list(map(cell, counts)))
 
 
 def _row(task: str, count: int, told: list[str]) -> str:

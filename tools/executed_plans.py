@@ -5,30 +5,27 @@
 The plan of conf/facts/<task>.yaml is played in n feasible training scenarios, with and without its optional sub-goals.
 Wrong plans are played in the first ones: with a required sub-goal missing, with two neighbours that have an order
 exchanged, and with a wrong sub-goal in place of all or in place of the second half. The last kind counts if the wrong
-sub-goal was begun, because nothing is wrong where the goal is reached before it. Results are lines of
-records/executed_plans.jsonl; a repeated call plays only what the file lacks under today's code.
+sub-goal was begun, because nothing is wrong where the goal is reached before it. Results are rows of records/plan; a
+repeated call plays only what is missing there.
 """
 
-import hashlib
-import json
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import count, islice
-from pathlib import Path
+from typing import Any
 
 from scengen import list_tasks, load_task
 from scengen.agents import execution, facts
 from scengen.agents.order import Order
 from scengen.errors import Infeasible
+from scengen.evidence import measuring
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
-from scengen.validate.identity import source_sha256
 from scengen.validate.rebuilt import world_of
 
-RECORDS = Path(__file__).parent.parent / "records" / "executed_plans.jsonl"
 RIGHT, OPTIONAL, MISSING, ORDER, WRONG = "right", "with optional ones", "missing", "wrong order", "wrong sub-goal"
 SEED = 1
 """Seed of the draws, that of `tools/certified.py` for draws that only the oracle plays."""
@@ -59,9 +56,6 @@ def feasible(task: Task) -> Iterator[Scenario]:
 def main(*arguments: str) -> None:
     """Play what is missing, and print the table."""
     numbers = {"n": 10, "wrong": 3} | {k: int(v) for k, v in (a.split("=") for a in arguments if "=" in a)}
-    known = {}
-    if RECORDS.exists():
-        known = {record["digest"]: record for record in map(json.loads, RECORDS.read_text().splitlines())}
     for name in [a for a in arguments if "=" not in a] or list_tasks():
         task = load_task(name)
         order = facts.load(task).plan
@@ -72,28 +66,25 @@ def main(*arguments: str) -> None:
         scenarios = list(islice(feasible(task), numbers["n"]))
         for kind, names, many in plans(order, numbers["n"], numbers["wrong"]):
             for index, scenario in enumerate(scenarios[:many]):
-                told = [name, scenario.id, task.horizon, names, source_sha256(task.family)]
-                digest = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
-                if digest not in known:
-                    found = execution.execute(names, order, scenario, world_of(scenario, task.embodiment), task.horizon)
-                    assert found
-                    record = {"digest": digest, "task": name, "scenario": index, "kind": kind, "plan": " ".join(names)}
-                    began = sum(end != execution.NOT_BEGUN for _, end in found.steps)
-                    result = {
-                        "success": found.success,
-                        "reason": found.reason,
-                        "seconds": found.seconds,
-                        "began": began,
-                    }
-                    known[digest] = {**record, **result}
-                    with RECORDS.open("a") as file:
-                        file.write(json.dumps(known[digest]) + "\n")
-                    if found.success != (kind in (RIGHT, OPTIONAL)):
-                        print(f"  {name}@{index} {kind}: {' '.join(names)}: {found.reason or 'success'}", flush=True)
-                if kind != WRONG or known[digest]["began"] == len(names):  # else the goal was reached before it
-                    counts[kind].append(known[digest]["success"])
+                made_with = {"plan": " ".join(names), "is": kind, "scenario": index}
+                row = measuring.measured(task, ID, "plan", made_with)
+                if row is None:
+                    value = played(task, order, names, scenario)
+                    row = measuring.keep(task, ID, "plan", 1, value, made_with)
+                    if value["success"] != (kind in (RIGHT, OPTIONAL)):
+                        print(f"  {name}@{index} {kind}: {' '.join(names)}: {value['reason'] or 'success'}", flush=True)
+                if kind != WRONG or row.value["began"] == len(names):  # else the goal was reached before it
+                    counts[kind].append(row.value["success"])
         told = ", ".join(f"{kind} {sum(found)}/{len(found)}" for kind, found in counts.items())
         print(f"{name}: reached the goal: {told}", flush=True)
+
+
+def played(task: Task, order: Order, names: tuple[str, ...], scenario: Scenario) -> dict[str, Any]:
+    """What became of a plan in a scenario."""
+    found = execution.execute(names, order, scenario, world_of(scenario, task.embodiment), task.horizon)
+    assert found
+    began = sum(end != execution.NOT_BEGUN for _, end in found.steps)
+    return {"success": found.success, "reason": found.reason, "seconds": found.seconds, "began": began}
 
 
 if __name__ == "__main__":

@@ -1,36 +1,29 @@
-"""Play the cheats that people found, into records/cheats.jsonl, and write docs/kept_cheats.md.
+"""Play the cheats that people found, into records/cheat, and write docs/kept_cheats.md.
 
     python tools/kept_cheats.py [TASK ...]
 
 Each cheat of `tests/attack/hands` is played on the same draws of training in its task as it is and without its mend. A
-record counts as long as the code of the task and of the cheat is the same, so that a repeated call continues. With
-`page` alone, the tool only writes the page. What the adversary finds by itself is told by `tests/attack/recall.py`.
+repeated call continues. With `page` alone, the tool only writes the page. What the adversary finds by itself is told by
+`tests/attack/recall.py`.
 """
 
-import hashlib
 import importlib
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
 import mutation_score
-from axis_records import lines
 from hand import Hand
 from test_hands import HANDS, outcome
 
 from scengen import load_task
 from scengen.attack.campaign import GRAMMAR
-from scengen.validate.identity import source_sha256
+from scengen.evidence import ledger, measuring
+from scengen.samplers.split import ID
 
 ROOT = Path(__file__).parents[1]
-RECORDS = ROOT / "records" / "cheats.jsonl"
-"""File of the results."""
-RECALL = ROOT / "records" / "recall.jsonl"
-"""File of the cheats that the adversary looked for where their mends are taken out."""
 PAGE = ROOT / "docs" / "kept_cheats.md"
 DRAWS = 12
 """Number of training draws."""
@@ -63,30 +56,15 @@ around it.
 
 def main(*names: str) -> None:
     """Play what is missing, and write the page."""
-    if names != ("page",):
-        known = lines(RECORDS)
-        for task, cheat in HANDS:
-            about = identity(task, cheat)
-            if (names and task not in names) or newest(known, about):
-                continue
-            record = {**about, **played(task, cheat)}
-            with open(RECORDS, "a") as file:
-                file.write(json.dumps(record) + "\n")
-            print(f"{task} {cheat}: {record['closed']} of {DRAWS}, {record['open']} without its mend", flush=True)
+    for name, cheat in HANDS if names != ("page",) else ():
+        task, made_with = load_task(name), {"cheat": cheat, "draws": DRAWS}
+        if (names and name not in names) or measuring.measured(task, ID, "cheat", made_with):
+            continue
+        found = played(name, cheat)
+        measuring.keep(task, ID, "cheat", DRAWS, found, made_with)
+        print(f"{name} {cheat}: {found['closed']} of {DRAWS}, {found['open']} without its mend", flush=True)
     PAGE.write_text(page())
     print(f"wrote {PAGE.relative_to(ROOT)}")
-
-
-def identity(task: str, cheat: str) -> dict[str, Any]:
-    """What a record is about: it counts while this is the same."""
-    plan = Path(str(importlib.import_module(f"hands.{task}").__file__))
-    code = source_sha256(load_task(task).family) + hashlib.sha256(plan.read_bytes()).hexdigest()
-    return {"task": task, "cheat": cheat, "draws": DRAWS, "code_sha256": hashlib.sha256(code.encode()).hexdigest()}
-
-
-def newest(known: list[dict[str, Any]], about: dict[str, Any]) -> dict[str, Any] | None:
-    """The newest record with this identity."""
-    return next((record for record in reversed(known) if about.items() <= record.items()), None)
 
 
 def played(task: str, cheat: str) -> dict[str, int]:
@@ -105,9 +83,11 @@ def page() -> str:
 def clauses() -> Iterator[str]:
     """The rows of the table of clauses, and their sums."""
     found = mutation_score.stored()
-    for name in ("all", *sorted({record["task"] for record in found})):
-        of = [record for record in found if name in ("all", record["task"])]
-        mutants, varied = ([one for one in of if bool(one["mutant"]) is which] for which in (True, False))
+    for name in ("all", *sorted({row.task for row in found})):
+        of = [row for row in found if name in ("all", row.task)]
+        mutants, varied = (
+            [row.value for row in of if bool(row.made_with["mutant"]) is which] for which in (True, False)
+        )
         exploited = [one for one in mutants if one["cheats"]]
         counts = [sum(bool(one[what]) for one in exploited) for what in ("found", "random")]
         runs, flagged = (sum(one[what] for one in varied) for what in ("runs", "flagged"))
@@ -118,25 +98,25 @@ def clauses() -> Iterator[str]:
 
 def rows() -> Iterator[str]:
     """The rows of the table."""
-    known, recalled, last = lines(RECORDS), lines(RECALL), ""
+    last = ""
     for (task, cheat), hand in HANDS.items():
         number, _, idea = str(importlib.import_module(f"hands.{task}").__doc__).partition(":")
         name = f"{number} [{task}](tasks/{task}.md)" if task != last else ""
-        found = newest(known, identity(task, cheat))
-        counts = [f"{found[part]} of {DRAWS}" for part in ("closed", "open")] if found else ["not counted yet"] * 2
+        found = next((row.value for row in ledger.current("cheat", task) if row.has(cheat=cheat, draws=DRAWS)), None)
+        none = ledger.not_measured(task)
+        counts = [f"{found[part]} of {DRAWS}" for part in ("closed", "open")] if found else [none] * 2
         plan = cheat.removesuffix("_raw").replace("_", " ") + (", raw" if hand.raw else "")
         idea = " ".join(idea.split()) if task != last else ""
-        yield f"| {' | '.join((name, idea, plan, *counts, found_by(recalled, task, hand)))} |"
+        yield f"| {' | '.join((name, idea, plan, *counts, found_by(task, hand)))} |"
         last = task
 
 
-def found_by(recalled: list[dict[str, Any]], task: str, hand: Hand) -> str:
+def found_by(task: str, hand: Hand) -> str:
     """The tiers that find a way without a cheat's mend. Cheats with the same mend share them."""
     mended = {cheat for (name, cheat), other in HANDS.items() if name == task and other.unmended == hand.unmended}
-    code = source_sha256(load_task(task).family)
-    of = [record for record in recalled if record["task"] == task and record["cheat"] in mended]
-    record = newest(of, {"source_sha256": code, "grammar": GRAMMAR})
-    return "not tried yet" if record is None else record["found"].partition(":")[0] or "nothing"
+    rows = [row for row in ledger.current("recall", task) if row.has(grammar=GRAMMAR)]
+    found = next((row.value["found"] for row in rows if row.made_with["cheat"] in mended), None)
+    return ledger.not_measured(task) if found is None else found.partition(":")[0] or "nothing"
 
 
 if __name__ == "__main__":

@@ -3,14 +3,13 @@
 Every mutant of tests/attack/mutants.py that a written cheat exploits is attacked, without the declared shortcuts, until
 an attempt succeeds that the sound family refuses. For comparison: the hits of random macros with the same number of
 rollouts, and the number of varied runs of the oracle that would be taken for a way around the task. Results are stored
-in records/mutation_score.jsonl, and a repeated call continues there: first the varied runs, then a mutant of each task,
+in records/mutation, and a repeated call continues there: first the varied runs, then a mutant of each task,
 then the next ones, so that an interrupted call has measured all tasks alike.
 
 `python tools/mutation_score.py hits [budget] [task ...]` counts, for each mutant that a written cheat exploits, all
 successes that the sound family refuses, of the adversary and of random macros with the same number of rollouts.
 """
 
-import inspect
 import json
 import sys
 import time
@@ -23,7 +22,6 @@ from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
-from axis_records import lines
 from cheats import written
 from mutants import BARS, TASKS, Mutant, mutants
 from opened import Opened
@@ -36,14 +34,13 @@ from scengen.attack.experience import Experience, experience
 from scengen.attack.macros import Macro
 from scengen.attack.player import SETTLE_TIME, Attempt, Player
 from scengen.attack.signature import pairs
-from scengen.pool.files import sha256
+from scengen.evidence import ledger, measuring
+from scengen.evidence.ledger import Evidence
+from scengen.samplers.split import ID
 from scengen.samplers.task import Task
-from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
-RESULTS = Path("records/mutation_score.jsonl")
-"""File of the results."""
 SCENARIOS = 10
 """Number of scenarios for each mutant, as for a task in tools/attack_all.py."""
 CHEATED = 2
@@ -58,34 +55,32 @@ WIDER_JITTER = Robust(position=0.003, turn=2.0, mass=0.08, friction=0.15, noise=
 
 def main(budget: str = "500", *tasks: str) -> None:
     """Score all mutants, or those of some tasks, and print the score."""
-    RESULTS.parent.mkdir(exist_ok=True)
-    records = stored()
-    done = {(record["task"], record["mutant"]) for record in records}
-    with open(RESULTS, "a") as page:
-        for task in tasks or TASKS:
-            if (task, "") not in done:
-                records.append(_keep(page, flagged(task)))
-        for mutant in mutants():
-            if (tasks and mutant.task not in tasks) or (mutant.task, mutant.name) in done:
-                continue
-            records.append(_keep(page, scored(mutant, int(budget))))
-    print(_summary(records))
+    for task in map(load_task, tasks or TASKS):
+        if not done(task, ""):
+            found = flagged(task.name)
+            _keep(task, "", found["runs"], found)
+    for mutant in mutants():
+        task = load_task(mutant.task)
+        if (not tasks or mutant.task in tasks) and not done(task, mutant.name):
+            found = scored(mutant, int(budget))
+            _keep(task, mutant.name, SCENARIOS if found["cheats"] else CHEATED, found)
+    print(_summary(stored()))
 
 
-def stored() -> list[dict[str, Any]]:
-    """The records that count: what they are about is the same today."""
-    return [record for record in lines(RESULTS) if identity(record).items() <= record.items()]
+def stored() -> list[Evidence]:
+    """The rows about today's tasks and plans."""
+    return [row for task in TASKS for row in ledger.current("mutation", task) if counts(row)]
 
 
-def identity(record: dict[str, Any]) -> dict[str, Any]:
-    """What a record is about, beside its mutant: the code of its family, and what has judged or attacked it.
+def done(task: Task, mutant: str) -> bool:
+    """Whether the ledger has a mutant of a task, or with an empty name its varied runs."""
+    rows = [row for row in ledger.current("mutation", task.name) if row.has(mutant=mutant) and counts(row)]
+    return any(not measuring.stale(task, row) for row in rows)
 
-    Varied runs are judged by their contacts. Where no written cheat succeeds, no plan of the adversary is played.
-    """
-    code = {"task": record["task"], "source_sha256": source_sha256(load_task(record["task"]).family)}
-    if not record["mutant"]:
-        return {**code, "contacts_sha256": sha256(inspect.getsource(CausalContacts))}
-    return {**code, "grammar": GRAMMAR} if record["cheats"] else code
+
+def counts(row: Evidence) -> bool:
+    """Whether a row was made with today's plans, or without any: where no written cheat succeeds, none is played."""
+    return row.has(grammar=GRAMMAR) or not row.value.get("cheats")
 
 
 def compare(budget: str = "60", *tasks: str) -> None:
@@ -128,8 +123,6 @@ def scored(mutant: Mutant, budget: int) -> dict[str, Any]:
         used, found = hunted(mutant, subjects, budget, PLAYED) if cheats else (0, None)
         luck = hunted(mutant, subjects, used, [RANDOM])[1] if found else None
     return {
-        "task": mutant.task,
-        "mutant": mutant.name,
         "cheats": cheats,
         "rollouts": used,
         "found": _told(found),
@@ -150,9 +143,6 @@ def guessed(mutant: Mutant) -> dict[str, Any]:
         hits += [hit for hit in result.hits if len(above) and hit.tier == f"prior_{len(above[-1].values)}"]
     told = _told(hits[0]) if hits else ""
     return {
-        "task": mutant.task,
-        "mutant": mutant.name,
-        "subjects": len(subjects),
         "cheats": [f"{len(p.values)} fixed: {p.fresh:.0%}" for p in above],
         "rollouts": used,
         "found": told,
@@ -229,7 +219,7 @@ def flagged(task: str) -> dict[str, Any]:
                 found = causal.lacking(pairs(world))
                 taken += bool(found)
                 lacking |= found
-    return {"task": task, "mutant": "", "runs": runs, "flagged": taken, "lacking": sorted(lacking)}
+    return {"runs": runs, "flagged": taken, "lacking": sorted(lacking)}
 
 
 def _hit(player: Player, attempt: Attempt, played: Any) -> Hit:
@@ -244,23 +234,20 @@ def _told(hit: Hit | None) -> str:
     return f"{hit.tier} {'raw' if hit.raw else 'filtered'}: {hit.plan[:120]}"
 
 
-def _keep(page: Any, found: dict[str, Any]) -> dict[str, Any]:
-    """Store a record and return it."""
-    record = identity(found) | found
-    page.write(json.dumps(record) + "\n")
-    page.flush()
-    print(json.dumps(record), flush=True)
-    return record
+def _keep(task: Task, mutant: str, n: int, found: dict[str, Any]) -> None:
+    """Store a result."""
+    row = measuring.keep(task, ID, "mutation", n, found, {"mutant": mutant, "grammar": GRAMMAR})
+    print(json.dumps({"task": row.task, "mutant": mutant, **found}), flush=True)
 
 
-def _summary(records: Sequence[dict[str, Any]]) -> str:
-    scores = [record for record in records if record["mutant"]]
-    exploited = [record for record in scores if record["cheats"]]
+def _summary(rows: Sequence[Evidence]) -> str:
+    scores = [row.value for row in rows if row.made_with["mutant"]]
+    exploited = [one for one in scores if one["cheats"]]
     lines = [f"{len(scores)} mutants, {len(exploited)} exploited by a written cheat"]
     for what in ("found", "random"):
-        lines.append(f"{what}: {sum(bool(r[what]) for r in exploited)} of {len(exploited)}")
-    varied = [record for record in records if not record["mutant"]]
-    runs, taken = (sum(record[what] for record in varied) for what in ("runs", "flagged"))
+        lines.append(f"{what}: {sum(bool(one[what]) for one in exploited)} of {len(exploited)}")
+    varied = [row.value for row in rows if not row.made_with["mutant"]]
+    runs, taken = (sum(one[what] for one in varied) for what in ("runs", "flagged"))
     lines.append(f"varied oracle runs flagged: {taken} of {runs}")
     return "\n".join(lines)
 

@@ -1,6 +1,6 @@
 """Which cheap baseline predicts what an axis does to a learner, as docs/predictors.md: `python tools/predictors.py`
 
-The page is written from records. It compares the loss of each baseline, and the distance of the features, with the
+The page is written from the ledger. It compares the loss of each baseline, and the distance of the features, with the
 learner's loss, over all axes on which a learner was tried that works in training.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import mannwhitneyu, rankdata
 
 from scengen import list_tasks, load_task
+from scengen.evidence import ledger
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.statistics import NORMAL_QUANTILE
 
@@ -157,7 +158,7 @@ def _exceptions() -> list[str]:
         "| task | axis | card | learner in training and here | what it is |",
         "|---|---|---|---|---|",
     ]
-    for one in _trials():
+    for one in (trial for trial in _trials() if DISTANCE in trial.losses):  # which a card tells
         broken = any(found.finding == "breaks" for found in one.card if found.name in (*OBJECT_CENTRIC, *BELIEF))
         told = verdict(one.card)
         clear = broken or (told != INCONCLUSIVE and not told.startswith("breaks"))
@@ -178,12 +179,12 @@ def sentence() -> str:
     return f"Which baseline predicts the learner is not decided: {tried}."
 
 
-def cell(found: Mapping[str, Baseline]) -> str:
-    """What is told of an axis that no learner has tried."""
+def cell(task: str, found: Mapping[str, Baseline]) -> str:
+    """What is told of an axis of a task that no learner has tried."""
     for name in ranking():
         if name in found and found[name].finding in TELLING:
-            return f"not measured; {_spelled(name)} predicts: {found[name].finding}"
-    return "not measured"
+            return f"{ledger.not_measured(task)}; {_spelled(name)} predicts: {found[name].finding}"
+    return ledger.not_measured(task)
 
 
 def _spelled(name: str) -> str:
@@ -236,8 +237,8 @@ class Trial:
 def _trials() -> list[Trial]:
     """All axes on which a learner was tried that works in training."""
     found = []
-    for task in (load_task(name) for name in list_tasks() if (axis_records.LEARNED / f"{name}.jsonl").is_file()):
-        cards = axis_records.read(axis_records.CARDS, task)
+    for task in (load_task(name) for name in list_tasks() if ledger.current("baseline", name)):
+        cards = axis_records.cards(task)
         for axis, baselines in axis_records.baselines(task).items():
             learner = next((baselines[name] for name in LEARNERS if name in baselines), None)
             if learner is None or learner.training is None or learner.training.value < MIN_TRAINING:

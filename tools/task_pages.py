@@ -16,6 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from scengen import list_tasks, load_task
 from scengen.agents import facts
+from scengen.evidence import ledger
 from scengen.pictures.film import Take, strip
 from scengen.pictures.render import Picture, camera
 from scengen.samplers.axis import spell
@@ -110,7 +111,8 @@ def _story(task: Task) -> Iterator[str]:
 def _facts(task: Task) -> Iterator[str]:
     yield f"> {task.instruction}"
     yield ""
-    yield f"Paper: {task.code}, category {task.category}. Time limit {task.horizon:g} s. Robot: `{task.embodiment}`. "
+    yield f"Paper: {task.code}, category {task.category}. Version {task.version}. "
+    yield f"Time limit {task.horizon:g} s. Robot: `{task.embodiment}`. "
     yield f"Family: `{task.family.__module__}.{task.family.__name__}`; distributions: `conf/task/{task.name}.yaml`."
     yield ""
 
@@ -172,7 +174,7 @@ def _attacks(task: Task) -> Iterator[str]:
     """Results of the adversary."""
     yield from ("## Attacks", "")
     found = list(_measured(ATTACKS, task))
-    yield from found or ("The adversary in its present form has not attacked this task yet.", "")
+    yield from found or (f"The adversary has not attacked this task: {ledger.not_measured(task.name)}.", "")
 
 
 def _measured(page: Path, task: Task) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Train small policies on other demonstrations than tools/baselines.py, into records/trainings.
+"""Train small policies on other demonstrations than tools/baselines.py, into records/training.
 
     python tools/trainings.py curves|styles|curation|wrench [workers=N] [TASK ...]
 
@@ -19,31 +19,30 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
-import axis_records
 import baselines
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from arguments import parted
 from baselines import ALL, BLIND, CURATED, FELT, MIXED, NOMINAL, RANDOM, VARIED, Question
-from filelock import FileLock
 
 from scengen import load_task
 from scengen.envs.object_state import NAME
 from scengen.envs.observations import proprioception
+from scengen.evidence import measuring
 from scengen.learn.data import KEPT
 from scengen.learn.models import BC, KNN, MIP
 from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
-from scengen.pool.files import sha256
 from scengen.samplers.split import ID
+from scengen.samplers.task import Task
 
 AXES = {
     "domino_single": ("diagonal", "stout_starter"),
@@ -103,7 +102,7 @@ SEEN = ("robot0_", "force_torque", "observation.")
 class Training:
     """One training."""
 
-    task: str
+    task: Task
     data: str
     """Name of the set of demonstrations."""
     policy: str
@@ -115,7 +114,20 @@ class Training:
     def folder(self) -> Path:
         """Folder of the policy."""
         name = self.data.replace(" ", "_")
-        return baselines.MADE / self.task / "trainings" / f"{name}-{self.policy}-{self.size or 'all'}-{self.seed}"
+        made = baselines.made_of(self.task) / "trainings"
+        return made / f"{name}-{self.policy}-{self.size or 'all'}-{self.seed}"
+
+    @property
+    def made_with(self) -> dict[str, Any]:
+        """Settings of the training in the ledger: its own, and the format and the number of epochs of all trainings."""
+        own = {"data": self.data, "policy": self.policy, "size": self.size, "seed": self.seed}
+        return {**own, "format": FORMAT, "epochs": TrainSettings().epochs}
+
+    @property
+    def done(self) -> bool:
+        """Whether the ledger has the results of the training."""
+        splits = (ID, *AXES[self.task.name])
+        return all(measuring.measured(self.task, split, "training", self.made_with) for split in splits)
 
 
 def main(*arguments: str) -> None:
@@ -124,29 +136,28 @@ def main(*arguments: str) -> None:
     question = next((one for one in get_args(Question) if one in names[:1]), None)
     if question is None:
         sys.exit(f"give a question: {', '.join(get_args(Question))}")
-    tasks, workers = names[1:] or TASKS[question], int(settings.get("workers", 1))
-    if unknown := {*tasks} - {*AXES}:
+    chosen, workers = names[1:] or TASKS[question], int(settings.get("workers", 1))
+    if unknown := {*chosen} - {*AXES}:
         sys.exit(f"no task named {min(unknown)!r}; known: {', '.join(AXES)}")
+    tasks = [load_task(name) for name in chosen]
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
         list(executor.map(pools, tasks))
         list(executor.map(prepare, *zip(*product(tasks, BASES[question]), strict=True)))
         list(executor.map(partial(derive, question), tasks))
-        done = {identity(record) for task in tasks for record in records(task)}
-        missing = [one for one in trainings(question, tasks) if one not in done]
-        started = [executor.submit(train, one) for one in missing]
+        missing = [one for one in trainings(question, tasks) if not one.done]
+        started = {executor.submit(train, one): one for one in missing}
         for number, future in enumerate(as_completed(started), 1):
-            record = future.result()
-            store(record)
-            print(f"{number} of {len(started)}: {record['task']} {identity(record).folder.name} {record['solved']}")
+            one = started[future]
+            print(f"{number} of {len(started)}: {one.task.name} {one.folder.name} {future.result()}")
 
 
-def trainings(question: Question, tasks: Iterable[str]) -> list[Training]:
+def trainings(question: Question, tasks: Iterable[Task]) -> list[Training]:
     """The trainings that a question takes; all of one seed come before the next one."""
     found = [one for task in tasks for one in _of_task(question, task)]
     return sorted(found, key=lambda one: one.seed)
 
 
-def _of_task(question: Question, task: str) -> Iterator[Training]:
+def _of_task(question: Question, task: Task) -> Iterator[Training]:
     if question == "curves":
         for policy, seeds in SEEDS.items():
             yield from (Training(task, MIXED, policy, size, seed) for size in SIZES for seed in seeds)
@@ -154,90 +165,51 @@ def _of_task(question: Question, task: str) -> Iterator[Training]:
         yield from (Training(task, data, BC, None, seed) for data in COMPARED[question] for seed in SEEDS[BC])
 
 
-def records(task: str) -> list[dict[str, Any]]:
-    """The records of a task that were made as they would be now."""
-    made = _made(task)
-    return [one for one in axis_records.lines(_path(task)) if made.items() <= one.items()]
-
-
-def _made(task: str) -> dict[str, Any]:
-    """How trainings of a task are made: their format and number of epochs, and what is drawn in each split.
-
-    Machines with different fingerprints draw the same scenarios, and write pools that differ in the last bits.
-    """
-    own = load_task(task)
-    hashes = {}
-    for split in (ID, *AXES[task]):
-        dists = {name: str(dist) for name, dist in {**own.training, **own.shifts(split)}.items()}
-        hashes[split] = sha256(json.dumps(dists, sort_keys=True))
-    return {"format": FORMAT, "epochs": TrainSettings().epochs, "draws_sha256": hashes}
-
-
-def identity(record: dict[str, Any]) -> Training:
-    """The training of a record."""
-    return Training(**{name: record[name] for name in Training.__dataclass_fields__})
-
-
-def store(record: dict[str, Any]) -> None:
-    """Add a record to those of its task; those that were made otherwise are dropped."""
-    path = _path(record["task"])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with FileLock(baselines.MADE / f"{path.stem}.lock"):
-        known = [*records(record["task"]), record]
-        path.write_text("".join(sorted(json.dumps(one, sort_keys=True) + "\n" for one in known)))
-
-
-def _path(task: str) -> Path:
-    return baselines.TRAININGS / f"{task}.jsonl"
-
-
-def pools(task: str) -> dict[str, Path]:
+def pools(task: Task) -> dict[str, Path]:
     """Make the pools of a task on which policies are evaluated, if they are missing. Returns them by split."""
-    return baselines.make_pools(task, AXES[task])
+    return baselines.make_pools(task, AXES[task.name])
 
 
-def train(training: Training) -> dict[str, Any]:
-    """Train and evaluate a policy. Returns the record."""
-    data = _recordings(training.task)[training.data]
-    to = training.folder
+def train(training: Training) -> dict[str, int]:
+    """Train and evaluate a policy, and store the rows. Returns the number of solved scenarios by split."""
+    task, to = training.task, training.folder
+    data = _recordings(task)[training.data]
     settings = [f"policy={training.policy}", f"data={data}", f"seed={training.seed}", f"to={to}"]
     if training.size is not None:
         settings.append(f"demonstrations={training.size}")
     if training.data == FELT:
-        robot = load_task(training.task).embodiment
-        settings.append(f"observations=[{','.join((*proprioception(robot), NAME, 'force_torque'))}]")
+        settings.append(f"observations=[{','.join((*proprioception(task.embodiment), NAME, 'force_torque'))}]")
     baselines.run("train", *settings)
-    evaluated = pools(training.task)
+    evaluated, solved = pools(task), {}
     baselines.play(str(to), [*evaluated.values()], to / "evaluation")
-    outcomes = {
-        split: [success for _, success in baselines.outcomes(episodes, Pool.open(evaluated[split]))]
-        for split, episodes in baselines.episodes(to / "evaluation", evaluated).items()
-    }
-    solved = {split: sum(own) for split, own in outcomes.items()}
-    played = {"pools_sha256": {split: Pool.open(pool).sha256 for split, pool in evaluated.items()}}
-    return {**asdict(training), "solved": solved, "outcomes": outcomes, **played, **_made(training.task)}
+    for split, episodes in baselines.episodes(to / "evaluation", evaluated).items():
+        own = [success for _, success in baselines.outcomes(episodes, Pool.open(evaluated[split]))]
+        solved[split] = sum(own)
+        value = {"solved": solved[split], "outcomes": own}
+        measuring.keep(task, split, "training", len(own), value, training.made_with)
+    return solved
 
 
 # --- sets of demonstrations ---------------------------------------------------------------
 
 
-def _recordings(task: str) -> dict[str, Path]:
+def _recordings(task: Task) -> dict[str, Path]:
     """Folders of the recordings of a task, by the name of the set."""
-    folder = baselines.MADE / task
+    folder = baselines.made_of(task)
     names = (NOMINAL, VARIED, ALL, CURATED, RANDOM)
     own = dict.fromkeys((MIXED, BLIND, FELT), folder / baselines.RECORDING)
     return own | {name: folder / "sets" / name for name in names}
 
 
-def prepare(task: str, name: str) -> None:
+def prepare(task: Task, name: str) -> None:
     """Make the demonstrations of a set, and record them, unless they are there."""
     to = _recordings(task)[name]
-    demos = baselines.MADE / task / ("demos" if name == MIXED else f"demos-{name}")
+    demos = baselines.made_of(task) / ("demos" if name == MIXED else f"demos-{name}")
     styles = (f"styles={STYLES[name]}",) if name in STYLES else ()
     baselines.record(task, to, demos, pools(task).values(), *styles)
 
 
-def derive(question: Question, task: str) -> None:
+def derive(question: Question, task: Task) -> None:
     """Make the spoiled, the curated and the random recording of a task, if they are asked for and missing."""
     if question == "curation":
         sets = _recordings(task)

@@ -24,6 +24,8 @@ from ..sim.embodiment import hands
 from ..validate.rebuilt import world_of
 from ..work.parallel import Limits, Workers, each
 
+SEARCH = 1
+"""Number of the search and of the observations that it reads. It rises when either changes: then results are old."""
 IDLE_TIME = 0.3
 """Time without action before the second observation [s]. Events whose moment is hidden come later: those that have come
 may be seen."""

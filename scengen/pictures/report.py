@@ -11,11 +11,12 @@ from rich.table import Table
 from ..attack.campaign import AttackReport
 from ..attack.evidence import TierRate, spelled
 from ..certificate import STAGES
+from ..evidence.ledger import Evidence
 from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
-from ..samplers.task import Task
+from ..samplers.task import ID, Task
 from ..task_files import About
 from ..validate.playable import check_scene
 from . import render
@@ -116,12 +117,12 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     return [about, params, checks]
 
 
-def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
+def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Evidence]]) -> Table:
     """One line for each task.
 
     Args:
         tasks: tasks, grouped by category.
-        certified: results of certification, see `task_files.certified`.
+        certified: results of certification by task and split.
     """
     table = Table(title=f"{len(tasks)} tasks", title_justify="left")
     for column in ("", "code", "task", "hands"):
@@ -130,16 +131,18 @@ def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Map
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("instruction")
     for task, after in zip_longest(tasks, tasks[1:]):
-        results = certified.get(task.name, {}).values()
+        rows = certified[task.name]
+        results = [row.value for row in rows.values()]
         share = f"{sum(t['certified'] for t in results)} of {sum(t['indices'] for t in results)}" if results else "-"
-        each = certified.get(task.name, {}).get("id", {}).get("cpu")
+        each = f"{rows[ID].value['cpu']:.1f}" if ID in rows else "-"
         hands = task.embodiment.replace("panda_", "")
-        cells = (task.name, hands, str(len(task.axes)), share, f"{each:.1f}" if each else "-", task.instruction)
+        cells = (task.name, hands, str(len(task.axes)), share, each, task.instruction)
         table.add_row(
             task.category, task.code, *cells, end_section=after is not None and after.category != task.category
         )
     table.caption = (
-        "certified: of the tried draws (conf/certified.yaml); CPU s: for one certificate in training, level quick"
+        "certified: of the tried draws; CPU s: for one certificate in training, level quick; "
+        "-: not measured on the task's version of today"
     )
     table.caption_justify = "left"
     return table

@@ -1,11 +1,11 @@
-"""Measured figures: conf/certified.yaml, and the tables of axes, attacks and baselines in the documentation."""
+"""Measured figures: certification, and the tables of axes, attacks and baselines in the documentation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from ..task_files import certified
+from ..evidence.ledger import Evidence, latest
+from ..task_files import tasks
 
 PAGES = ("axes", "attacks", "baselines")
 """Pages of docs/ that hold tables whose first column is `task`. They are written from what tools/ measures."""
@@ -15,8 +15,8 @@ PAGES = ("axes", "attacks", "baselines")
 class Figures:
     """What was measured about all tasks."""
 
-    certified: Mapping[str, Mapping[str, Mapping[str, Any]]]
-    """Results of certification by task and split, see `task_files.certified`."""
+    certified: Mapping[str, Mapping[str, Evidence]]
+    """Results of certification of today's versions, by task and split."""
     tables: Mapping[str, list[dict[str, str]]]
     """Lines of the tables by page; each line holds its cells by title."""
 
@@ -24,7 +24,8 @@ class Figures:
     def read(cls, docs: Path | None) -> "Figures":
         """The figures of a folder of documentation, or those of certification alone."""
         paths = {page: docs / "docs" / f"{page}.md" for page in PAGES} if docs else {}
-        return cls(certified(), {page: lines_of(path.read_text()) for page, path in paths.items() if path.is_file()})
+        certified = {task: latest("certified", task) for task in tasks()}
+        return cls(certified, {page: lines_of(path.read_text()) for page, path in paths.items() if path.is_file()})
 
     def of(self, page: str, task: str, axis: str = "") -> list[dict[str, str]]:
         """The lines of a page about a task, or about one of its axes, without the cells that name them."""

@@ -3,10 +3,9 @@
 Every kept cheat (`hands`) has a mend. Here the mend is taken out, and the adversary attacks the open task. If the mend
 is a rule, a success counts if the closed task refuses the same actions. If it changes the physics or the events, the
 same actions prove nothing; there the closed task is attacked as well, and must be solved less than half as often.
-Records are in `records/recall.jsonl`; the command continues them.
+Results are in `records/recall`; the command continues them.
 """
 
-import json
 import sys
 from collections import Counter
 from dataclasses import replace
@@ -21,12 +20,11 @@ from scengen.attack.adversary import CLOCK, MEMORY, PRIOR, RANDOM, SEARCH, SERVO
 from scengen.attack.campaign import GRAMMAR, AttackJob, AttackSettings, drawn, fitted
 from scengen.attack.experience import experience
 from scengen.compose import load_task
+from scengen.evidence import measuring
 from scengen.sim import scene_text
 from scengen.sim.world import World
-from scengen.validate.identity import source_sha256
 from scengen.validate.rollout import replay
 
-RECORDS = Path(__file__).parents[2] / "records" / "recall.jsonl"
 UNAIDED = (SHORTCUT, PRIOR, MEMORY, CLOCK, SERVO, RANDOM, SEARCH)
 """Tiers that do not continue the witness of the scenario, which of course reaches the goal. They alone attack a task
 whose mend changes the physics or the events."""
@@ -86,22 +84,17 @@ def attacked(task, unmended, n, budget):
 
 def main(n=4, budget=320, *tasks):
     n, budget = int(n), int(budget)
-    known = [json.loads(line) for line in RECORDS.read_text().splitlines()] if RECORDS.exists() else []
     mends = {(task, hand.unmended): cheat for (task, cheat), hand in reversed(HANDS.items())}
     found = 0
     for (name, unmended), cheat in sorted(mends.items(), key=lambda item: item[0][0]):
         if tasks and name not in tasks:
             continue
-        task = load_task(name)
-        about = {"task": name, "cheat": cheat, "n": n, "budget": budget, "grammar": GRAMMAR,
-                 "source_sha256": source_sha256(task.family)}  # fmt: skip
-        record = next((one for one in known if about.items() <= one.items()), None)
-        if record is None:
-            record = {**about, **attacked(task, unmended, n, budget)}
-            with open(RECORDS, "a") as file:
-                file.write(json.dumps(record) + "\n")
-        found += bool(record["found"])
-        print(f"{name} {cheat}: {record['found'] or 'not found'}", flush=True)
+        task, made_with = load_task(name), {"cheat": cheat, "budget": budget, "grammar": GRAMMAR, "n": n}
+        row = measuring.measured(task, "id", "recall", made_with)
+        if row is None:
+            row = measuring.keep(task, "id", "recall", n, attacked(task, unmended, n, budget), made_with)
+        found += bool(row.value["found"])
+        print(f"{name} {cheat}: {row.value['found'] or 'not found'}", flush=True)
     print(f"found {found} of {sum(not tasks or task in tasks for task, _ in mends)} cheats")
 
 

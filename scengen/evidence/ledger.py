@@ -1,0 +1,136 @@
+"""The ledger of measured figures: records/<kind>/<task>.jsonl, one line for each measurement.
+
+A figure belongs to the version of its task that it was measured on. Readers ask for the rows of today's version; a row
+of another version is only named, never shown as if it were of this one.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from .. import task_files
+from ..errors import BadConfig, cut
+
+Kind = Literal[
+    "certified",
+    "axis",
+    "belief",
+    "baseline",
+    "training",
+    "attack",
+    "cheat",
+    "leak",
+    "recall",
+    "mutation",
+    "plan",
+    "drift",
+]
+"""Kind of a measurement, and name of its folder in records/.
+
+`certified`: scenarios certified of the first draws, and what the oracle and robosuite did; `axis`: card of an axis;
+`belief`: planners with beliefs of training; `baseline`, `training`: trained policies; `attack`: the adversary; `cheat`:
+cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
+`mutation`: rules left out; `plan`: plans carried out; `drift`: verdicts under other versions of MuJoCo.
+"""
+KINDS: tuple[Kind, ...] = get_args(Kind)
+"""All kinds."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One row of the ledger: figures that one measurement gave."""
+
+    task: str
+    """Name of the task."""
+    version: int
+    """Version of the task that was measured."""
+    split: str
+    """Split that was measured."""
+    kind: Kind
+    """Kind of the measurement."""
+    n: int
+    """Number of draws, twins or rollouts that the figures rest on."""
+    value: Mapping[str, Any]
+    """Figures, as plain data."""
+    made_with: Mapping[str, Any]
+    """Settings of the measurement, as plain data. Another measurement with the same settings replaces this one."""
+    draws: str
+    """Hash of the first draws of the split and their scenes, see `measuring.draws_of`."""
+
+    @property
+    def place(self) -> str:
+        """What a row of the same kind and task must differ in to stand beside this one: the split and the settings."""
+        return json.dumps([self.split, self.made_with], sort_keys=True)
+
+    def has(self, **made_with: Any) -> bool:
+        """Whether the row was made with these settings."""
+        return made_with.items() <= self.made_with.items()
+
+
+def folder() -> Path:
+    """Folder of the ledger."""
+    return task_files.shipped("records")
+
+
+def read(kind: Kind, task: str) -> list[Evidence]:
+    """All rows of a kind about a task, those of earlier versions included.
+
+    Raises:
+        BadConfig: a line of the file is not a row.
+    """
+    path = folder() / kind / f"{task}.jsonl"
+    return list(_rows(path)) if path.is_file() else []
+
+
+def current(kind: Kind, task: str) -> list[Evidence]:
+    """The rows of a kind about today's version of an installed task."""
+    rows = read(kind, task)
+    return [row for row in rows if row.version == task_files.version(task)] if rows else []
+
+
+def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
+    """The row about today's version of a task on each split: of those with these settings, that with the largest n."""
+    rows = [row for row in current(kind, task) if row.has(**made_with)]
+    return {row.split: row for row in sorted(rows, key=lambda row: row.n)}
+
+
+def write(row: Evidence) -> None:
+    """Add a row to the ledger. It replaces the row of the same place, whatever version that is about."""
+    path = folder() / row.kind / f"{row.task}.jsonl"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with _locked(path.parent):
+        known = _rows(path) if path.is_file() else ()
+        rows = {one.place: one for one in known} | {row.place: row}
+        text = "".join(json.dumps(asdict(rows[place]), sort_keys=True) + "\n" for place in sorted(rows))
+        unfinished = path.with_suffix(".unfinished")
+        unfinished.write_text(text)
+        unfinished.replace(path)
+
+
+def not_measured(task: str) -> str:
+    """What a page says where there is no row about today's version of a task."""
+    return f"not measured on version {task_files.version(task)}"
+
+
+def _rows(path: Path) -> Iterator[Evidence]:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        try:
+            yield Evidence(**json.loads(line))
+        except (ValueError, TypeError) as error:
+            raise BadConfig(f"{path}, line {number}: {cut(str(error))}; restore the file") from None
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Lock a folder, so that one process at a time writes in it. The lock leaves no file."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)

@@ -1,0 +1,37 @@
+"""The table of what was measured of a task, by kind."""
+
+from rich.table import Table
+
+from ..samplers.task import ID, Task
+from .ledger import KINDS, Kind, read
+
+EACH_SPLIT: tuple[Kind, ...] = ("certified", "baseline")
+"""Kinds that are measured on every split."""
+EACH_AXIS: tuple[Kind, ...] = ("axis", "belief")
+"""Kinds that are measured on every axis."""
+
+
+def evidence_table(task: Task) -> Table:
+    """One line for each kind: the splits that were measured on today's version of a task, and those that were not."""
+    title = f"evidence: measured on version {task.version}"
+    table = Table("kind", "splits", "n", "not measured on this version", title=title, title_justify="left")
+    for kind in KINDS:
+        rows = read(kind, task.name)
+        today = [row for row in rows if row.version == task.version]
+        here = {row.split or "whole task" for row in today}
+        wanted = [*([ID] if kind in EACH_SPLIT else []), *(task.axes if kind in (*EACH_SPLIT, *EACH_AXIS) else [])]
+        missing = [split for split in wanted if split not in here]
+        others = sorted({row.version for row in rows} - {task.version})
+        lacking = [f"{len(missing)} of {len(wanted)}: {', '.join(missing)}"] if here and missing else []
+        lacking += [] if here else [f"not measured on version {task.version}"]
+        lacking += [f"measured on version {', '.join(map(str, others))}"] if others else []
+        table.add_row(kind, _names(task, here), str(sum(row.n for row in today)), "; ".join(lacking))
+    return table
+
+
+def _names(task: Task, splits: set[str]) -> str:
+    """Names of splits: all axes are `all axes`."""
+    axes = [axis for axis in task.axes if axis in splits]
+    if len(axes) == len(task.axes):
+        axes = [f"all {len(axes)} axes"]
+    return ", ".join([*sorted(splits - {*task.axes}), *axes])

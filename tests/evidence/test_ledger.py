@@ -1,0 +1,202 @@
+"""The ledger of measured figures: its rows are about today's tasks, and no page shows a figure of another version."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, replace
+
+import all_axes
+import attack_all
+import axis_records
+import baselines_page
+import cluster_page
+import drift_all
+import kept_cheats
+import predictors
+import pytest
+
+from scengen import list_tasks, load_task, task_files
+from scengen.cli import run
+from scengen.errors import BadConfig
+from scengen.evidence import ledger, measuring
+from scengen.evidence.ledger import KINDS, Evidence
+
+TASK = load_task("domino_single")
+ROWS = [row for kind in KINDS for task in list_tasks() for row in ledger.read(kind, task)]
+ROW = Evidence(TASK.name, 1, "id", "plan", 3, {"solved": 2}, {"seed": 0}, measuring.draws_of(TASK, "id"))
+
+
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    """A ledger without rows."""
+    monkeypatch.setattr(ledger, "folder", lambda: tmp_path)
+    return tmp_path
+
+
+# --- the rows of the repository -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_file_is_about_a_task_and_every_row_is_whole(kind):
+    for path in (ledger.folder() / kind).iterdir():
+        assert path.suffix == ".jsonl" and path.stem in list_tasks()
+        rows = ledger.read(kind, path.stem)
+        assert path.read_text() == "".join(json.dumps(asdict(row), sort_keys=True) + "\n" for row in rows)
+        assert [row.place for row in rows] == sorted({row.place for row in rows}), "one row for each place, in order"
+        splits, version = task_files.splits(path.stem), task_files.version(path.stem)
+        for row in rows:
+            assert (row.task, row.kind) == (path.stem, kind)
+            assert row.split in ("", *splits)
+            assert type(row.version) is int and 1 <= row.version <= version
+            assert type(row.n) is int and row.n >= 1
+            assert type(row.value) is dict and row.value and type(row.made_with) is dict and row.made_with
+
+
+@pytest.mark.parametrize("name", sorted({row.task for row in ROWS}))
+def test_no_row_is_stale(name):
+    """A row about today's version was measured on today's draws. If not, the version was not raised with the task."""
+    task = load_task(name)
+    rows = [row for row in ROWS if row.task == name and row.version == task.version]
+    draws = {split: measuring.draws_of(task, split) for split in {row.split for row in rows}}
+    stale = [f"{row.kind} of {row.split}" for row in rows if row.draws != draws[row.split]]
+    assert not stale, f"{name} has changed without a new VERSION: {', '.join(stale)}"
+
+
+def test_the_ledger_has_a_row_of_every_kind():
+    assert {row.kind for row in ROWS} == set(KINDS)
+
+
+# --- versions -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", list_tasks())
+def test_the_version_is_read_without_an_import_as_the_family_declares_it(name):
+    assert task_files.version(name) == load_task(name).version
+
+
+def test_a_version_is_that_of_the_class_itself():
+    text = "class Other:\n    VERSION: ClassVar[int] = 3\n\nclass Family(Other):\n    pass  # VERSION\n"
+    assert task_files._declared(text, "Other") == 3
+    assert task_files._declared(text, "Family") == 1
+
+
+def test_a_family_that_is_not_there_is_told(tmp_path):
+    (tmp_path / "task").mkdir()
+    (tmp_path / "task" / "lost.yaml").write_text("family: scengen.tasks.nowhere.Lost\n")
+    with pytest.raises(BadConfig, match="there is no module scengen.tasks.nowhere"):
+        task_files.version("lost", [f"hydra.searchpath=[file://{tmp_path}]"])
+
+
+# --- measuring ------------------------------------------------------------------------------
+
+
+def test_what_was_measured_with_the_same_settings_is_not_measured_again(empty, monkeypatch):
+    made_with = {"n": 2, "mujoco": ["3.5.0", "4.0.0"]}
+    assert measuring.measured(TASK, "id", "plan", made_with) is None
+    row = measuring.keep(TASK, "id", "plan", 2, {"solved": 1}, made_with)
+    assert measuring.measured(TASK, "id", "plan", made_with) == row
+    assert measuring.measured(TASK, "id", "plan", {**made_with, "n": 3}) is None
+    assert measuring.measured(TASK, "diagonal", "plan", made_with) is None
+    assert measuring.measured(TASK, "id", "drift", made_with) is None
+    monkeypatch.setattr(TASK.family, "VERSION", 2)
+    assert measuring.measured(TASK, "id", "plan", made_with) is None
+
+
+def test_a_split_with_other_draws_is_measured_again(empty):
+    ledger.write(replace(ROW, draws="0" * 12))
+    assert measuring.measured(TASK, "id", "plan", ROW.made_with) is None
+    ledger.write(ROW)
+    assert measuring.measured(TASK, "id", "plan", ROW.made_with) == ROW
+
+
+def test_the_draws_tell_distributions_apart_and_scenes(monkeypatch):
+    axes = [measuring.draws_of(TASK, split) for split in ("", "id", *TASK.axes)]
+    assert axes[0] == axes[1] and len(set(axes)) == 1 + len(TASK.axes)
+    monkeypatch.setattr(measuring, "rebuild", lambda scenario: "<mujoco/>")
+    assert measuring.draws_of(TASK, "id") != axes[1]
+
+
+def test_a_row_of_the_same_settings_is_replaced_and_others_stay(empty):
+    other = replace(ROW, made_with={"seed": 1})
+    for row in (ROW, other, replace(ROW, version=2, n=5)):
+        ledger.write(row)
+    assert ledger.read("plan", TASK.name) == [replace(ROW, version=2, n=5), other]
+
+
+def test_rows_that_are_written_at_once_are_all_kept(empty):
+    rows = [replace(ROW, made_with={"seed": seed}) for seed in range(20)]
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(ledger.write, rows))
+    assert sorted(ledger.read("plan", TASK.name), key=lambda row: row.made_with["seed"]) == rows
+    assert [path.name for path in (empty / "plan").iterdir()] == ["domino_single.jsonl"]
+
+
+def test_a_damaged_line_is_told_with_its_number(empty):
+    ledger.write(ROW)
+    with open(empty / "plan" / "domino_single.jsonl", "a") as file:
+        file.write('{"task": "domino_single"}\n')
+    with pytest.raises(BadConfig, match=r"domino_single\.jsonl, line 2: .*restore the file"):
+        ledger.read("plan", TASK.name)
+
+
+def test_of_several_rows_of_a_split_the_largest_is_shown(empty):
+    for n, seed in ((20, 0), (50, 1), (10, 2)):
+        ledger.write(replace(ROW, n=n, made_with={"seed": seed}))
+    assert ledger.latest("plan", TASK.name)["id"].n == 50
+    assert ledger.latest("plan", TASK.name, seed=2)["id"].n == 10
+
+
+def test_certification_is_measured_once(empty, monkeypatch):
+    certified = pytest.importorskip("certified", reason="no robosuite, in which the tool plays witnesses")
+    calls = []
+    monkeypatch.setattr(certified, "measured", lambda task, split, **asked: calls.append(split) or {"indices": 3})
+    splits = ["id", *TASK.axes]
+    certified.main("2", f"split={splits[0]}", TASK.name)
+    for _ in range(2):
+        certified.main("2", TASK.name)
+    assert calls == splits
+    certified.main("3", "split=id", TASK.name)
+    assert calls == [*splits, "id"]
+
+
+# --- what is shown --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def of_another_version(empty):
+    """The rows of one task, all of another version."""
+    for row in ROWS:
+        if row.task == TASK.name:
+            ledger.write(replace(row, version=7))
+    pages = (baselines_page._rates, baselines_page._measured, baselines_page._trainings)
+    cached = (*pages, predictors.ranking, predictors._trials)
+    for of in cached:
+        of.cache_clear()
+    yield
+    for of in cached:
+        of.cache_clear()
+
+
+def test_no_page_shows_figures_of_another_version(of_another_version):
+    none = "not measured on version 1"
+    cells = all_axes._row(TASK, "diagonal", None, axis_records.baselines(TASK)["diagonal"], None)
+    assert set(cells[2:]) <= {none, "nothing hidden"}
+    assert all(not ledger.current(kind, TASK.name) for kind in KINDS)
+    assert attack_all._reports("strict") == {} and f"`{TASK.name}`: {none}" in attack_all.page()
+    assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in baselines_page._all_splits()
+    assert not baselines_page._trainings(baselines_page.MIXED)
+    assert [line for line in kept_cheats.rows() if TASK.name in line and line.count(none) != 3] == []
+    assert drift_all.page().count("| domino_single |") == 0
+    assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in cluster_page.table()
+
+
+def test_the_terminal_tells_what_was_not_measured(of_another_version, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(("tasks", f"task={TASK.name}")) == 0
+    told = capsys.readouterr().out
+    lines = told.partition("evidence: measured on version 1")[2].splitlines()
+    for kind in {row.kind for row in ROWS if row.task == TASK.name}:
+        [line] = [line for line in lines if f" {kind} " in line]
+        assert "not measured on version 1; measured on version 7" in line
+    assert run(("tasks",)) == 0
+    [line] = [line for line in capsys.readouterr().out.splitlines() if " domino_single " in line]
+    assert " of " not in line
