@@ -143,3 +143,25 @@ def slid(friction: float, rate: float, seconds: float) -> tuple[float, float]:
     """
     grows = GRAVITY * rate / math.cos(slip_angle(friction))
     return grows * seconds**3 / 6, grows * seconds**2 / 2
+
+
+def stopping_speed(friction: float, way: float) -> float:
+    """Speed from which sliding friction on level ground stops a block after `way` [m], in [m/s]."""
+    return math.sqrt(2 * friction * GRAVITY * way)
+
+
+def thrown_off(speed: float, friction: float, edge: float, drop: float) -> float:
+    """Farthest distance that a block that is struck on top of another one can reach [m].
+
+    Sliding friction slows it up to the edge of the lower one, it falls freely, and slides on. A block that tumbles does
+    not get so far: measured are 0.6 to 1.0 of it.
+
+    Args:
+        speed: its speed after the blow [m/s].
+        friction: its coefficient of friction.
+        edge: distance to the edge of the lower block [m].
+        drop: height from which it falls [m].
+    """
+    brake = 2 * friction * GRAVITY
+    at_edge = math.sqrt(max(0.0, speed**2 - brake * edge))
+    return edge + at_edge * math.sqrt(2 * drop / GRAVITY) + at_edge**2 / brake

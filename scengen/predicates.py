@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from .assets.prop import TABLE_TOP
+from .control.loop import Loop
 from .geometry import Vec3
 from .sim.world import ROBOT, World
 
@@ -67,6 +68,11 @@ def seated(world: World, body: str, container: str, middle: Vec3, off: float, hi
 def over(world: World, body: str, spot: Vec3, half: float) -> bool:
     """Whether a body's centre of mass is over a square along x and y, given by its middle and half its side [m]."""
     return bool(np.abs(world.com(body) - spot)[:2].max() <= half)
+
+
+def count_time(world: World, name: str, holds: bool) -> None:
+    """Remember under `name` for how long a condition has held without a break [s]. For `events`, once per period."""
+    world.memory[name] = world.memory[name] + Loop.PERIOD if holds else 0.0
 
 
 def touched_only(world: World, *allowed: str) -> str | None:

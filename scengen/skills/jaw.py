@@ -44,6 +44,12 @@ def release(arm: Arm, seconds: float = RELEASE_TIME) -> Plan:
     yield from hold(arm, seconds, OPEN)
 
 
+def let_go(arm: Arm, up: float = 0.10, seconds: float = RELEASE_TIME, pace: Pace = COARSE) -> Plan:
+    """Open the jaw in place, and move straight up by `up` [m]."""
+    yield from release(arm, seconds)
+    yield from retreat(arm, up, pace)
+
+
 def pick(
     arm: Arm,
     at: ArrayLike,

@@ -9,8 +9,11 @@ from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.world import Arm
-from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, hold, retreat, steer
+from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, go_to, hold, retreat, steer
+from .pace import approach
 
+ABOVE = 0.03
+"""Height above a face from which the cup comes down on it [m]."""
 FIRMLY = 0.15
 """Time that the cup must hold on before a piece is lifted [s]."""
 BRAKE = 6.0
@@ -36,6 +39,12 @@ SQUARED = 2.0
 """Longest time of squaring up [s]: under noise the mean error may stay above `SQUARE`."""
 ADDING = 2.0
 """Integral gain of the error of a hand that is squared up [1/s]; at 4 the hand swings by a degree to either side."""
+
+
+def take(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08) -> Plan:
+    """Come down on a face at `spot` [m] from `ABOVE`, and take hold of it with the cup; see `suck`."""
+    yield from go_to(arm, spot + ABOVE * UP, rot, STEADY, OPEN)
+    yield from suck(arm, spot, rot, speed)
 
 
 def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
@@ -156,8 +165,6 @@ def carry_to(
             aim, setpoint = aim + shift, setpoint + shift
         lag = max(0.0, float((setpoint - arm.hand) @ way))
         setpoint = setpoint - max(0.0, lag - slack) * way
-        ahead = aim - setpoint
-        distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (max(0.0, 1.0 - lag / slack) * min(pace.speed, BRAKE * distance) / max(distance, 1e-9))
+        velocity = approach(aim - setpoint, pace.speed, max(0.0, 1.0 - lag / slack), BRAKE)
         setpoint = setpoint + velocity * Loop.PERIOD
         yield firm(arm, setpoint, velocity, between(arm.hand_rot, aim_rot))

@@ -43,7 +43,7 @@ from ..robots.jaw import OPEN_GAP, pinch
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
-from ..skills.jaw import carry, pick, release
+from ..skills.jaw import carry, let_go, pick
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, wait
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
@@ -142,8 +142,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
 
     def leave(self, world: World) -> Plan:
         """Open the jaw and go straight up, slowly while the fingers are beside the rod."""
-        yield from release(world.arm, 0.3)
-        yield from retreat(world.arm, 0.03, Pace(0.05, 0.003))
+        yield from let_go(world.arm, 0.03, seconds=0.3, pace=Pace(0.05, 0.003))
         yield from retreat(world.arm, 0.06)
 
     def bring(self, world: World, across: float, height: float = 0.004) -> Plan:

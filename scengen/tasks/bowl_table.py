@@ -200,8 +200,7 @@ class BowlTable(Scenario):
             com = self.goal + (height + world.com("bowl")[2] - world.pos("bowl")[2]) * UP
             yield from jaw.carry(arm, "bowl", com, pace=CARRY_PACE)
         yield from push(arm, -LOWER_SPEED * UP, lambda: world.touching("bowl", "table"))
-        yield from jaw.release(arm)
-        yield from motion.retreat(arm)
+        yield from jaw.let_go(arm)
 
     # --- what must not work ---------------------------------------------------------------
 

@@ -211,8 +211,7 @@ class CrackerBoxJaw(BoxAndSlot):
         yield from jaw.carry(arm, "box", near + LIFT_HEIGHT * UP, rot, LEAN_PACE)
         yield from jaw.carry(arm, "box", near + self.slot.depth / 2 * UP, rot, Pace(0.10, 0.004))
         yield from push(arm, -0.05 * UP, lambda: world.touching("box", "slot"), CLOSED)
-        yield from jaw.release(arm)
-        yield from retreat(arm)
+        yield from jaw.let_go(arm)
         behind = world.com("box") + 0.4 * height * UP - (thickness / 2 + STAND_OFF) * out
         falls = math.radians(40.0)
         yield from jaw.poke(arm, behind, 0.15 * out, lambda: world.tilt("box") > falls, rot=self._knocking_hand)

@@ -48,8 +48,8 @@ from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_B
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
 from ..skills import motion
-from ..skills.jaw import carry, come_down, grasp, pick, release
-from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait
+from ..skills.jaw import carry, come_down, grasp, let_go, pick, release
+from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, stay, steer, until, wait
 
 MAX_RISE = 0.02  # height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall
 STANDOFF_DISTANCE = 0.03
@@ -135,8 +135,7 @@ class GapFunnel(Scenario):
 
     def _leave(self, world: World) -> Plan:
         """Open the jaw and move up."""
-        yield from release(world.arm, 0.3)
-        yield from retreat(world.arm, APPROACH_HEIGHT)
+        yield from let_go(world.arm, APPROACH_HEIGHT, seconds=0.3)
 
     def send(self, world: World, spot: Vec3, factor: float) -> Plan:
         """Push the ball towards a spot, until the hand is in front of the wall.

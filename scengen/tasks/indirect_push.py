@@ -53,8 +53,8 @@ from ..robots.jaw import TIP_BELOW
 from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require
 from ..sim.world import ROBOT, World
-from ..skills.jaw import carry, pick, release
-from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, retreat, steer
+from ..skills.jaw import carry, let_go, pick
+from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, steer
 
 COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (0.90, 0.72, 0.20, 1.0))
 """Colours of the blocks; the target is red."""
@@ -178,8 +178,7 @@ class IndirectPush(Scenario):
         yield from carry(arm, block, spot + held + 0.07 * UP, rot, COARSE)
         yield from carry(arm, block, spot + held + 0.008 * UP, rot, Pace(0.20, 0.003))
         yield from push(arm, -0.04 * UP, until=lambda: world.touching(block, "table"))
-        yield from release(arm)
-        yield from retreat(arm, 0.09)
+        yield from let_go(arm, 0.09)
 
     def push_out(self, world: World, block: str, speed: float = PUSH_SPEED, last: float = CONTACT_SPEED) -> Plan:
         """Push a block outwards with the leaning hand until the target is in the zone or the arm is stretched out.

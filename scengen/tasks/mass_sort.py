@@ -52,7 +52,7 @@ from ..scenario import (
 )
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
-from ..skills.jaw import pick, put, release, weigh
+from ..skills.jaw import let_go, pick, put, weigh
 from ..skills.motion import STEADY, push, retreat
 
 CUBE_COUNT = 3
@@ -183,8 +183,7 @@ class MassSort(Scenario):
     def _put_back(self, world: World, cube: str) -> Plan:
         """Lower the held cube to the table, release it and move up."""
         yield from push(world.arm, -0.1 * UP, lambda: world.touching(cube, "table"))
-        yield from release(world.arm)
-        yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
+        yield from let_go(world.arm, self.edge + APPROACH_HEIGHT)
 
     def sort_held(self, world: World, ranks: Sequence[int]) -> Plan:
         """Put the last cube, which is held, and then the others into the zones of the given ranks."""

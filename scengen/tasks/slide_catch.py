@@ -46,8 +46,8 @@ from ..physics import slid, slip_angle
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, World
-from ..skills.jaw import pick, release
-from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
+from ..skills.jaw import let_go, pick, release
+from ..skills.motion import Condition, Pace, facing_down, go_to, stay
 
 BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
@@ -181,8 +181,7 @@ class SlideCatch(Scenario):
         """Wait for one block after the other, then let go of the bin."""
         for block in blocks:
             yield from self.wait_at(world, world.pos(block)[1], lambda block=block: self.caught(world, block))
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.05)
+        yield from let_go(world.arm, 0.05)
 
     def wait_at(self, world: World, y: float, until: Condition) -> Plan:
         """Draw the bin to a place at the lip, square to it, and keep it there until a condition holds."""
