@@ -122,6 +122,26 @@ def slipping(speed: float, spin: float, friction: float) -> tuple[float, float]:
     return seconds, speed - slip * SPIN / (1.0 + SPIN)
 
 
+def as_if_rolling(at: Vec3, velocity: Vec3, surface: Vec3, friction: float) -> tuple[Vec3, Vec3, Vec3]:
+    """State of a ball that rolls from the start and that a ball on level ground equals once it no longer slips.
+
+    Args:
+        at: place of the ball [m].
+        velocity: its level velocity [m/s].
+        surface: velocity of its surface about its centre [m/s]: `velocity` if it rolls, 0 if it does not turn.
+        friction: coefficient of sliding friction.
+
+    Returns:
+        Place [m], velocity [m/s] and velocity of the surface [m/s].
+    """
+    slip = velocity - surface
+    if (speed := math.sqrt(slip @ slip)) < 1e-6:
+        return at, velocity, surface
+    seconds, left = slipping(speed, 0.0, friction)
+    rolls = velocity - (1.0 - left / speed) * slip
+    return at + seconds / 2 * (velocity - rolls), rolls, rolls
+
+
 def slip_angle(friction: float) -> float:
     """Slope at which a block begins to slide [rad]."""
     return math.atan(friction)
