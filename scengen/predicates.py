@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from .assets.keyboard import LETTERS
 from .assets.prop import TABLE_TOP
 from .control.loop import Loop
 from .geometry import Vec3
-from .sim.world import ROBOT, World
+from .sim.world import ROBOT, Arm, World
 
 
 def fallen(world: World, *bodies: str, below: float = 0.05) -> str | None:
@@ -78,3 +79,30 @@ def count_time(world: World, name: str, holds: bool) -> None:
 def touched_only(world: World, *allowed: str) -> str | None:
     """The first free body, not among the allowed ones, that the robot has touched since the start, or None."""
     return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)
+
+
+SEVERAL_KEYS = -1
+"""Number that stands for more than one key at once."""
+KEY_MEMORY = ("key_0", "held_0", "key_1", "held_1")
+"""Names of what `key_that_counts` remembers: for each arm the key that it touches, counted from 1, or `SEVERAL_KEYS`,
+and the time for which it has touched it without a break [s]."""
+
+
+def long_enough(seconds: float, hold: float) -> bool:
+    """Whether a key counts that has been touched for `seconds`, if it must be touched for `hold` [s]."""
+    return seconds > hold - 1e-9
+
+
+def key_that_counts(world: World, arm: Arm, keyboard: str, hold: float) -> int:
+    """Number of the key that counts now: an arm has just touched it for `hold` [s] without a break. 0 if there is none.
+
+    For `events`, once per period.
+    """
+    memory, key, held = world.memory, f"key_{arm.number}", f"held_{arm.number}"
+    touched = [name for name in world.touching_bodies(arm.label) if name.startswith(f"{keyboard}/key_")]
+    now = SEVERAL_KEYS if len(touched) > 1 else LETTERS.index(touched[0][-1]) + 1 if touched else 0
+    before = memory[held]
+    memory[held] = (before if now == memory[key] else 0.0) + Loop.PERIOD if now else 0.0
+    memory[key] = now
+    counted = long_enough(before, hold) and memory[held] > before
+    return now if long_enough(memory[held], hold) and not counted else 0

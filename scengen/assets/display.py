@@ -1,14 +1,15 @@
 """A display behind a keyboard that shows a word: faint letters until they are typed, then bold ones in their place."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 
 from ..geometry import UP, Vec3, quat
+from ..sim.world import World
 from .glyph import write
 from .keyboard import PRINT_SIZE, Keyboard
-from .prop import Rgba, shown
+from .prop import Rgba, place, shown
 
 LETTER_HEIGHT = 0.024
 """Height of the letters on the display [m]."""
@@ -23,36 +24,49 @@ COLOURS: tuple[tuple[Rgba, Rgba, Rgba], ...] = (
 """Colours of a cap, of a faint and of a bold letter, by owner: another robot's, the agent's."""
 
 
-def add_display(
-    scene: mujoco.MjSpec, keyboard: Keyboard, body: str, word: str, owners: Sequence[int], pos: Vec3, yaw: float
+def place_with_display(
+    scene: mujoco.MjSpec,
+    keyboard: Keyboard,
+    name: str,
+    pos: Vec3,
+    yaw: float,
+    word: str,
+    is_own: Callable[[int], bool],
 ) -> None:
-    """Add a display that shows a word to a keyboard in a scene, and colour the caps of the word's letters.
+    """Add a keyboard with a display that shows a word to a scene, and colour the caps of the word's letters.
 
-    Bold letters wait below the table top. To show that a place `k` of the word is typed, move the body `typed_k` to the
-    keyboard's pose.
+    Bold letters wait below the table top until `show_typed` shows them.
 
     Args:
-        scene: the scene, with the keyboard in it.
+        scene: the scene.
         keyboard: the keyboard.
-        body: the keyboard's body.
+        name: name of the keyboard's body.
+        pos: position of the keyboard [m].
+        yaw: yaw of the keyboard [rad].
         word: the word.
-        owners: index of its owner in `COLOURS` for each letter. The key of a letter that is twice in the word shows the
-            first one.
-        pos: initial position of the keyboard [m].
-        yaw: initial yaw of the keyboard [rad].
+        is_own: function that says whether a place of the word is the agent's. The key of a letter that is twice in the
+            word shows the first owner.
     """
-    plate, count, turn = scene.body(body), len(word), quat("z", yaw)
+    place(scene, keyboard, name, pos, yaw)
+    plate, count, turn = scene.body(name), len(word), quat("z", yaw)
     half = [LETTER_HEIGHT, LETTER_SPACING * count / 2, 0.0005]
     shown(plate, "display", (0.97, 0.97, 0.95, 1.0), size=half, pos=_spot(keyboard, count, (count - 1) / 2))
     hidden = pos - 0.03 * UP
     for k, letter in reversed(list(enumerate(word))):
-        cap, faint, bold = COLOURS[owners[k]]
-        scene.geom(f"{body}/cap_{letter}").rgba = np.array(cap, np.float32)
+        cap, faint, bold = COLOURS[is_own(k)]
+        scene.geom(f"{name}/cap_{letter}").rgba = np.array(cap, np.float32)
         write(plate, letter, _spot(keyboard, count, k), LETTER_HEIGHT, 0.0010, faint, f"faint_{k}")
         typed = scene.worldbody.add_body(name=f"typed_{k}", mocap=True, pos=hidden.tolist(), quat=turn)
         spots = (_spot(keyboard, count, k), LETTER_HEIGHT), (keyboard.at(letter), PRINT_SIZE * keyboard.cap)
         for spot, height in spots:  # 0.3 mm before the faint letters, their strokes twice as wide
             write(typed, letter, spot + 0.0003 * UP, height, 0.0020, bold, f"bold_{height:.3f}_{k}")
+
+
+def show_typed(world: World, body: str, count: int) -> None:
+    """Show the first letters of the word bold, wherever the keyboard is now. For `events`."""
+    keyboard = world.body(body)
+    for k in range(count):
+        world.move(f"typed_{k}", world.data.xpos[keyboard], world.data.xquat[keyboard])
 
 
 def _spot(keyboard: Keyboard, count: int, k: float) -> Vec3:

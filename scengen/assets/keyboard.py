@@ -87,5 +87,11 @@ class Keyboard(Prop):
             )
 
 
+def disable(scene: mujoco.MjSpec, keyboard: str, letter: str) -> None:
+    """Let a key of a keyboard in a scene give way: nothing touches it."""
+    cap = scene.geom(f"{keyboard}/cap_{letter}")
+    cap.contype = cap.conaffinity = 0
+
+
 if __name__ == "__main__":
     show(Keyboard())

@@ -37,13 +37,14 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from ..assets.display import add_display
-from ..assets.keyboard import LETTERS, Keyboard
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.display import place_with_display, show_typed
+from ..assets.keyboard import LETTERS, Keyboard, disable
+from ..assets.prop import TABLE_TOP, table
+from ..assets.words import WORDS
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, about_z
 from ..params import param
-from ..predicates import count_time, fallen
+from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
 from ..robots import panda
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, require
 from ..sim.memory import remember
@@ -51,12 +52,6 @@ from ..sim.world import Arm, World
 from ..skills import keys, motion
 from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, until, wait
 
-TRAINING_WORDS = tuple("WORLD PLANT MUSIC FRUIT BREAD CHAIR HOUSE NIGHT QUICK JUMBO GHOST BLACK".split())
-UNSEEN_WORDS = tuple("TABLE STONE CLOUD OCEAN TIGER LEMON SUGAR VIDEO PIANO ZEBRA WALTZ FLAME".split())
-DOUBLED_WORDS = tuple("APPLE HELLO SWEET GRASS HAPPY LEVEL KAYAK RADAR".split())
-LONG_WORDS = tuple("PICTURE KITCHEN DOLPHIN TROUBLE PROBLEM MONKEYS JOURNAL HUSBAND".split())
-WORDS = TRAINING_WORDS + UNSEEN_WORDS + DOUBLED_WORDS + LONG_WORDS
-"""All words, by their number: five different letters (two lists), five with one twice, seven different ones."""
 MIN_CLEARANCE = 0.15
 """Distance beside the keyboard at which a hand is out of the other arm's way [m]: a palm is 0.10 m to each side."""
 PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.20])  # of the agent's hand, out of the partner's way [m]
@@ -69,12 +64,10 @@ TIME_MARGIN = 0.05  # beyond `hold`, for which shortcuts press a key [s]
 TIP_HALF_WIDTH = 0.013  # of the closed finger tips, along y [m]
 MAX_REACH = 0.70
 """Distance from an arm's first axis up to which a hand that points down goes exactly to its target [m]; measured."""
-SEVERAL_KEYS = -1  # number that stands in memory for more than one key at once
 MISTAKES = ("", "several keys were held at once", "the letter was not next", "the letter was the other robot's")
-MEMORY = ("typed", "mistake", "key_0", "held_0", "key_1", "held_1", "waited")
-"""Number of letters typed; number of the mistake; for each arm the key that it touches, counted from 1, or
-`SEVERAL_KEYS`, and the time for which it has touched it without a break [s]; in the partner's turn the time since the
-agent was last in its way, in the agent's turn the time that it let go by [s]."""
+MEMORY = ("typed", "mistake", *KEY_MEMORY, "waited")
+"""Number of letters typed; number of the mistake; touches of keys; in the partner's turn the time since the agent was
+last in its way, in the agent's turn the time that it let go by [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,9 +93,7 @@ class KeyboardTyping(Scenario):
     def build(self) -> mujoco.MjSpec:
         scene = table()
         remember(scene, *MEMORY)
-        place(scene, self.keyboard, "keyboard", self.spot, math.radians(self.yaw))
-        owners = [int(self.owns(k)) for k in range(len(self.letters))]
-        add_display(scene, self.keyboard, "keyboard", self.letters, owners, self.spot, math.radians(self.yaw))
+        place_with_display(scene, self.keyboard, "keyboard", self.spot, math.radians(self.yaw), self.letters, self.owns)
         return scene
 
     # --- goal -----------------------------------------------------------------------------
@@ -123,28 +114,14 @@ class KeyboardTyping(Scenario):
         """Count what is typed, show it, and move the partner."""
         (partner,) = world.partners
         for arm in (world.arm, partner):
-            self._watch_keys(world, arm)
+            if number := key_that_counts(world, arm, "keyboard", self.hold):
+                self._judge_press(world, number, arm)
         self._watch_turn(world)
-        keyboard = world.body("keyboard")
-        for k in range(int(world.memory["typed"])):
-            world.move(f"typed_{k}", world.data.xpos[keyboard], world.data.xquat[keyboard])
-        key, counts = self._partner_key(world), self._long_enough(world.memory["held_1"])
+        k = int(world.memory["typed"])
+        show_typed(world, "keyboard", k)
+        key = self.key(world, k) if self.partner_next(world) and world.memory["waited"] > self.pause(k) else None
+        counts = long_enough(world.memory["held_1"], self.hold)
         partner.tell(keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace))
-
-    def _watch_keys(self, world: World, arm: Arm) -> None:
-        """Watch which key an arm touches, and for how long."""
-        memory, key, held = world.memory, f"key_{arm.number}", f"held_{arm.number}"
-        touched = [name for name in world.touching_bodies(arm.label) if name.startswith("keyboard/key_")]
-        now = SEVERAL_KEYS if len(touched) > 1 else LETTERS.index(touched[0][-1]) + 1 if touched else 0
-        before = memory[held]
-        memory[held] = (before if now == memory[key] else 0.0) + Loop.PERIOD if now else 0.0
-        memory[key] = now
-        if self._long_enough(memory[held]) and not (self._long_enough(before) and memory[held] > before):
-            self._judge_press(world, now, arm)
-
-    def _long_enough(self, seconds: float) -> bool:
-        """Whether a key counts that has been touched for `seconds` [s]."""
-        return seconds > self.hold - 1e-9
 
     def _judge_press(self, world: World, key: int, arm: Arm) -> None:
         """Judge a key that counts: it is the next letter, and this arm's, or a mistake."""
@@ -174,12 +151,6 @@ class KeyboardTyping(Scenario):
     def pending(self, world: World) -> bool:
         """Whether the partner has a letter to type, and goes there by itself after a pause."""
         return self.partner_next(world) and self.beside(world, world.arm)
-
-    def _partner_key(self, world: World) -> Vec3 | None:
-        """Position of the key that the partner is going for [m], or None."""
-        k = int(world.memory["typed"])
-        goes = self.partner_next(world) and world.memory["waited"] > self.pause(k)
-        return self.key(world, k) if goes else None
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -272,8 +243,7 @@ class KeyboardTyping(Scenario):
         scene = self.build()
         for k, letter in enumerate(self.letters):
             if not self.owns(k):
-                cap = scene.geom(f"keyboard/cap_{letter}")
-                cap.contype = cap.conaffinity = 0
+                disable(scene, "keyboard", letter)
         return {"dead_keys_of_the_partner": scene}
 
     # --- constraints ------------------------------------------------------------------------
