@@ -7,7 +7,7 @@ import numpy as np
 from .assets.keyboard import LETTERS
 from .assets.prop import TABLE_TOP
 from .control.loop import Loop
-from .geometry import Vec3
+from .geometry import Vec3, yaw_of
 from .sim.world import ROBOT, Arm, World
 
 
@@ -79,6 +79,26 @@ def count_time(world: World, name: str, holds: bool) -> None:
 def touched_only(world: World, *allowed: str) -> str | None:
     """The first free body, not among the allowed ones, that the robot has touched since the start, or None."""
     return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)
+
+
+def remember_first_pose(world: World, body: str, number: int) -> None:
+    """Remember where a body is, seen from above, unless that is known. For `events`.
+
+    The names are `tried_<number>`, which says that it is known, `x_<number>`, `y_<number>` and `yaw_<number>`.
+    """
+    (x, y, _), yaw, memory = world.pos(body), yaw_of(world.rot(body)), world.memory
+    if not memory[f"tried_{number}"]:
+        memory[f"x_{number}"], memory[f"y_{number}"], memory[f"yaw_{number}"] = x, y, yaw
+        memory[f"tried_{number}"] = 1.0
+
+
+def off_first_pose(world: World, body: str, number: int) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of a body from the pose of `remember_first_pose`, from above; 0 if none is known."""
+    if not world.memory[f"tried_{number}"]:
+        return 0.0, 0.0
+    x, y, yaw = (world.memory[f"{value}_{number}"] for value in ("x", "y", "yaw"))
+    pos, turn = world.pos(body), math.remainder(yaw_of(world.rot(body)) - yaw, math.tau)
+    return math.hypot(pos[0] - x, pos[1] - y), abs(turn)
 
 
 SEVERAL_KEYS = -1

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import UP, Mat3, Vec3, about_y, quat
-from ..params import check_bounds, param
+from ..params import Bounded, param
 from ..physics import slid, slip_angle
 from .prop import Prop, Rgba, servo, show, shown, solid
 
@@ -118,14 +118,11 @@ class Incline(Prop):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Load:
+class Load(Bounded):
     """A block on an incline."""
 
     friction: float = param(0.6, "1", 0.15, 1.0, hidden=True)
     away: float = param(0.04, "m", 0.02, 0.12)  # distance of its middle from the lip
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     @property
     def colour(self) -> Rgba:

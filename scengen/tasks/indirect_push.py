@@ -32,7 +32,6 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
 * Anything else may be done with the blocks. A block that is held in the jaw reaches less far than one that is pushed.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -44,8 +43,8 @@ from ..assets.box import Cube
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading
-from ..params import check_bounds, param
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading, least_gap
+from ..params import Bounded, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots import ik
@@ -76,15 +75,12 @@ END_MARGIN = 0.004  # distance inside the zone at which the push ends [m]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Spot(Bounded):
     """Pose of a block at the start."""
 
     x: float = param(-0.12, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     @property
     def pos(self) -> Vec3:
@@ -263,7 +259,7 @@ class IndirectPush(Scenario):
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
         near, far = min(away), max(away)
         yield require(MIN_DISTANCE <= near and far <= MAX_DISTANCE, "a block is out of reach", away=far)
-        apart = min(gap(one, other) for one, other in itertools.combinations(outlines, 2))
+        apart = least_gap([each] for each in outlines)
         yield require(apart > 0.03, "there is no room for the fingers between two blocks", apart=apart)
         beside = min(gap(one, self.lane) for one in outlines)
         yield require(beside > 0.0, "a block lies where the chain is to stand", beside=beside)

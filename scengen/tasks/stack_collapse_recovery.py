@@ -41,7 +41,7 @@ from ..assets.box import Cube, LoadedCube
 from ..assets.prop import TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, heading
-from ..params import check_bounds, param
+from ..params import Bounded, param
 from ..physics import stopping_speed, thrown_off
 from ..predicates import count_time, fallen, still
 from ..robots.jaw import PALM_ABOVE, PALM_ALONG, SPAN, TIP_BELOW
@@ -67,7 +67,7 @@ cube has lain on the table since the last blow."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Blow:
+class Blow(Bounded):
     """An impulse through the middle of the top cube, and possibly one through that of the middle cube."""
 
     when: float = param(0.7, "s", 0.1, 10.0, hidden=True)
@@ -79,9 +79,6 @@ class Blow:
     """Direction in which the middle cube is thrown."""
     speed: float = param(0.88, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the top cube
     speed_middle: float = param(0.92, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the middle cube
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
 
 @dataclass(frozen=True, kw_only=True)
