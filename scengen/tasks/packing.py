@@ -34,7 +34,7 @@ Decisions, where the paper (App. B, T33) says no more than "L-shaped pieces", "b
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -163,12 +163,12 @@ class Packing(Scenario):
     def pack(self, world: World, count: int) -> Plan:
         """Bring the first `count` pieces into their slots, and release each once it lies there."""
         for i in range(count):
-            lies = lambda i=i: self.lies(world, i)  # noqa: E731
+            lies = partial(self.lies, world, i)
             yield from fitting.fit(world.arm, f"piece_{i}", self.face(i), *self.goal(i), self.thickness, lies)
 
     def insert(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
         """Lower the held piece `i` into a place at a yaw [rad]; see `fitting.insert`."""
-        lies = lambda: self.lies(world, i)  # noqa: E731
+        lies = partial(self.lies, world, i)
         yield from fitting.insert(world.arm, f"piece_{i}", pos, yaw, self.thickness, lies)
 
     def steps(self) -> Mapping[str, Planner]:
@@ -213,7 +213,7 @@ class Packing(Scenario):
     def _place_all(self, world: World, pose: Callable[[int], tuple[Vec3, float]]) -> Plan:
         """Press each piece down softly at a pose and let go, wherever it comes to lie."""
         for i in range(self.count):
-            lies = lambda i=i: self.lies(world, i)  # noqa: E731
+            lies = partial(self.lies, world, i)
             yield from fitting.lay(world.arm, f"piece_{i}", self.face(i), *pose(i), self.thickness, lies)
 
     def _unturned(self, world: World, i: int) -> tuple[Vec3, float]:
@@ -247,9 +247,8 @@ class Packing(Scenario):
 
     def constraints(self) -> Iterator[Refutation | None]:
         area, floor = float(sum(slot.area for slot in self.cut.pieces)), float(self.cut.rect.area)
-        yield require(
-            guillotine.closes(*self.cut), "the pieces do not close the bin's footprint", pieces=area, bin=floor
-        )
+        closes = guillotine.closes(*self.cut)
+        yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=floor)
         narrow, cup = min(min(piece.upright, piece.lying) for piece in self.pieces), 2 * CUP_HALF_WIDTH
         yield require(narrow >= cup, "an arm is too narrow for the cup", arm=narrow, cup=cup)
         weight = GRAVITY * max(piece.mass for piece in self.pieces)
