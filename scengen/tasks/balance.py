@@ -34,17 +34,17 @@ import numpy as np
 
 from ..assets.inlaid_rod import InlaidRod
 from ..assets.ridge import Ridge
-from ..control.loop import Loop
 from ..geometry import UP, Mat3, about_z, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, rests_on
+from ..predicates import count_time, fallen, rests_on
 from ..robots.jaw import OPEN_GAP, pinch
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import ROBOT, World
 from ..skills.jaw import carry, let_go, pick
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, wait
+from ..skills.waiting import elapsed
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
 RELEASE_TIME = 0.1
@@ -107,7 +107,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
         if self.released(world):
             return
         alone = world.touching("rod", RIDGE) and not world.touching(ROBOT, "rod")
-        world.memory["alone"] = world.memory["alone"] + Loop.PERIOD if alone else 0.0
+        count_time(world, "alone", alone)
 
     def pending(self, world: World) -> bool:
         return False
@@ -219,8 +219,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
         arm, across = world.arm, self.normal
         yield from go_to(arm, arm.hand - 0.05 * across)
         yield from push(arm, SLIDE_SPEED * across, until=lambda: bool((world.com("rod") - self.top) @ across > -0.012))
-        end = world.time + 0.25
-        yield from push(arm, SLIDE_SPEED * across, until=lambda: world.time > end, grip=OPEN)
+        yield from push(arm, SLIDE_SPEED * across, until=elapsed(world, 0.25), grip=OPEN)
         yield from retreat(arm, 0.08)
 
     def _lay(self, world: World) -> Plan:
