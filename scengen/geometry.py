@@ -17,6 +17,8 @@ Outline = NDArray[np.float64]
 
 UP: Vec3 = np.array([0.0, 0.0, 1.0])
 """Unit vector that points up."""
+AHEAD: Vec3 = np.array([1.0, 0.0, 0.0])
+"""Unit vector that points away from the robot."""
 
 
 def heading(angle: float) -> Vec3:

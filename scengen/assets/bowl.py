@@ -120,10 +120,11 @@ class Bowl(Turned):
         return distance * math.sin(angle), self.centre - distance * math.cos(angle)
 
 
-def close(body: mujoco.MjsBody, bowl: Bowl) -> None:
-    """Close the opening of a bowl in a scene with a lid without mass."""
+def closed(scene: mujoco.MjSpec, body: str, bowl: Bowl) -> mujoco.MjSpec:
+    """A scene in which the opening of a bowl is closed with a lid without mass."""
     size, pos = [bowl.radius - bowl.bead, 0.001], [0.0, 0.0, bowl.depth - 0.001]
-    solid(body, "lid", size, pos, type=mujoco.mjtGeom.mjGEOM_CYLINDER, mass=0.0)
+    solid(scene.body(body), "lid", size, pos, type=mujoco.mjtGeom.mjGEOM_CYLINDER, mass=0.0)
+    return scene
 
 
 if __name__ == "__main__":

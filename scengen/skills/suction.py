@@ -115,7 +115,7 @@ def press_on(arm: Arm, along: Vec3, speed: float, face: str) -> Plan:
         raise GaveUp(f"the cup did not get hold of {face}")
 
 
-def put(arm: Arm, body: str, spot: Vec3, pace: Pace, speed: float) -> Plan:
+def put(arm: Arm, body: str, spot: Vec3, pace: Pace, speed: float = 0.04) -> Plan:
     """Bring the cup over `spot` [m], for 4 s at most, lower it until its body touches something, let go, move up.
 
     Args:

@@ -37,32 +37,21 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from ..assets.bowl import Bowl, close
+from ..assets.bowl import Bowl, closed
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ring_rack import RingRack
-from ..geometry import UP, Mat3, Vec3, about_y, about_z, corners, gap, way_to
+from ..geometry import AHEAD, UP, Mat3, Vec3, about_y, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch
+from ..robots.jaw import OPENING, TIP_BELOW, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
-from ..skills import jaw, motion, suction
-from ..skills.handover import (
-    FORWARDS,
-    LEFT,
-    SIDEWAYS,
-    STAND_OFF,
-    draw_back,
-    hand_over,
-    hold_out,
-    parking,
-    stand_up,
-    upright_hand,
-)
+from ..skills import handover, jaw, motion, suction
+from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over, parking
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, turn_to, until, with_arm
 from ..skills.waiting import at_most, elapsed
 
@@ -75,7 +64,6 @@ MAX_FALL_SPEED = 0.40  # speed of a fall above which the bowl breaks [m/s]
 RIM_CLEARANCE = 0.004  # gap between the rim and the ring [m]
 DOME_CLEARANCE = 0.012
 """Gap between the dome and the ring at the ring's upper edge [m]: a finger is 15 mm thick at its tip."""
-X_AXIS: Vec3 = np.array([1.0, 0.0, 0.0])  # unit vector away from the robot
 HANDOVER_POINT: Vec3 = np.array([-0.10, -0.03, TABLE_TOP + 0.32])
 """Position of the middle of the bowl's foot during the handover [m]."""
 PARKED_HAND: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
@@ -151,7 +139,7 @@ class BowlTable(Scenario):
         yield from alone(right, self.extract(right))
         yield from motion.together(world, self.present(right), self.wait_beside(left))
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS, RIM_OVERLAP)
-        yield from motion.together(world, draw_back(right, PARKED_HAND, STEADY), self.turn_up(left))
+        yield from motion.together(world, handover.draw_back(right, PARKED_HAND, STEADY), self.turn_up(left))
         yield from alone(left, self.put_down(left))
 
     def extract(self, arm: Arm) -> Plan:
@@ -165,7 +153,7 @@ class BowlTable(Scenario):
         yield from go_to(arm, [*arm.hand[:2], HANDOVER_POINT[2]], pace=Pace(0.15, 0.02))
         yield from go_to(arm, HANDOVER_POINT, pace=Pace(0.20, 0.02))
         yield from turn_to(arm, motion.facing(math.pi / 2, self.bowl.bead_slope), 0.8)
-        yield from hold_out(arm, "bowl", HANDOVER_POINT, self.opening, CARRY_PACE)
+        yield from handover.hold_out(arm, "bowl", HANDOVER_POINT, self.opening, CARRY_PACE)
 
     def wait_beside(self, arm: Arm) -> Plan:
         """Bring the open jaw beside the place where the rim is going to be."""
@@ -179,12 +167,12 @@ class BowlTable(Scenario):
     def turn_up(self, arm: Arm) -> Plan:
         """Turn the opening up, and the hand to the robot's side of the bowl, where its palm meets no rack."""
         # 60 of the 90 deg from the bowl's right to the robot's side: at 90 with a drooping bowl joint 5 meets its limit
-        yield from turn_to(arm, about_z(-math.radians(60.0)) @ upright_hand(arm, "bowl"), 1.0)
+        yield from turn_to(arm, about_z(-math.radians(60.0)) @ handover.upright_hand(arm, "bowl"), 1.0)
 
     def put_down(self, arm: Arm) -> Plan:
         """Bring the bowl over the square, lower it until its foot is on the table, and release it."""
         heights = (0.18, 0.02)  # levelled twice: the bowl droops all the time, and by 7 deg at every jerk
-        yield from stand_up(arm, "bowl", self.goal, heights, CARRY_PACE, LOWER_SPEED)
+        yield from handover.stand_up(arm, "bowl", self.goal, heights, CARRY_PACE, LOWER_SPEED)
 
     # --- what must not work ---------------------------------------------------------------
 
@@ -204,19 +192,19 @@ class BowlTable(Scenario):
     def _set_down(self, arm: Arm) -> Plan:
         """Put the bowl on the square with the cup, upside down."""
         yield from self.extract(arm)
-        yield from self._put(arm, self.goal)
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     @with_arm(0)
     def _tip_over(self, arm: Arm) -> Plan:
         """Turn the bowl as far as the cup's hand goes, and put it on the square on its side: it would rock upright."""
         yield from self._turn_with_cup(arm, self.goal + 0.20 * UP, FORWARDS)
-        yield from self._put(arm, self.goal + 0.05 * X_AXIS)  # as far as the foot comes back when the bowl rocks up
+        yield from suction.put(arm, "bowl", self.goal + 0.05 * AHEAD, CARRY_PACE)  # as far as the foot rocks back up
 
     @with_arm(0)
     def _fling(self, arm: Arm) -> Plan:
         """Turn the bowl fast and let go in the middle of the turn, so that it turns on as it falls."""
         yield from self.extract(arm)
-        yield from go_to(arm, self.goal - 0.06 * X_AXIS + 0.20 * UP, pace=Pace(0.2, 0.02))
+        yield from go_to(arm, self.goal - 0.06 * AHEAD + 0.20 * UP, pace=Pace(0.2, 0.02))
         turn = turn_to(arm, about_y(-math.radians(20.0)) @ FORWARDS, 3.0)  # forwards and 20 deg up
         yield from until(turn, lambda: arm.world.tilt("bowl") < math.radians(110.0))
         yield from suction.let_go(arm)
@@ -231,28 +219,24 @@ class BowlTable(Scenario):
         yield from go_to(arm, arm.hand + 0.25 * UP, pace=CARRY_PACE)
         yield from turn_to(arm, facing_down(), 0.6)
         yield from at_most(arm.world, 6.0, turn_to(arm, motion.facing(-math.pi / 2, 0.0), 0.6, give_up=7.0))
-        yield from self._put(arm, self.goal)
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     @with_arm(0)
     def _right_in_rack(self, arm: Arm) -> Plan:
         """Lay the bowl on the rack on its side: it would rock upright there. Bring it to the square by its inside."""
         yield from self._turn_with_cup(arm, self.foot + (self.rack.top + 0.15) * UP, FORWARDS)
-        yield from self._put(arm, self.foot)
+        yield from suction.put(arm, "bowl", self.foot, CARRY_PACE)
         floor = arm.world.pos("bowl") + self.bowl.floor * UP
         yield from suction.take(arm, floor, facing_down(), above=0.10, pace=COARSE)
         yield from go_to(arm, arm.hand + 0.10 * UP, pace=CARRY_PACE)
-        yield from self._put(arm, self.goal)
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     def _turn_with_cup(self, arm: Arm, above: Vec3, rot: Mat3) -> Plan:
         """Pull the bowl out, bring it to `above` [m], and turn the hand towards `rot` as far as it goes."""
         yield from self.extract(arm)
         yield from go_to(arm, [*arm.hand[:2], above[2]], pace=CARRY_PACE)
-        yield from go_to(arm, above - self.bowl.depth / 2 * X_AXIS, pace=CARRY_PACE)
+        yield from go_to(arm, above - self.bowl.depth / 2 * AHEAD, pace=CARRY_PACE)
         yield from at_most(arm.world, 6.0, turn_to(arm, rot, 0.6, give_up=7.0))
-
-    def _put(self, arm: Arm, spot: Vec3) -> Plan:
-        """Bring the cup over `spot` [m] and down until the bowl touches something; let go."""
-        yield from suction.put(arm, "bowl", spot, CARRY_PACE, LOWER_SPEED)
 
     def _pinch_dome(self, arm: Arm) -> Plan:
         """Pinch the dome with the jaw, as far down as it opens, lift, and bring the bowl to the square."""
@@ -272,16 +256,14 @@ class BowlTable(Scenario):
         yield from alone(right, self.extract(right))
         yield from motion.together(world, self.present(right), self.wait_beside(left))
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS, RIM_OVERLAP)
-        yield from alone(right, draw_back(right, PARKED_HAND, STEADY))
-        com = self.goal + (self.bowl.radius + 0.01) * UP
-        yield from alone(left, jaw.carry(left, "bowl", com, pace=CARRY_PACE))
+        yield from alone(right, handover.draw_back(right, PARKED_HAND, STEADY))
+        yield from alone(left, jaw.carry(left, "bowl", self.goal + (self.bowl.radius + 0.01) * UP, pace=CARRY_PACE))
         yield from alone(left, jaw.release(left))
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """With a hole in its foot the cup does not hold the bowl; with a lid on the bowl the jaw finds no rim."""
-        lidded = self.build()
-        close(lidded.body("bowl"), self.bowl)
-        return {"holed_foot": self._scene(replace(self.bowl, hole=0.020)), "lidded": lidded}
+        holed = self._scene(replace(self.bowl, hole=0.020))
+        return {"holed_foot": holed, "lidded": closed(self.build(), "bowl", self.bowl)}
 
     # --- what must hold -------------------------------------------------------------------
 
@@ -306,12 +288,12 @@ class BowlTable(Scenario):
         yield within_reach("the square", self.goal + 0.18 * UP, base=left)
 
     def features(self) -> Mapping[str, float]:
-        bowl, lever = self.bowl, self.bowl.radius
+        bowl = self.bowl
         return {
             "rim": bowl.radius,
             "depth": bowl.depth,
-            "slope": self.bowl.bead_slope,
-            "droop": GRAVITY * bowl.mass * lever / (pinch(bowl.bead) * PAD / 2),
+            "slope": bowl.bead_slope,
+            "droop": droop(bowl.mass, bowl.radius, bowl.bead),
             "foot_height": self.plinth + bowl.depth,
             "side": self.goal_y - self.rack_y,
         }

@@ -41,7 +41,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
+from ..robots.jaw import OPENING, PALM_ACROSS, TIP_BELOW, droop, pinch
 from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.world import ROBOT, Arm, World
@@ -354,4 +354,4 @@ class CupInversion(Scenario):
     def droop(self) -> float:
         """Torque of the level cup's weight about the pads, over the torque that they resist: above 1 the cup turns."""
         lever = self.cup.height - OVERLAP - self.cup.inertial()[0][2]
-        return GRAVITY * self.cup.mass * lever / (pinch(self.cup.bead) * PAD / 2)
+        return droop(self.cup.mass, lever, self.cup.bead)

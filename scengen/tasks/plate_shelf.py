@@ -43,7 +43,7 @@ from ..geometry import UP, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import PAD, PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, pinch
+from ..robots.jaw import PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TUBE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import Arm, World
@@ -280,10 +280,9 @@ class PlateShelf(PlateAndSlot[Plate]):
 
     def features(self) -> Mapping[str, float]:
         plate = self.plate
-        lever = plate.radius - OVERLAP
         return {
             "slack": self.slack,
-            "droop": GRAVITY * plate.mass * lever / (pinch(plate.thickness) * PAD / 2),
+            "droop": droop(plate.mass, plate.radius - OVERLAP, plate.thickness),
             "radius": plate.radius,
             "carried": float(np.linalg.norm(self.foot - self.start)),
             "slot_yaw": math.radians(self.shelf_yaw),
