@@ -286,10 +286,10 @@ def test_with_dead_keys_for_the_partner_its_turn_never_ends():
 
 @dataclass(frozen=True, kw_only=True)
 class Parked(KeyboardTyping):
-    """The partner stays where it is."""
+    """The partner pauses for ever, and stays at home."""
 
-    def _partner_action(self, world, arm):
-        return arm.idle
+    def pause(self, k):
+        return math.inf
 
 
 def test_with_the_partner_parked_the_witness_fails(world):
