@@ -1,6 +1,8 @@
 """Directions, rotations and outlines: the geometry that scenes and moves share. Lengths in [m], angles in [rad]."""
 
 import math
+from collections.abc import Iterable, Sequence
+from itertools import combinations
 
 import mujoco
 import numpy as np
@@ -15,6 +17,8 @@ Outline = NDArray[np.float64]
 
 UP: Vec3 = np.array([0.0, 0.0, 1.0])
 """Unit vector that points up."""
+AHEAD: Vec3 = np.array([1.0, 0.0, 0.0])
+"""Unit vector that points away from the robot."""
 
 
 def heading(angle: float) -> Vec3:
@@ -134,3 +138,8 @@ def gap(one: Outline, other: Outline) -> float:
     axes = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     a, b = one @ axes.T, other @ axes.T
     return float(np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0)).max())
+
+
+def least_gap(bodies: Iterable[Sequence[Outline]]) -> float:
+    """Least `gap` between outlines of different bodies, each of which has one outline or more [m]."""
+    return min(gap(a, b) for one, other in combinations(bodies, 2) for a in one for b in other)

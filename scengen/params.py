@@ -94,6 +94,13 @@ def values(owner: Any) -> dict[str, Value]:
     return {p.name: p.nominal for p in parameters(owner)}
 
 
+class Bounded:
+    """Base of dataclasses of parameters that are parts of a scenario: each checks its bounds."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self)
+
+
 def check_bounds(owner: Any) -> None:
     """Raise for the first parameter of `owner` outside its bounds. Nested assets check their own."""
     for p in parameters(owner):

@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 
+from .assets.keyboard import LETTERS
 from .assets.prop import TABLE_TOP
-from .geometry import Vec3
-from .sim.arm import ROBOT
+from .control.loop import Loop
+from .geometry import Vec3, yaw_of
+from .sim.arm import ROBOT, Arm
 from .sim.world import World
 
 
@@ -70,6 +72,58 @@ def over(world: World, body: str, spot: Vec3, half: float) -> bool:
     return bool(np.abs(world.com(body) - spot)[:2].max() <= half)
 
 
+def count_time(world: World, name: str, holds: bool) -> None:
+    """Remember under `name` for how long a condition has held without a break [s]. For `events`, once per period."""
+    world.memory[name] = world.memory[name] + Loop.PERIOD if holds else 0.0
+
+
 def touched_only(world: World, *allowed: str) -> str | None:
     """The first free body, not among the allowed ones, that the robot has touched since the start, or None."""
     return next((body for body in world.free_bodies if body not in allowed and world.touched(ROBOT, body)), None)
+
+
+def remember_first_pose(world: World, body: str, number: int) -> None:
+    """Remember where a body is, seen from above, unless that is known. For `events`.
+
+    The names are `tried_<number>`, which says that it is known, `x_<number>`, `y_<number>` and `yaw_<number>`.
+    """
+    (x, y, _), yaw, memory = world.pos(body), yaw_of(world.rot(body)), world.memory
+    if not memory[f"tried_{number}"]:
+        memory[f"x_{number}"], memory[f"y_{number}"], memory[f"yaw_{number}"] = x, y, yaw
+        memory[f"tried_{number}"] = 1.0
+
+
+def off_first_pose(world: World, body: str, number: int) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of a body from the pose of `remember_first_pose`, from above; 0 if none is known."""
+    if not world.memory[f"tried_{number}"]:
+        return 0.0, 0.0
+    x, y, yaw = (world.memory[f"{value}_{number}"] for value in ("x", "y", "yaw"))
+    pos, turn = world.pos(body), math.remainder(yaw_of(world.rot(body)) - yaw, math.tau)
+    return math.hypot(pos[0] - x, pos[1] - y), abs(turn)
+
+
+SEVERAL_KEYS = -1
+"""Number that stands for more than one key at once."""
+KEY_MEMORY = ("key_0", "held_0", "key_1", "held_1")
+"""Names of what `key_that_counts` remembers: for each arm the key that it touches, counted from 1, or `SEVERAL_KEYS`,
+and the time for which it has touched it without a break [s]."""
+
+
+def long_enough(seconds: float, hold: float) -> bool:
+    """Whether a key counts that has been touched for `seconds`, if it must be touched for `hold` [s]."""
+    return seconds > hold - 1e-9
+
+
+def key_that_counts(world: World, arm: Arm, keyboard: str, hold: float) -> int:
+    """Number of the key that counts now: an arm has just touched it for `hold` [s] without a break. 0 if there is none.
+
+    For `events`, once per period.
+    """
+    memory, key, held = world.memory, f"key_{arm.number}", f"held_{arm.number}"
+    touched = [name for name in world.touching_bodies(arm.label) if name.startswith(f"{keyboard}/key_")]
+    now = SEVERAL_KEYS if len(touched) > 1 else LETTERS.index(touched[0][-1]) + 1 if touched else 0
+    before = memory[held]
+    memory[held] = (before if now == memory[key] else 0.0) + Loop.PERIOD if now else 0.0
+    memory[key] = now
+    counted = long_enough(before, hold) and memory[held] > before
+    return now if long_enough(memory[held], hold) and not counted else 0

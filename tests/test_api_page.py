@@ -26,10 +26,11 @@ def test_every_public_function_is_on_the_page_with_its_signature(tool):
     from scengen import physics, predicates
     from scengen.assets import prop
     from scengen.envs import gym
-    from scengen.skills import grip, handover, hook, jaw, motion, suction
+    from scengen.skills import cubes, fitting, grip, handover, hook, insertion, jaw, keys, motion, suction, waiting
 
     page = tool.PAGE.read_text()
-    for module in (predicates, physics, prop, gym, handover, grip, hook, jaw, motion, suction):
+    moves = (handover, grip, hook, jaw, motion, suction, waiting, cubes, fitting, insertion, keys)
+    for module in (predicates, physics, prop, gym, *moves):
         own = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
         assert own and not [n for n in own if not n.startswith("_") and not re.search(rf"### (class )?`{n}[(`]", page)]
     assert "class `Guillotine" not in page, "`scengen asset` lists the assets"

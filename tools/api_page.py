@@ -23,6 +23,11 @@ MODULES = {
         "skills.suction",
         "skills.hook",
         "skills.handover",
+        "skills.waiting",
+        "skills.cubes",
+        "skills.fitting",
+        "skills.insertion",
+        "skills.keys",
     ),
     "The robot": ("robots.jaw", "control.teleop"),
     "Distributions and draws": (

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
+from ..geometry import UP, Vec3
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
@@ -35,6 +37,11 @@ class Bin(Prop):
     def outer(self) -> tuple[float, float]:
         """Outer lengths along x and y, walls included [m]."""
         return self.width + 2 * self.wall, self.length + 2 * self.wall
+
+    def floor_region(self, within: float) -> tuple[Vec3, Vec3]:
+        """Opposite corners of the inside, from `within` below the floor to as much above it [m]."""
+        middle, half = self.floor * UP, np.array([self.width / 2, self.length / 2, within])
+        return middle - half, middle + half
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         half_x, half_y = self.width / 2, self.length / 2

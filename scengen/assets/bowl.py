@@ -3,8 +3,11 @@
 import math
 from dataclasses import dataclass
 
+import mujoco
+
+from ..geometry import UP, Mat3, Vec3
 from ..params import param
-from .prop import Rgba, show
+from .prop import Rgba, show, solid
 from .turned import FOOT_PROTRUSION, MIN_DETAIL, Section, Turned
 
 SHELL_BANDS = 6
@@ -59,6 +62,27 @@ class Bowl(Turned):
         """Radius of the inner sphere [m]. Only floor and bead reach into it, no other part of the shell."""
         return self.outer - self.wall
 
+    def dome_height(self, radius: float) -> float:
+        """Height of the dome of a bowl that is upside down over its rim, at a distance from the axis [m]."""
+        return self.depth - self.centre + math.sqrt(self.outer**2 - radius**2)
+
+    @property
+    def bead_slope(self) -> float:
+        """Angle by which the bead, at half its height, leans outwards [rad]."""
+        (low, foot), (out, top) = self.sections[-1].corners[:2]
+        return math.atan2(out - low, top - foot)
+
+    def rim_distance(self, place: Vec3) -> float:
+        """Distance of a place in the bowl's axes from the middle of the rim's thickness [m]."""
+        x, y, z = place
+        return math.hypot(math.hypot(x, y) - self.radius + self.bead / 2, z - self.depth)
+
+    def rim_top(self, pos: Vec3, rot: Mat3) -> Vec3:
+        """Uppermost point of the rim of a bowl in a pose, not upright, at half the rim's thickness [m]."""
+        axis = rot[:, 2]
+        up = (UP - axis[2] * axis) / math.hypot(axis[0], axis[1])
+        return pos + self.depth * axis + (self.radius - self.bead / 2) * up
+
     @property
     def floor(self) -> float:
         """Height of the floor inside [m]."""
@@ -94,6 +118,13 @@ class Bowl(Turned):
     def _corner(self, distance: float, angle: float) -> tuple[float, float]:
         """Radius and height of the point at a distance [m] from the spheres' centre, at an angle from straight down."""
         return distance * math.sin(angle), self.centre - distance * math.cos(angle)
+
+
+def closed(scene: mujoco.MjSpec, body: str, bowl: Bowl) -> mujoco.MjSpec:
+    """A scene in which the opening of a bowl is closed with a lid without mass."""
+    size, pos = [bowl.radius - bowl.bead, 0.001], [0.0, 0.0, bowl.depth - 0.001]
+    solid(scene.body(body), "lid", size, pos, type=mujoco.mjtGeom.mjGEOM_CYLINDER, mass=0.0)
+    return scene
 
 
 if __name__ == "__main__":

@@ -70,6 +70,11 @@ class CatchBin(Prop):
         """Height of the rim [m]."""
         return self.floor + self.depth
 
+    def holds(self, place: Vec3, depth: float = 0.0) -> bool:
+        """Whether a place in the bin's axes [m] is between its walls, at least `depth` below its rim [m]."""
+        x, y, z = np.abs(place)
+        return bool(x < self.width / 2 and y < self.length / 2 and z < self.rim - depth)
+
     @property
     def handle(self) -> Vec3:
         """Grasp point on the handle, in the bin's axes [m]."""

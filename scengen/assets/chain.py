@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 
 from ..geometry import Vec3
-from ..params import check_bounds, param
+from ..params import Bounded, param
 from .box import Domino
 
 GAP = 0
@@ -26,7 +26,7 @@ MISSING = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Defect:
+class Defect(Bounded):
     """A defect, because of which a chain does not reach the slab that counts. Each kind uses some of the fields."""
 
     kind: int = param(GAP, "0 gap, 1 drift, 2 decoy, 3 missing", GAP, MISSING)
@@ -37,9 +37,6 @@ class Defect:
     side: int = param(1, "0 right, 1 left", 0, 1)
     stretch: float = param(1.25, "tile heights", 1.02, 2.0)
     """Widest space of a drifting chain, the one before its slab."""
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     def broken(self, count: int) -> int:
         """Index of the tile that is beside the chain or missing, in a chain of `count` tiles; never the first tile."""

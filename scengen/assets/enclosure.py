@@ -2,21 +2,23 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import mujoco
 import numpy as np
 
-from ..geometry import Vec3
+from ..geometry import Outline, Vec3, about_z, corners
 from ..params import param
-from ..physics import contact, reflected
-from .prop import PRIORITY, Prop, Rgba, show, solid
+from ..physics import GRAVITY, SPIN, as_if_rolling, contact, reflected
+from .prop import PRIORITY, TABLE_TOP, Prop, Rgba, show, solid
 
 WALL_STIFFNESS = 2e4
 """Contact stiffness of the walls per mass [1/s^2]. A bounce takes 22 ms, 11 steps of the simulation, and a ball at
 0.5 m/s goes 3.5 mm into the wall. With stiffer walls the restitution depends on the time step."""
 BOUNCE_TIME = math.pi / math.sqrt(WALL_STIFFNESS)
 """Duration of a bounce [s]."""
+MAT_SIZE = (0.39, 0.39, 0.002)
+"""Half length, half width and height of the mat [m]."""
 MAX_WAYS = 10
 """Largest number of straight ways that are predicted."""
 
@@ -90,6 +92,14 @@ class Enclosure(Prop):
         return min(found, key=lambda hit: hit[1]) if found else None
 
 
+def lay_mat(scene: mujoco.MjSpec, friction: float) -> None:
+    """Cover the table with a mat, on which a ball slides without turning if its friction is 0, and else rolls."""
+    mat = scene.worldbody.add_body(name="mat", pos=[0.0, 0.0, TABLE_TOP + MAT_SIZE[2] / 2])
+    size = [MAT_SIZE[0], MAT_SIZE[1], MAT_SIZE[2] / 2]
+    smooth = {"friction": friction, "condim": 3 if friction else 1, "priority": PRIORITY + 1}
+    solid(mat, "mat", size, rgba=(0.30, 0.33, 0.38, 1.0), **smooth)
+
+
 class Way(NamedTuple):
     """A straight way of a ball between two bounces."""
 
@@ -99,6 +109,83 @@ class Way(NamedTuple):
     """Position at which it begins [m]."""
     velocity: Vec3
     """Velocity of the ball on it [m/s]."""
+
+
+@dataclass(frozen=True)
+class PlacedEnclosure:
+    """An enclosure at its place in the world."""
+
+    enclosure: Enclosure
+    mouth: Vec3
+    """Position of the middle of the opening [m]."""
+    yaw: float
+    """Direction that leads in [rad]."""
+
+    @classmethod
+    def about(cls, enclosure: Enclosure, middle: Vec3, yaw: float) -> Self:
+        """An enclosure around a place [m], open against the direction `yaw` [rad]."""
+        return cls(enclosure, middle - enclosure.depth / 2 * about_z(yaw)[:, 0], yaw)
+
+    @property
+    def outline(self) -> Outline:
+        """Outline of the enclosure, seen from above."""
+        middle = self.mouth + self.enclosure.depth / 2 * about_z(self.yaw)[:, 0]
+        return corners(middle, self.yaw, self.enclosure.size)
+
+    def inside(self, at: Vec3) -> Vec3:
+        """A place in the axes of the enclosure [m]."""
+        return about_z(self.yaw).T @ (at - self.mouth)
+
+    def wall_distance(self, at: Vec3) -> float:
+        """Distance of a place from the nearest wall [m]."""
+        (along, across, _), wall = self.inside(at), self.enclosure
+        beside = math.hypot(max(0.0, -along), wall.width / 2 - abs(across))
+        return min(beside, wall.depth - along)
+
+    def end_distance(self, way: Way) -> float:
+        """Distance from the ends of the side walls at which a way enters [m]; inf if it does not."""
+        at, velocity = self.inside(way.at), about_z(self.yaw).T @ way.velocity
+        if at[0] >= 0.0 or velocity[0] <= 0.0:
+            return math.inf
+        return self.enclosure.width / 2 - abs(float(at[1] - at[0] / velocity[0] * velocity[1]))
+
+    def ways(
+        self,
+        at: Vec3,
+        velocity: Vec3,
+        surface: Vec3,
+        radius: float,
+        friction: float = 0.0,
+        restitution: float | None = None,
+    ) -> list[Way]:
+        """The ways of a ball from a state on, in the world; curved ones as if the ball rolled from their start.
+
+        Args:
+            at: place of the ball [m].
+            velocity: level velocity of the ball [m/s].
+            surface: velocity of its surface about its centre [m/s]: `velocity` if it rolls, 0 if it does not turn.
+            radius: radius of the ball [m].
+            friction: friction between ball and floor.
+            restitution: another restitution of the walls, such as 1 for mirror images.
+        """
+        axes, found, begins = about_z(self.yaw), [], 0.0
+        while True:
+            if friction:
+                at, velocity, surface = as_if_rolling(at, velocity, surface, friction)
+            ways = self.enclosure.ways(axes.T @ (at - self.mouth), axes.T @ velocity, radius, restitution)
+            ways = [Way(begins + w.begins, self.mouth + axes @ w.at, axes @ w.velocity) for w in ways]
+            if not friction or len(ways) == 1:
+                return found + ways
+            found.append(ways[0])
+            begins, at, velocity = ways[1]
+            surface = _spin_after_bounce(velocity, surface, friction)
+
+
+def _spin_after_bounce(velocity: Vec3, surface: Vec3, friction: float) -> Vec3:
+    """Velocity of the surface after a bounce [m/s]: the wall is smooth, but the floor brakes it meanwhile."""
+    slip = velocity - surface
+    speed = math.sqrt(slip @ slip)
+    return surface + min(1.0, friction * GRAVITY * BOUNCE_TIME / (SPIN * max(speed, 1e-9))) * slip
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 Length = Fraction | int
 
@@ -115,6 +116,50 @@ class Ell:
         enters = (gone[0], inner[1]) if before[0] == gone[0] else (inner[0], gone[1])
         leaves = (gone[0], inner[1]) if after[0] == gone[0] else (inner[0], gone[1])
         return [*ring[:at], enters, inner, leaves, *ring[at + 1 :]]
+
+
+class Cut(NamedTuple):
+    """A rectangle that is cut into pieces: they prove that it can be tiled with them."""
+
+    pieces: tuple[Ell, ...]
+    """Pieces where they were cut."""
+    rect: Rect
+    """The rectangle; its lower left corner is at the origin."""
+
+    def mirrored(self) -> "Cut":
+        """The mirror image: left and right exchanged."""
+        return Cut(mirrored(self.pieces, self.rect), self.rect)
+
+    def like(self, other: "Cut") -> bool:
+        """Whether the pieces of another cut have the same shapes, in their order."""
+        return all(mine.sides == its.sides for mine, its in zip(self.pieces, other.pieces, strict=True))
+
+    def dealt(self, deal: int) -> "Cut":
+        """The same cut with its first three pieces in another order, the permutation of number `deal`."""
+        return Cut((*list(itertools.permutations(self.pieces[:3]))[deal], *self.pieces[3:]), self.rect)
+
+
+def three(frame: Length, left: Length, right: Length, low: Length, rise: Length, top: Length) -> Cut:
+    """Cut a rectangle in three: a piece `frame` wide frames a rectangle that a staircase divides.
+
+    Args:
+        frame: width of both arms of the first piece.
+        left: width of the framed rectangle left of the staircase's step.
+        right: width right of it.
+        low: height of the lower piece left of the step.
+        rise: height by which it is higher right of the step.
+        top: height of the upper piece there.
+    """
+    rect = Rect.sized(frame + left + right, frame + low + rise + top)
+    first, rest = framed(rect, frame, frame)
+    return Cut((first, *stairs(rest, left, low, low + rise)), rect)
+
+
+def four(left: Length, right: Length, low: Length, rise: Length, top: Length) -> Cut:
+    """Cut a rectangle in two halves and each by a staircase, the second one downwards; lengths as in `three`."""
+    rect = Rect.sized(2 * (left + right), low + rise + top)
+    one, two = rect.cut_x(left + right)
+    return Cut((*stairs(one, left, low, low + rise), *stairs(two, left, low + rise, low)), rect)
 
 
 def framed(rect: Rect, upright: Length, lying: Length) -> tuple[Ell, Rect]:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry import UP, Mat3, Vec3, about_y, quat
-from ..params import param
+from ..params import Bounded, param
+from ..physics import slid, slip_angle
 from .prop import Prop, Rgba, servo, show, shown, solid
 
 POST_WIDTH = 0.016
@@ -30,6 +32,9 @@ ARMATURE = 0.05
 """Inertia of the servo's rotor [kg m^2]."""
 SLAB_FRICTION = 0.05
 """Sliding friction of the slab, less than that of all things on it: MuJoCo takes the larger of two frictions."""
+TIPPING_SHARE = 0.9
+"""Time in which a cube slides a distance, as a share of that by the law of sliding: it leans on its lower edge and tips
+early. Measured: 0.86 to 0.93."""
 FRAME_COLOUR: Rgba = (0.35, 0.37, 0.40, 1.0)
 """Colour of posts and axle."""
 
@@ -67,6 +72,13 @@ class Incline(Prop):
         """
         return about_y(-math.radians(self.least) - turned)
 
+    @property
+    def resting(self) -> NDArray[np.float64]:
+        """Orientation of a block that lies on the slab at the start (wxyz)."""
+        turn = np.empty(4)
+        mujoco.mju_mat2Quat(turn, self.axes().ravel())
+        return turn
+
     def on_slab(self, away: float, along: float, turned: float = 0.0) -> Vec3:
         """A point on the slab's face, in the axes of the incline [m].
 
@@ -103,6 +115,92 @@ class Incline(Prop):
         axle = mujoco.mjtGeom.mjGEOM_CYLINDER
         pos, turn = [0, 0, -SLAB_THICKNESS / 2], quat("x", math.pi / 2)
         shown(slab, "", FRAME_COLOUR, type=axle, size=[SLAB_THICKNESS / 2, beside, 0], pos=pos, quat=turn)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load(Bounded):
+    """A block on an incline."""
+
+    friction: float = param(0.6, "1", 0.15, 1.0, hidden=True)
+    away: float = param(0.04, "m", 0.02, 0.12)  # distance of its middle from the lip
+
+    @property
+    def colour(self) -> Rgba:
+        """Colour that shows the friction, in proportion: pale at 0, dark at 1."""
+        pale, dark = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
+        return *(pale + self.friction * (dark - pale)).tolist(), 1.0
+
+
+@dataclass(frozen=True)
+class LoadedIncline:
+    """An incline at its place that tilts from its smallest to its largest angle, with a block in each of its lanes."""
+
+    incline: Incline
+    foot: Vec3
+    """Position of the middle of the lip, on the ground [m]."""
+    lane: float
+    """Distance between neighbouring lanes [m]."""
+    loads: tuple[Load, ...]
+    """Blocks by lane, from the left."""
+    start: float
+    """Time at which the tilt starts [s]."""
+    rate: float
+    """Rate of the tilt [rad/s]."""
+
+    @property
+    def lip(self) -> Vec3:
+        """Middle of the lip [m]."""
+        return self.foot + self.incline.lip * UP
+
+    def spot(self, lane: int) -> Vec3:
+        """Place of the block of a lane at the start [m]."""
+        along = (len(self.loads) // 2 - lane) * self.lane
+        return self.foot + self.incline.on_slab(self.loads[lane].away, along)
+
+    def under(self, place: Vec3) -> bool:
+        """Whether a place is over the incline, not before its lip [m]."""
+        x, _, z = place - self.lip
+        return bool(x > 0.0 and z > 0.0)
+
+    # --- mechanics ------------------------------------------------------------------------
+
+    @property
+    def sequence(self) -> tuple[int, ...]:
+        """Lanes in the order in which their blocks slide."""
+        return tuple(sorted(range(len(self.loads)), key=lambda lane: self.loads[lane].friction))
+
+    @property
+    def end(self) -> float:
+        """Time at which the incline is at its largest angle [s]."""
+        return self.start + self.incline.turns / self.rate
+
+    def turned(self, time: float) -> float:
+        """Angle of the hinge that is commanded at a time [rad]."""
+        return min(self.rate * max(0.0, time - self.start), self.incline.turns)
+
+    def slips(self, lane: int, error: float = 0.0) -> float:
+        """Slope at which the block of a lane begins to slide [rad], its friction being larger by a share `error`."""
+        return slip_angle(self.loads[lane].friction * (1.0 + error))
+
+    def slide_start(self, lane: int, error: float = 0.0) -> float:
+        """Time at which it begins to slide [s]."""
+        return self.start + (self.slips(lane, error) - math.radians(self.incline.least)) / self.rate
+
+    def slide_time(self, lane: int, way: float) -> float:
+        """Time that it takes to slide a distance [s]."""
+        return TIPPING_SHARE * (way / slid(self.loads[lane].friction, self.rate, 1.0)[0]) ** (1 / 3)
+
+    def lip_time(self, lane: int, error: float = 0.0) -> float:
+        """Time at which its middle is over the lip [s]."""
+        return self.slide_start(lane, error) + self.slide_time(lane, self.loads[lane].away)
+
+    def time_between(self, one: int, other: int, error: float) -> float:
+        """Least time from one block over the lip to another one [s], both frictions being off by a share `error`."""
+        return self.lip_time(other, -error) - self.lip_time(one, error)
+
+    def time_left(self, lane: int, way: float) -> float:
+        """Time from when the block of a lane has slid some way [m] until its middle is over the lip [s]."""
+        return self.slide_time(lane, self.loads[lane].away) - self.slide_time(lane, way)
 
 
 def driven(scene: mujoco.MjSpec, name: str) -> str:

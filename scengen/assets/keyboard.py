@@ -64,6 +64,10 @@ class Keyboard(Prop):
         along = ROWS[row].index(letter) + STAGGER * row - (len(ROWS[0]) - 1) / 2
         return np.array([(1 - row) * self.pitch, -along * self.pitch, self.height])
 
+    def outside(self, offset: Vec3) -> float:
+        """Distance of a place beyond the outline, seen from above; `offset` is in the keyboard's axes [m]."""
+        return float((np.abs(offset) - self.size / 2)[:2].max())
+
     def under(self, spot: Vec3) -> str | None:
         """Letter of the cap below a point, which is in the keyboard's axes [m]; None between caps."""
         over = [letter for letter in LETTERS if np.all(np.abs(spot[:2] - self.at(letter)[:2]) <= self.cap / 2)]
@@ -81,6 +85,12 @@ class Keyboard(Prop):
             write(
                 key, letter, [0.0, 0.0, 0.0], PRINT_SIZE * self.cap, STROKE_HALF_WIDTH, LETTER_COLOUR, f"print_{letter}"
             )
+
+
+def disable(scene: mujoco.MjSpec, keyboard: str, letter: str) -> None:
+    """Let a key of a keyboard in a scene give way: nothing touches it."""
+    cap = scene.geom(f"{keyboard}/cap_{letter}")
+    cap.contype = cap.conaffinity = 0
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ from typing import Self
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..geometry import Outline, corners
 from ..params import param
 from .prop import Prop, Rgba, show, solid
 
@@ -91,6 +93,10 @@ class LPiece(Prop):
             (0.0, (self.lying - self.length) / 2, self.width, self.lying),
             ((self.upright - self.width) / 2, self.lying / 2, self.upright, self.length - self.lying),
         )
+
+    def outlines(self, pos: ArrayLike, yaw: float) -> list[Outline]:
+        """Outlines of both parts, seen from above, of a piece at `pos` [m] with a `yaw` [rad]."""
+        return [corners(pos, yaw, part[2:], part[:2]) for part in self.parts]
 
     @property
     def centroid(self) -> Point:

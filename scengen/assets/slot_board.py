@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from ..geometry import Outline, Vec3, corners
 from ..params import param
 from .prop import PRIORITY, Prop, Rgba, shown, solid, table
 
@@ -86,6 +87,15 @@ class SlotBoard(Prop):
         diagonal = math.hypot(self.slot, long)
         return max(0.0, math.acos(min(1.0, width / diagonal)) - math.atan2(long, self.slot))
 
+    def outline(self, pin: Vec3, yaw: float) -> Outline:
+        """Outline of the board without its arm, seen from above.
+
+        Args:
+            pin: position of the pin [m].
+            yaw: direction of the slot [rad].
+        """
+        return corners(pin, yaw, [self.depth, self.width], [self.depth / 2 - self.pivot, 0.0])
+
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         hinge = mujoco.mjtJoint.mjJNT_HINGE
         body.add_joint(name="hinge", type=hinge, axis=[0, 0, 1], damping=DAMPING, armature=ARMATURE)
@@ -123,16 +133,16 @@ class SlotBoard(Prop):
             return [(back, inner), (back, outer), (front, outer), (front, inner + off), (front + cut, inner)]
 
         for wall, sign in (("left", 1.0), ("right", -1.0)):
-            corners = [(x, y, z) for x, y in profile(sign * half, sign * side) for z in (GROUND_CLEARANCE, self.top)]
-            self._add_mesh(body, spec, f"{name}_{wall}", corners)
+            points = [(x, y, z) for x, y in profile(sign * half, sign * side) for z in (GROUND_CLEARANCE, self.top)]
+            self._add_mesh(body, spec, f"{name}_{wall}", points)
         for wall, inner, outer in (("bottom", low, GROUND_CLEARANCE), ("roof", high, self.top)):
-            corners = [(x, y, z) for x, z in profile(inner, outer) for y in (-end, end)]
-            self._add_mesh(body, spec, f"{name}_{wall}", corners)
+            points = [(x, y, z) for x, z in profile(inner, outer) for y in (-end, end)]
+            self._add_mesh(body, spec, f"{name}_{wall}", points)
 
     def _add_mesh(
-        self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, corners: Sequence[Sequence[float]]
+        self, body: mujoco.MjsBody, spec: mujoco.MjSpec, name: str, points: Sequence[Sequence[float]]
     ) -> None:
-        spec.add_mesh(name=name, uservert=np.array(corners).ravel().tolist())
+        spec.add_mesh(name=name, uservert=np.array(points).ravel().tolist())
         self._add_solid(body, name, (), type=mujoco.mjtGeom.mjGEOM_MESH).meshname = name
 
     def _add_solid(

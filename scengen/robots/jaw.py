@@ -8,6 +8,8 @@ once per period and sees their end up to 10 ms later.
 
 import math
 
+from ..physics import GRAVITY
+
 # --- sizes: the collision geometry of panda_gripper.xml, to 0.5 mm --------------------------
 
 OPENING = 0.079
@@ -76,6 +78,17 @@ def pinch(width: float) -> float:
     fingers' weight.
     """
     return min(STIFFNESS * (width + OVERLAP), 2 * MAX_FORCE)
+
+
+def droop(mass: float, lever: float, width: float) -> float:
+    """Torque of a held body's weight about the pads, over the torque that they resist: above 1 the body turns.
+
+    Args:
+        mass: mass of the body [kg].
+        lever: level distance of its centre of mass from the pads [m].
+        width: width of the body between the pads [m].
+    """
+    return GRAVITY * mass * lever / (pinch(width) * PAD / 2)
 
 
 def time_to_touch(width: float, gap: float = OPENING) -> float:

@@ -1,10 +1,12 @@
 """Moves of a two-finger jaw: pick up, put down, poke, and their parts. See `motion`."""
 
 from collections.abc import Generator
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3
 from ..scenario import Action, Plan
 from ..sim.arm import Arm
@@ -23,6 +25,7 @@ from .motion import (
     retreat,
     until,
 )
+from .waiting import at_most
 
 Wrench = NDArray[np.float64]
 """Force [N] and torque [N m], shape (6,)."""
@@ -42,6 +45,12 @@ def grasp(arm: Arm, seconds: float = GRASP_TIME) -> Plan:
 def release(arm: Arm, seconds: float = RELEASE_TIME) -> Plan:
     """Open the jaw in place."""
     yield from hold(arm, seconds, OPEN)
+
+
+def let_go(arm: Arm, up: float = 0.10, seconds: float = RELEASE_TIME, pace: Pace = COARSE) -> Plan:
+    """Open the jaw in place, and move straight up by `up` [m]."""
+    yield from release(arm, seconds)
+    yield from retreat(arm, up, pace)
 
 
 def pick(
@@ -67,6 +76,25 @@ def pick(
     yield from come_down(arm, at, closing, above, pace)
     yield from grasp(arm, squeeze)
     yield from retreat(arm, lift)
+
+
+def snatch(arm: Arm, at: ArrayLike, closing: ArrayLike, to: ArrayLike) -> Plan:
+    """Come down on an object as far as it lets the fingers, pinch, lift, and release at a place what has come along.
+
+    Args:
+        arm: the arm.
+        at: position of the grip site to which the hand comes down, for 2 s at most [m].
+        closing: level direction along which the fingers close.
+        to: position at which the jaw opens [m]. If the object does not come along, and holds the jaw, it opens there.
+    """
+    target = np.asarray(at, float)
+    yield from go_to(arm, target + 0.10 * UP, closing_along(arm, closing), COARSE, OPEN)
+    yield from at_most(arm.world, 2.0, go_to(arm, target, pace=FINE))
+    yield from grasp(arm, 0.5)
+    with suppress(GaveUp):
+        yield from retreat(arm, 0.12)
+        yield from go_to(arm, to)
+    yield from release(arm)
 
 
 def come_down(arm: Arm, at: ArrayLike, closing: ArrayLike, above: float = 0.10, pace: Pace = FINE) -> Plan:

@@ -20,10 +20,10 @@ from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
+from .pace import APPROACH_RATE, Manner, Pace, approach
 from .pace import COARSE as COARSE
 from .pace import FINE as FINE
 from .pace import STEADY as STEADY
-from .pace import Manner, Pace
 
 OPEN = -1.0
 """Gripper command: jaw open, or suction off."""
@@ -137,7 +137,7 @@ def go_to(arm: Arm, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = STEADY
             raise GaveUp(f"the hand stayed {short} of its target ({place}) m for {pace.give_up:g} s{_touching(arm)}")
         ahead = goal - setpoint
         distance = math.sqrt(ahead @ ahead)
-        speed = min(pace.speed, 4.0 * distance)
+        speed = min(pace.speed, APPROACH_RATE * distance)
         velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)
         setpoint = setpoint + velocity * Loop.PERIOD
         if not manner.styled:
@@ -162,9 +162,7 @@ def stay(arm: Arm, pos: ArrayLike, rot: Mat3, until: Condition, pace: Pace = STE
     """
     goal, setpoint, more = np.asarray(pos, float), arm.hand, np.zeros(3)
     while not until():
-        ahead = goal - setpoint
-        distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (min(pace.speed, 4.0 * distance) / max(distance, 1e-9))
+        velocity = approach(goal - setpoint, pace.speed)
         setpoint = setpoint + velocity * Loop.PERIOD
         left, turn = goal - arm.hand, between(arm.hand_rot, rot)
         if max(math.sqrt(left @ left) / INTEGRAL_RANGE, math.sqrt(turn @ turn) / INTEGRAL_ANGLE) < 1.0:

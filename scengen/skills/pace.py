@@ -16,6 +16,8 @@ MIN_DETOUR_LENGTH = 0.10
 """Length of the shortest move through free space that is displaced [m]."""
 DISPLACED_TIME = 0.3
 """Time for which the commanded position is displaced [s]."""
+APPROACH_RATE = 4.0
+"""Speed limit of a setpoint per metre of remaining distance [1/s]."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,19 @@ STEADY = Pace(0.25, 0.005)
 """Pace of a move to a place beside objects."""
 FINE = Pace(0.15, 0.003)
 """Pace of a move up to an object that is to be grasped, put down or touched."""
+
+
+def approach(ahead: Vec3, speed: float, share: float = 1.0, rate: float = APPROACH_RATE) -> Vec3:
+    """Velocity of a setpoint that goes straight to its target and slows down before it [m/s].
+
+    Args:
+        ahead: way from the setpoint to its target [m].
+        speed: largest speed [m/s].
+        share: share of the speed at which it goes now.
+        rate: speed limit per metre of remaining distance [1/s].
+    """
+    distance = math.sqrt(ahead @ ahead)
+    return ahead * (share * min(speed, rate * distance) / max(distance, 1e-9))
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,13 @@ from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, rotation
 from ..scenario import Action, Plan
-from ..sim.arm import Arm
-from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, hold, retreat, steer
+from ..sim.arm import ROBOT, Arm
+from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, go_to, hold, push, retreat, steer
+from .pace import approach
+from .waiting import at_most
 
+ABOVE = 0.03
+"""Height above a face from which the cup comes down on it [m]."""
 FIRMLY = 0.15
 """Time that the cup must hold on before a piece is lifted [s]."""
 BRAKE = 6.0
@@ -36,6 +40,12 @@ SQUARED = 2.0
 """Longest time of squaring up [s]: under noise the mean error may stay above `SQUARE`."""
 ADDING = 2.0
 """Integral gain of the error of a hand that is squared up [1/s]; at 4 the hand swings by a degree to either side."""
+
+
+def take(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, above: float = ABOVE, pace: Pace = STEADY) -> Plan:
+    """Come down on a face at `spot` [m] from `above` it [m], and take hold of it with the cup; see `suck`."""
+    yield from go_to(arm, spot + above * UP, rot, pace, OPEN)
+    yield from suck(arm, spot, rot, speed)
 
 
 def suck(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, give_up: float = 3.0) -> Plan:
@@ -91,6 +101,34 @@ def suck_upright(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.02, give_up: 
         else:
             setpoint, aim = arm.hand, arm.hand_rot
             yield firm(arm, setpoint, -speed * along, np.zeros(3))
+
+
+def press_on(arm: Arm, along: Vec3, speed: float, face: str) -> Plan:
+    """Press the cup along a direction onto a face of a name, for 2 s at most, until it holds.
+
+    Raises:
+        GaveUp: the cup did not take hold.
+    """
+    yield from at_most(arm.world, 2.0, push(arm, speed * along, lambda: arm.sealed, CLOSED))
+    yield from hold(arm, 0.3, CLOSED)
+    if not arm.sealed:
+        raise GaveUp(f"the cup did not get hold of {face}")
+
+
+def put(arm: Arm, body: str, spot: Vec3, pace: Pace, speed: float = 0.04) -> Plan:
+    """Bring the cup over `spot` [m], for 4 s at most, lower it until its body touches something, let go, move up.
+
+    Args:
+        arm: the arm.
+        body: the body that hangs on the cup.
+        spot: the place; its height does not count [m].
+        pace: pace of the way there.
+        speed: speed of the way down [m/s].
+    """
+    yield from at_most(arm.world, 4.0, go_to(arm, [spot[0], spot[1], arm.hand[2]], pace=pace))
+    yield from push(arm, -speed * UP, lambda: arm.world.touching_bodies(body) > {ROBOT}, give_up=8.0)
+    yield from let_go(arm)
+    yield from retreat(arm)
 
 
 def let_go(arm: Arm) -> Plan:
@@ -156,8 +194,6 @@ def carry_to(
             aim, setpoint = aim + shift, setpoint + shift
         lag = max(0.0, float((setpoint - arm.hand) @ way))
         setpoint = setpoint - max(0.0, lag - slack) * way
-        ahead = aim - setpoint
-        distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (max(0.0, 1.0 - lag / slack) * min(pace.speed, BRAKE * distance) / max(distance, 1e-9))
+        velocity = approach(aim - setpoint, pace.speed, max(0.0, 1.0 - lag / slack), BRAKE)
         setpoint = setpoint + velocity * Loop.PERIOD
         yield firm(arm, setpoint, velocity, between(arm.hand_rot, aim_rot))

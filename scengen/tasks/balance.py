@@ -34,18 +34,18 @@ import numpy as np
 
 from ..assets.inlaid_rod import InlaidRod
 from ..assets.ridge import Ridge
-from ..control.loop import Loop
 from ..geometry import UP, Mat3, about_z, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, rests_on
+from ..predicates import count_time, fallen, rests_on
 from ..robots.jaw import OPEN_GAP, pinch
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.jaw import carry, pick, release
+from ..skills.jaw import carry, let_go, pick
 from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, go_to, hold, push, retreat, turn_to, wait
+from ..skills.waiting import elapsed
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
 RELEASE_TIME = 0.1
@@ -108,7 +108,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
         if self.released(world):
             return
         alone = world.touching("rod", RIDGE) and not world.touching(ROBOT, "rod")
-        world.memory["alone"] = world.memory["alone"] + Loop.PERIOD if alone else 0.0
+        count_time(world, "alone", alone)
 
     def pending(self, world: World) -> bool:
         return False
@@ -143,8 +143,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
 
     def leave(self, world: World) -> Plan:
         """Open the jaw and go straight up, slowly while the fingers are beside the rod."""
-        yield from release(world.arm, 0.3)
-        yield from retreat(world.arm, 0.03, Pace(0.05, 0.003))
+        yield from let_go(world.arm, 0.03, seconds=0.3, pace=Pace(0.05, 0.003))
         yield from retreat(world.arm, 0.06)
 
     def bring(self, world: World, across: float, height: float = 0.004) -> Plan:
@@ -221,8 +220,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
         arm, across = world.arm, self.normal
         yield from go_to(arm, arm.hand - 0.05 * across)
         yield from push(arm, SLIDE_SPEED * across, until=lambda: bool((world.com("rod") - self.top) @ across > -0.012))
-        end = world.time + 0.25
-        yield from push(arm, SLIDE_SPEED * across, until=lambda: world.time > end, grip=OPEN)
+        yield from push(arm, SLIDE_SPEED * across, until=elapsed(world, 0.25), grip=OPEN)
         yield from retreat(arm, 0.08)
 
     def _lay(self, world: World) -> Plan:

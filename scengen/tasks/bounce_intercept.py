@@ -41,12 +41,11 @@ import mujoco
 import numpy as np
 
 from ..assets.ball import Ball
-from ..assets.enclosure import BOUNCE_TIME, Enclosure, Way
-from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
+from ..assets.enclosure import MAT_SIZE, Enclosure, PlacedEnclosure, Way, lay_mat
+from ..assets.prop import TABLE_TOP, place, table
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, corners, heading, polar, way_to
+from ..geometry import UP, Vec3, heading, polar, way_to
 from ..params import param
-from ..physics import GRAVITY, SPIN, slipping
 from ..robots import jaw
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require
@@ -68,7 +67,6 @@ from .launched_ball import (
 )
 
 CATCHABLE_DISTANCE = 0.06  # distance of the ball's centre from the walls from which on it may be caught [m]
-MAT_SIZE = (0.39, 0.39, 0.002)  # half length, half width and height of the mat [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,11 +89,8 @@ class BounceIntercept(LaunchedBall):
 
     def build(self) -> mujoco.MjSpec:
         scene = table()
-        mat = scene.worldbody.add_body(name="mat", pos=[0.0, 0.0, TABLE_TOP + MAT_SIZE[2] / 2])
-        size = [MAT_SIZE[0], MAT_SIZE[1], MAT_SIZE[2] / 2]
-        smooth = {"friction": self.friction, "condim": 3 if self.friction else 1, "priority": PRIORITY + 1}
-        solid(mat, "mat", size, rgba=(0.30, 0.33, 0.38, 1.0), **smooth)
-        place(scene, self.enclosure, "enclosure", self.mouth, self.turned, free=False)
+        lay_mat(scene, self.friction)
+        place(scene, self.enclosure, "enclosure", self.placed.mouth, self.turned, free=False)
         place(scene, self.ball, "ball", self.start)
         remember(scene, *MEMORY, "bounces", "at_wall")
         return scene
@@ -121,7 +116,7 @@ class BounceIntercept(LaunchedBall):
         if world.touching(ROBOT, "ball") and not world.memory["bounces"]:
             return Strict("the robot touched the ball before it was thrown back")
         first = world.touching(ROBOT, "ball") and not world.memory["first_touch"]
-        if first and self._wall_distance(world.com("ball")) < CATCHABLE_DISTANCE:
+        if first and self.placed.wall_distance(world.com("ball")) < CATCHABLE_DISTANCE:
             return Strict("the robot touched the ball at a wall")
         return None
 
@@ -213,12 +208,11 @@ class BounceIntercept(LaunchedBall):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        width, enclosure = 2 * self.ball.radius, self.enclosure
+        width, placed = 2 * self.ball.radius, self.placed
         yield on_table("the ball", self.start, EDGE_MARGIN)
-        middle = self.mouth + enclosure.depth / 2 * about_z(self.turned)[:, 0]
-        yield on_table("the enclosure", corners(middle, self.turned, enclosure.size))
+        yield on_table("the enclosure", placed.outline)
         yield require(width <= jaw.OPENING - 0.01, "the ball is too wide for the jaw", width=width, jaw=jaw.OPENING)
-        inside = self._in_enclosure(self.start)[0]
+        inside = placed.inside(self.start)[0]
         yield require(inside < -self.ball.radius, "the ball starts between the walls", inside=inside)
         ways = self._ways_after_launch()
         yield require(len(ways) > 1, "the ball meets no wall", aim=self.aim)
@@ -228,10 +222,9 @@ class BounceIntercept(LaunchedBall):
         late = "the hand comes too late to every place on the ball's way"
         yield require(met is not None, late, speed=self.speed, hand=HAND_SPEED)
         until = [way for way in ways if way.begins < (met[1] if met else math.inf)]
-        nearest = min(*(float(self._in_enclosure(way.at)[0]) for way in until[1:]), *map(self._end_distance, until))
+        nearest = min(*(float(placed.inside(way.at)[0]) for way in until[1:]), *map(placed.end_distance, until))
         # In a corner two walls return the ball one after the other or at once, each a part of the velocity of its own.
-        near = 2.0 * self.ball.radius
-        yield require(nearest >= near, "the ball meets the end of a wall", nearest=max(nearest, -1.0), near=near)
+        yield require(nearest >= width, "the ball meets the end of a wall", nearest=max(nearest, -1.0), near=width)
 
     def features(self) -> Mapping[str, float]:
         """Speed of the ball over that of the hand before the first and after the last wall, angle between its path and
@@ -271,7 +264,7 @@ class BounceIntercept(LaunchedBall):
             lead: time by which the hand must arrive before the ball [s].
             bounced: whether the first way already begins at a wall.
         """
-        times = np.arange(0.0, FORESIGHT_TIME, 0.05)
+        times, placed = np.arange(0.0, FORESIGHT_TIME, 0.05), self.placed
         passed = np.array([place_on(ways, t)[:2] for t in times])
 
         def path(seconds: float) -> Vec3 | None:
@@ -285,7 +278,7 @@ class BounceIntercept(LaunchedBall):
             earlier = passed[(times > now.begins - 2.0) & (times < now.begins)]
             if len(earlier) and np.hypot(*(earlier - at[:2]).T).min() < 0.10:
                 return None
-            return None if self._wall_distance(at) < 0.085 else at  # half the width of an open hand, and a clearance
+            return None if placed.wall_distance(at) < 0.085 else at  # half the width of an open hand, and a clearance
 
         def turn(seconds: float) -> float:
             _, now = way_at(ways, seconds)
@@ -295,45 +288,8 @@ class BounceIntercept(LaunchedBall):
         return min(found, key=lambda one: math.dist(one[0], hand), default=None) if bounced else next(found, None)
 
     def ways(self, at: Vec3, velocity: Vec3, surface: Vec3, restitution: float | None = None) -> list[Way]:
-        """The ball's ways from a state on, in the world.
-
-        Args:
-            at: place of the ball [m].
-            velocity: level velocity of the ball [m/s].
-            surface: velocity of its surface about its centre [m/s]: `velocity` if it rolls, 0 if it does not turn.
-            restitution: of the walls; by default the scene's.
-        """
-        axes, found, begins = about_z(self.turned), [], 0.0
-        while True:
-            if self.friction:
-                at, velocity, surface = self._as_if_rolling(at, velocity, surface)
-            inside = axes.T @ (at - self.mouth), axes.T @ velocity
-            ways = self.enclosure.ways(*inside, self.ball.radius, restitution)
-            ways = [Way(begins + w.begins, self.mouth + axes @ w.at, axes @ w.velocity) for w in ways]
-            if not self.friction or len(ways) == 1:
-                return found + ways
-            found.append(ways[0])
-            begins, at, velocity = ways[1]
-            surface = self._spin_after_bounce(velocity, surface)
-
-    def _spin_after_bounce(self, velocity: Vec3, surface: Vec3) -> Vec3:
-        """Velocity of the surface after a bounce [m/s]: the wall is smooth, but the floor brakes it meanwhile."""
-        slip = velocity - surface
-        speed = math.sqrt(slip @ slip)
-        return surface + min(1.0, self.friction * GRAVITY * BOUNCE_TIME / (SPIN * max(speed, 1e-9))) * slip
-
-    def _as_if_rolling(self, at: Vec3, velocity: Vec3, surface: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-        """State of a ball that rolls from the start and that this one equals once it no longer slips.
-
-        Returns:
-            Its place [m], velocity [m/s] and velocity of the surface [m/s].
-        """
-        slip = velocity - surface
-        if (speed := math.sqrt(slip @ slip)) < 1e-6:
-            return at, velocity, surface
-        seconds, left = slipping(speed, 0.0, self.friction)
-        rolls = velocity - (1.0 - left / speed) * slip
-        return at + seconds / 2 * (velocity - rolls), rolls, rolls
+        """The ball's ways from a state on, in the world; see `PlacedEnclosure.ways`."""
+        return self.placed.ways(at, velocity, surface, self.ball.radius, self.friction, restitution)
 
     def _ways_after_launch(self, restitution: float | None = None) -> list[Way]:
         """The ball's ways from the moment at which its motion is known."""
@@ -347,28 +303,10 @@ class BounceIntercept(LaunchedBall):
         found = self.meeting(self._ways_after_launch(1.0), PARKED_HAND)
         return math.inf if found is None else math.dist(found[0][:2], place_on(self._ways_after_launch(), found[1])[:2])
 
-    def _wall_distance(self, at: Vec3) -> float:
-        """Distance of a place from the nearest wall [m]."""
-        (along, across, _), wall = self._in_enclosure(at), self.enclosure
-        beside = math.hypot(max(0.0, -along), wall.width / 2 - abs(across))
-        return min(beside, wall.depth - along)
-
-    def _end_distance(self, way: Way) -> float:
-        """Distance from the ends of the side walls at which a way enters [m]; inf if it does not."""
-        at, velocity = self._in_enclosure(way.at), about_z(self.turned).T @ way.velocity
-        if at[0] >= 0.0 or velocity[0] <= 0.0:
-            return math.inf
-        return self.enclosure.width / 2 - abs(float(at[1] - at[0] / velocity[0] * velocity[1]))
-
-    def _in_enclosure(self, at: Vec3) -> Vec3:
-        """A place in the axes of the enclosure [m]."""
-        return about_z(self.turned).T @ (at - self.mouth)
-
     @property
-    def mouth(self) -> Vec3:
-        """Middle of the opening [m]."""
-        middle = np.array([0.10, 0.0, self.floor])  # of the enclosure, beyond the middle of the table
-        return middle - self.enclosure.depth / 2 * about_z(self.turned)[:, 0]
+    def placed(self) -> PlacedEnclosure:
+        """The enclosure in its place, beyond the middle of the table."""
+        return PlacedEnclosure.about(self.enclosure, np.array([0.10, 0.0, self.floor]), self.turned)
 
     @property
     def turned(self) -> float:

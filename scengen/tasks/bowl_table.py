@@ -31,31 +31,30 @@ pads on the bead 5 mm along it, foot in the square 32 mm.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from ..assets.bowl import Bowl
+from ..assets.bowl import Bowl, closed
 from ..assets.patch import TURNED_OVER, Patch
-from ..assets.prop import TABLE_TOP, place, solid, table
+from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ring_rack import RingRack
-from ..errors import GaveUp
-from ..geometry import UP, Mat3, Vec3, about_y, about_z, corners, gap, shortest, way_to
+from ..geometry import AHEAD, UP, Mat3, Vec3, about_y, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch
+from ..robots.jaw import OPENING, TIP_BELOW, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
-from ..skills import jaw, motion, suction
-from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over
-from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, turn_to, until, with_arm
+from ..skills import handover, jaw, motion, suction
+from ..skills.handover import FORWARDS, LEFT, SIDEWAYS, STAND_OFF, hand_over, parking
+from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, turn_to, until, with_arm
+from ..skills.waiting import at_most, elapsed
 
 UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a bowl that stands [rad]
 FALL_ANGLE = math.radians(30.0)
@@ -66,7 +65,6 @@ MAX_FALL_SPEED = 0.40  # speed of a fall above which the bowl breaks [m/s]
 RIM_CLEARANCE = 0.004  # gap between the rim and the ring [m]
 DOME_CLEARANCE = 0.012
 """Gap between the dome and the ring at the ring's upper edge [m]: a finger is 15 mm thick at its tip."""
-X_AXIS: Vec3 = np.array([1.0, 0.0, 0.0])  # unit vector away from the robot
 HANDOVER_POINT: Vec3 = np.array([-0.10, -0.03, TABLE_TOP + 0.32])
 """Position of the middle of the bowl's foot during the handover [m]."""
 PARKED_HAND: Vec3 = np.array([-0.15, -0.35, TABLE_TOP + 0.35])
@@ -99,14 +97,9 @@ class BowlTable(Scenario):
 
     @property
     def rack(self) -> RingRack:
-        """Rack that fits the bowl."""
-        return RingRack(radius=self.bowl.radius + RIM_CLEARANCE, height=self.ring_height, plinth=self.plinth)
-
-    @property
-    def ring_height(self) -> float:
-        """Height of the ring [m]: at its upper edge the dome is `DOME_CLEARANCE` from it."""
-        bowl = self.bowl
-        return bowl.depth - bowl.centre + math.sqrt(bowl.outer**2 - (bowl.radius + RIM_CLEARANCE - DOME_CLEARANCE) ** 2)
+        """Rack that fits the bowl: at the ring's upper edge the dome is `DOME_CLEARANCE` from it."""
+        height = self.bowl.dome_height(self.bowl.radius + RIM_CLEARANCE - DOME_CLEARANCE)
+        return RingRack(radius=self.bowl.radius + RIM_CLEARANCE, height=height, plinth=self.plinth)
 
     def _scene(self, bowl: Bowl) -> mujoco.MjSpec:
         scene = table()
@@ -128,8 +121,7 @@ class BowlTable(Scenario):
             return Strict("the bowl was dropped")
         touched, tilt = world.touching_bodies("bowl") - {ROBOT}, world.tilt("bowl")
         stored = touched == {"rack"} and tilt > math.pi - FALL_ANGLE
-        askew = touched and tilt > FALL_ANGLE and not stored
-        if askew:
+        if touched and tilt > FALL_ANGLE and not stored:
             return Strict("the bowl lay on its side or upside down")
         loose = FALL_ANGLE < tilt < TURNED_UP and not self.rim_held(world)
         return Strict("the bowl was turned up without the jaw on its rim") if loose else None
@@ -137,8 +129,7 @@ class BowlTable(Scenario):
     def rim_held(self, world: World) -> bool:
         """Whether the rim is between the closed fingers of the jaw."""
         jaw_arm = world.arms[1]
-        x, y, z = world.rot("bowl").T @ (jaw_arm.hand - world.pos("bowl"))
-        away = math.hypot(math.hypot(x, y) - self.bowl.radius + self.bowl.bead / 2, z - self.bowl.depth)
+        away = self.bowl.rim_distance(world.rot("bowl").T @ (jaw_arm.hand - world.pos("bowl")))
         return away < RIM_REACH and self.bowl.bead / 2 < jaw_arm.gap < self.bowl.bead + RIM_REACH
 
     # --- oracle ---------------------------------------------------------------------------
@@ -149,14 +140,12 @@ class BowlTable(Scenario):
         yield from alone(right, self.extract(right))
         yield from motion.together(world, self.present(right), self.wait_beside(left))
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS, RIM_OVERLAP)
-        yield from motion.together(world, self.park(right), self.turn_up(left))
+        yield from motion.together(world, handover.draw_back(right, PARKED_HAND, STEADY), self.turn_up(left))
         yield from alone(left, self.put_down(left))
 
     def extract(self, arm: Arm) -> Plan:
         """Suck the bowl by its foot and pull it out over the middle of the ring: a rim that rubs there peels it off."""
-        foot, down = arm.world.pos("bowl"), facing_down()
-        yield from go_to(arm, foot + 0.03 * UP, down, STEADY, OPEN)
-        yield from suction.suck(arm, foot, down)
+        yield from suction.take(arm, arm.world.pos("bowl"), facing_down())
         above = [*self.start[:2], arm.world.pos("bowl")[2] + self.rack.height + 0.02]
         yield from suction.carry_to(arm, "bowl", np.array(above), arm.world.rot("bowl"), Pace(0.10, 0.004))
 
@@ -164,9 +153,8 @@ class BowlTable(Scenario):
         """Hold the bowl out so that the uppermost part of its rim is level where the jaw takes it."""
         yield from go_to(arm, [*arm.hand[:2], HANDOVER_POINT[2]], pace=Pace(0.15, 0.02))
         yield from go_to(arm, HANDOVER_POINT, pace=Pace(0.20, 0.02))
-        yield from turn_to(arm, motion.facing(math.pi / 2, self.slope), 0.8)
-        held_out = shortest(arm.world.rot("bowl")[:, 2], self.opening) @ arm.world.rot("bowl")
-        yield from suction.carry_to(arm, "bowl", HANDOVER_POINT, held_out, CARRY_PACE)
+        yield from turn_to(arm, motion.facing(math.pi / 2, self.bowl.bead_slope), 0.8)
+        yield from handover.hold_out(arm, "bowl", HANDOVER_POINT, self.opening, CARRY_PACE)
 
     def wait_beside(self, arm: Arm) -> Plan:
         """Bring the open jaw beside the place where the rim is going to be."""
@@ -175,34 +163,17 @@ class BowlTable(Scenario):
 
     def rim(self, world: World) -> Vec3:
         """Uppermost point of the rim of a bowl that is held out, at half the rim's thickness [m]."""
-        axis = world.rot("bowl")[:, 2]
-        up = (UP - axis[2] * axis) / math.hypot(axis[0], axis[1])
-        return world.pos("bowl") + self.bowl.depth * axis + (self.bowl.radius - self.bowl.bead / 2) * up
-
-    def park(self, arm: Arm) -> Plan:
-        """Draw the cup back, and take its hand out of the way."""
-        yield from go_to(arm, arm.hand - 0.08 * arm.hand_rot[:, 2], pace=STEADY)
-        yield from go_to(arm, PARKED_HAND, pace=COARSE)
+        return self.bowl.rim_top(world.pos("bowl"), world.rot("bowl"))
 
     def turn_up(self, arm: Arm) -> Plan:
         """Turn the opening up, and the hand to the robot's side of the bowl, where its palm meets no rack."""
         # 60 of the 90 deg from the bowl's right to the robot's side: at 90 with a drooping bowl joint 5 meets its limit
-        yield from turn_to(arm, about_z(-math.radians(60.0)) @ self.upright_hand(arm), 1.0)
-
-    def upright_hand(self, arm: Arm) -> Mat3:
-        """Orientation of the hand in which the bowl that it holds is upright."""
-        return shortest(arm.world.rot("bowl")[:, 2], UP) @ arm.hand_rot
+        yield from turn_to(arm, about_z(-math.radians(60.0)) @ handover.upright_hand(arm, "bowl"), 1.0)
 
     def put_down(self, arm: Arm) -> Plan:
         """Bring the bowl over the square, lower it until its foot is on the table, and release it."""
-        world = arm.world
-        for height in (0.18, 0.02):  # levelled twice: the bowl droops all the time, and by 7 deg at every jerk
-            yield from turn_to(arm, self.upright_hand(arm), 0.8)
-            com = self.goal + (height + world.com("bowl")[2] - world.pos("bowl")[2]) * UP
-            yield from jaw.carry(arm, "bowl", com, pace=CARRY_PACE)
-        yield from push(arm, -LOWER_SPEED * UP, lambda: world.touching("bowl", "table"))
-        yield from jaw.release(arm)
-        yield from motion.retreat(arm)
+        heights = (0.18, 0.02)  # levelled twice: the bowl droops all the time, and by 7 deg at every jerk
+        yield from handover.stand_up(arm, "bowl", self.goal, heights, CARRY_PACE, LOWER_SPEED)
 
     # --- what must not work ---------------------------------------------------------------
 
@@ -213,8 +184,8 @@ class BowlTable(Scenario):
             "cup_flings_it": Shortcut(self._fling),
             "cup_rights_it_in_the_rack": Shortcut(self._right_in_rack),
             "cup_on_the_dome": Shortcut(self._turn_by_dome),
-            "jaw_on_the_dome": Shortcut(lambda world: self._with_cup_parked(world, self._pinch_dome), to_rest=True),
-            "jaw_pries_it_out": Shortcut(lambda world: self._with_cup_parked(world, self._pry_out)),
+            "jaw_on_the_dome": Shortcut(parking(0, PARKED_HAND, self._pinch_dome), to_rest=True),
+            "jaw_pries_it_out": Shortcut(parking(0, PARKED_HAND, self._pry_out)),
             "jaw_leaves_it_turned": Shortcut(self._put_down_on_side),
         }
 
@@ -222,19 +193,19 @@ class BowlTable(Scenario):
     def _set_down(self, arm: Arm) -> Plan:
         """Put the bowl on the square with the cup, upside down."""
         yield from self.extract(arm)
-        yield from self._lower(arm, self.goal)
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     @with_arm(0)
     def _tip_over(self, arm: Arm) -> Plan:
         """Turn the bowl as far as the cup's hand goes, and put it on the square on its side: it would rock upright."""
         yield from self._turn_with_cup(arm, self.goal + 0.20 * UP, FORWARDS)
-        yield from self._lower(arm, self.goal + 0.05 * X_AXIS)  # as far as the foot comes back when the bowl rocks up
+        yield from suction.put(arm, "bowl", self.goal + 0.05 * AHEAD, CARRY_PACE)  # as far as the foot rocks back up
 
     @with_arm(0)
     def _fling(self, arm: Arm) -> Plan:
         """Turn the bowl fast and let go in the middle of the turn, so that it turns on as it falls."""
         yield from self.extract(arm)
-        yield from go_to(arm, self.goal - 0.06 * X_AXIS + 0.20 * UP, pace=Pace(0.2, 0.02))
+        yield from go_to(arm, self.goal - 0.06 * AHEAD + 0.20 * UP, pace=Pace(0.2, 0.02))
         turn = turn_to(arm, about_y(-math.radians(20.0)) @ FORWARDS, 3.0)  # forwards and 20 deg up
         yield from until(turn, lambda: arm.world.tilt("bowl") < math.radians(110.0))
         yield from suction.let_go(arm)
@@ -245,61 +216,39 @@ class BowlTable(Scenario):
         out = (UP - LEFT) / math.sqrt(2.0)
         spot = arm.world.pos("bowl") - self.bowl.centre * UP + self.bowl.outer * out
         yield from go_to(arm, spot + 0.04 * out, motion.facing(math.pi / 2, math.pi / 4), STEADY, OPEN)
-        yield from until(push(arm, -LOWER_SPEED * out, lambda: arm.sealed, motion.CLOSED), _elapsed(arm.world, 2.0))
-        yield from motion.hold(arm, 0.3, motion.CLOSED)
-        if not arm.sealed:
-            raise GaveUp("the cup did not get hold of the dome")
+        yield from suction.press_on(arm, -out, LOWER_SPEED, "the dome")
         yield from go_to(arm, arm.hand + 0.25 * UP, pace=CARRY_PACE)
         yield from turn_to(arm, facing_down(), 0.6)
-        yield from until(turn_to(arm, motion.facing(-math.pi / 2, 0.0), 0.6, give_up=7.0), _elapsed(arm.world, 6.0))
-        yield from self._lower(arm, self.goal)
+        yield from at_most(arm.world, 6.0, turn_to(arm, motion.facing(-math.pi / 2, 0.0), 0.6, give_up=7.0))
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     @with_arm(0)
     def _right_in_rack(self, arm: Arm) -> Plan:
         """Lay the bowl on the rack on its side: it would rock upright there. Bring it to the square by its inside."""
         yield from self._turn_with_cup(arm, self.foot + (self.rack.top + 0.15) * UP, FORWARDS)
-        yield from self._lower(arm, self.foot)
+        yield from suction.put(arm, "bowl", self.foot, CARRY_PACE)
         floor = arm.world.pos("bowl") + self.bowl.floor * UP
-        yield from go_to(arm, floor + 0.10 * UP, facing_down(), COARSE, OPEN)
-        yield from suction.suck(arm, floor, facing_down())
+        yield from suction.take(arm, floor, facing_down(), above=0.10, pace=COARSE)
         yield from go_to(arm, arm.hand + 0.10 * UP, pace=CARRY_PACE)
-        yield from self._lower(arm, self.goal)
+        yield from suction.put(arm, "bowl", self.goal, CARRY_PACE)
 
     def _turn_with_cup(self, arm: Arm, above: Vec3, rot: Mat3) -> Plan:
         """Pull the bowl out, bring it to `above` [m], and turn the hand towards `rot` as far as it goes."""
         yield from self.extract(arm)
         yield from go_to(arm, [*arm.hand[:2], above[2]], pace=CARRY_PACE)
-        yield from go_to(arm, above - self.bowl.depth / 2 * X_AXIS, pace=CARRY_PACE)
-        yield from until(turn_to(arm, rot, 0.6, give_up=7.0), _elapsed(arm.world, 6.0))
-
-    def _lower(self, arm: Arm, spot: Vec3) -> Plan:
-        """Bring the cup over `spot` [m] and down until the bowl touches something; let go."""
-        yield from until(go_to(arm, [spot[0], spot[1], arm.hand[2]], pace=CARRY_PACE), _elapsed(arm.world, 4.0))
-        yield from push(arm, -LOWER_SPEED * UP, lambda: arm.world.touching_bodies("bowl") > {ROBOT}, give_up=8.0)
-        yield from suction.let_go(arm)
-        yield from motion.retreat(arm)
-
-    def _with_cup_parked(self, world: World, plan: Callable[[Arm], Plan]) -> Plan:
-        """Run a plan of the jaw's arm while the cup's hand goes out of its way: both would reach for the rack."""
-        right, left = world.arms
-        yield from motion.together(world, go_to(right, PARKED_HAND, pace=COARSE), plan(left))
+        yield from go_to(arm, above - self.bowl.depth / 2 * AHEAD, pace=CARRY_PACE)
+        yield from at_most(arm.world, 6.0, turn_to(arm, rot, 0.6, give_up=7.0))
 
     def _pinch_dome(self, arm: Arm) -> Plan:
         """Pinch the dome with the jaw, as far down as it opens, lift, and bring the bowl to the square."""
         across, below = (math.sqrt(self.bowl.outer**2 - r**2) for r in (OPENING / 2, self.bowl.foot))
         grip = arm.world.pos("bowl") + (TIP_BELOW + across - below) * UP
-        yield from go_to(arm, grip + 0.10 * UP, motion.closing_along(arm, LEFT), COARSE, OPEN)
-        yield from until(go_to(arm, grip, pace=motion.FINE), _elapsed(arm.world, 2.0))  # the dome may stop it higher
-        yield from jaw.grasp(arm, 0.5)
-        with suppress(GaveUp):  # if the pads do not slip off, the bowl stays in the rack, and they on it
-            yield from motion.retreat(arm, 0.12)
-            yield from go_to(arm, self.goal + 0.10 * UP)
-        yield from jaw.release(arm)
+        yield from jaw.snatch(arm, grip, LEFT, self.goal + 0.10 * UP)  # the dome may stop it higher, or slip out
 
     def _pry_out(self, arm: Arm) -> Plan:
         """Push the part of the bowl above the ring with closed fingers, up and to the other side; pinch the dome."""
         beside = self.foot + (self.rack.top + TIP_BELOW) * UP + (self.rack.radius + 0.02) * LEFT
-        yield from jaw.poke(arm, beside, 0.15 * (0.2 * UP - LEFT), _elapsed(arm.world, 4.0))
+        yield from jaw.poke(arm, beside, 0.15 * (0.2 * UP - LEFT), elapsed(arm.world, 4.0))
         yield from self._pinch_dome(arm)
 
     def _put_down_on_side(self, world: World) -> Plan:
@@ -308,24 +257,21 @@ class BowlTable(Scenario):
         yield from alone(right, self.extract(right))
         yield from motion.together(world, self.present(right), self.wait_beside(left))
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS, RIM_OVERLAP)
-        yield from alone(right, self.park(right))
-        com = self.goal + (self.bowl.radius + 0.01) * UP
-        yield from alone(left, jaw.carry(left, "bowl", com, pace=CARRY_PACE))
+        yield from alone(right, handover.draw_back(right, PARKED_HAND, STEADY))
+        yield from alone(left, jaw.carry(left, "bowl", self.goal + (self.bowl.radius + 0.01) * UP, pace=CARRY_PACE))
         yield from alone(left, jaw.release(left))
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """With a hole in its foot the cup does not hold the bowl; with a lid on the bowl the jaw finds no rim."""
-        lidded = self.build()
-        size, pos = [self.bowl.radius - self.bowl.bead, 0.001], [0.0, 0.0, self.bowl.depth - 0.001]
-        solid(lidded.body("bowl"), "lid", size, pos, type=mujoco.mjtGeom.mjGEOM_CYLINDER, mass=0.0)
-        return {"holed_foot": self._scene(replace(self.bowl, hole=0.020)), "lidded": lidded}
+        holed = self._scene(replace(self.bowl, hole=0.020))
+        return {"holed_foot": holed, "lidded": closed(self.build(), "bowl", self.bowl)}
 
     # --- what must hold -------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        bowl, rack, ring = self.bowl, self.rack, self.ring_height
+        bowl, rack = self.bowl, self.rack
         # 8 mm is twice the clearance: so the rim stays in the ring wherever the bowl is pushed.
-        yield require(ring > 0.008, "the ring is too low to keep the bowl", height=ring)
+        yield require(rack.height > 0.008, "the ring is too low to keep the bowl", height=rack.height)
         yield on_table("the rack", corners(self.foot, 0.0, 2 * [2 * rack.outer]))
         yield on_table("the square", corners(self.goal, 0.0, 2 * [self.patch.size]))
         apart = gap(corners(self.foot, 0.0, 2 * [2 * rack.outer]), corners(self.goal, 0.0, 2 * [2 * bowl.radius]))
@@ -343,12 +289,12 @@ class BowlTable(Scenario):
         yield within_reach("the square", self.goal + 0.18 * UP, base=left)
 
     def features(self) -> Mapping[str, float]:
-        bowl, lever = self.bowl, self.bowl.radius
+        bowl = self.bowl
         return {
             "rim": bowl.radius,
             "depth": bowl.depth,
-            "slope": self.slope,
-            "droop": GRAVITY * bowl.mass * lever / (pinch(bowl.bead) * PAD / 2),
+            "slope": bowl.bead_slope,
+            "droop": droop(bowl.mass, bowl.radius, bowl.bead),
             "foot_height": self.plinth + bowl.depth,
             "side": self.goal_y - self.rack_y,
         }
@@ -364,15 +310,9 @@ class BowlTable(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     @property
-    def slope(self) -> float:
-        """Angle by which the bead, at half its height, leans outwards [rad]."""
-        (low, foot), (out, top) = self.bowl.sections[-1].corners[:2]
-        return math.atan2(out - low, top - foot)
-
-    @property
     def opening(self) -> Vec3:
         """Direction in which the bowl's opening looks during the handover."""
-        return math.cos(self.slope) * LEFT - math.sin(self.slope) * UP
+        return math.cos(self.bowl.bead_slope) * LEFT - math.sin(self.bowl.bead_slope) * UP
 
     @property
     def foot(self) -> Vec3:
@@ -388,9 +328,3 @@ class BowlTable(Scenario):
     def goal(self) -> Vec3:
         """Goal position of the middle of the bowl's foot [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
-
-
-def _elapsed(world: World, seconds: float) -> motion.Condition:
-    """Condition that holds once `seconds` [s] have passed, for moves that may not reach their end."""
-    end = world.time + seconds
-    return lambda: world.time > end

@@ -44,6 +44,7 @@ from ..sim.world import World
 from ..skills import jaw
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing_down, go_to, hold, push, retreat
 from ..skills.suction import carry_to
+from ..skills.waiting import at_most
 from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 
 SEAT_TOLERANCE = 0.007  # largest distance of the box' middle from its seat along the table [m]
@@ -156,8 +157,8 @@ class CrackerBoxJaw(BoxAndSlot):
         start = np.array([*(end - STAND_OFF * out)[:2], height])
         yield from go_to(arm, [*start[:2], max(arm.hand[2], height + STAND_OFF)], self._knocking_hand, STEADY, CLOSED)
         yield from go_to(arm, start, self._knocking_hand, STEADY, CLOSED)
-        stop = world.time + KNOCK_TIMEOUT
-        yield from push(arm, 0.06 * out, lambda: world.time > stop or self.down(world), CLOSED, 2 * KNOCK_TIMEOUT)
+        push_down = push(arm, 0.06 * out, lambda: self.down(world), CLOSED, 2 * KNOCK_TIMEOUT)
+        yield from at_most(world, KNOCK_TIMEOUT, push_down)
         yield from go_to(arm, arm.hand - 0.03 * out, pace=COARSE)
         yield from retreat(arm, 0.06)
 
@@ -212,8 +213,7 @@ class CrackerBoxJaw(BoxAndSlot):
         yield from jaw.carry(arm, "box", near + LIFT_HEIGHT * UP, rot, LEAN_PACE)
         yield from jaw.carry(arm, "box", near + self.slot.depth / 2 * UP, rot, Pace(0.10, 0.004))
         yield from push(arm, -0.05 * UP, lambda: world.touching("box", "slot"), CLOSED)
-        yield from jaw.release(arm)
-        yield from retreat(arm)
+        yield from jaw.let_go(arm)
         behind = world.com("box") + 0.4 * height * UP - (thickness / 2 + STAND_OFF) * out
         falls = math.radians(40.0)
         yield from jaw.poke(arm, behind, 0.15 * out, lambda: world.tilt("box") > falls, rot=self._knocking_hand)
@@ -230,12 +230,8 @@ class CrackerBoxJaw(BoxAndSlot):
             _, rot = self.leaning(world, angle)
             with suppress(GaveUp):
                 yield from jaw.carry(arm, "box", self.seat + (PALM_ALONG + CARRY_HEIGHT) * UP, rot, Pace(0.15, 0.008))
-        stop = world.time + 3.0
-
-        def blocked() -> bool:
-            return world.time > stop or world.touching("robot", "slot")
-
-        yield from push(arm, -0.05 * UP, blocked, CLOSED, give_up=4.0)
+        lower = push(arm, -0.05 * UP, lambda: world.touching("robot", "slot"), CLOSED, give_up=4.0)
+        yield from at_most(world, 3.0, lower)
         yield from self.leave(arm)
 
     def _take_flat_side(self, world: World) -> Plan:

@@ -43,7 +43,7 @@ from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills.jaw import poke
 from ..skills.motion import CLOSED, COARSE, OPEN, STEADY, Pace, facing, go_to, push, retreat, turn_to, until
-from ..skills.suction import STAND_OFF, carry_to, let_go, suck, suck_upright
+from ..skills.suction import STAND_OFF, carry_to, let_go, suck_upright, take
 from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 
 SEAT_TOLERANCE = 0.006  # largest distance of the box' middle from its seat along the table [m]
@@ -193,8 +193,7 @@ class CrackerBoxSuction(BoxAndSlot):
         _, out = self.broad_face(world)
         top = world.pos("box") + self.box.size[2] * UP + beside * out
         down = axes(facing(math.atan2(out[1], out[0]), 0.0)[:, 0], -UP)
-        yield from go_to(arm, top + 0.03 * UP, down, STEADY, OPEN)
-        yield from suck(arm, top, down, 0.04)
+        yield from take(arm, top, down, 0.04)
         yield from retreat(arm, self.slot.depth + 2 * CARRY_HEIGHT, LIFT_PACE)
 
     def _insert_upright(self, world: World) -> Plan:

@@ -60,6 +60,7 @@ from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, req
 from ..sim.world import World
 from ..skills.jaw import release
 from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, hold, push, turn_to, until, wait
+from ..skills.waiting import elapsed
 
 ROBOT_AXIS: Vec3 = BASE * [1.0, 1.0, 0.0]  # point at which the robot's first axis meets the floor [m]
 DIAGONAL_BEARING = 50.0
@@ -251,10 +252,10 @@ class CubeToss(Scenario):
     def _stretch(self, world: World) -> Plan:
         """Hold the cube out towards the tray as far as the arm goes, and release it."""
         aim = yield from self.wind_up(world)
-        arm, end = world.arm, world.time + 4.5
+        arm, over = world.arm, elapsed(world, 4.5)
         yield from go_to(arm, arm.hand + 0.2 * UP)
         yield from turn_to(arm, rotation(-0.6 * aim.across) @ arm.hand_rot, give_up=2.0)
-        out = push(arm, 0.08 * aim.u, lambda: world.time > end, give_up=8.0)
+        out = push(arm, 0.08 * aim.u, over, give_up=8.0)
         yield from until(out, lambda: float((arm.hand - ROBOT_AXIS) @ aim.u) > 0.92)  # farther out the arm trembles
         yield from hold(arm, 0.3)
         yield from release(arm)

@@ -41,13 +41,13 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen
 from ..robots import panda
-from ..robots.jaw import OPENING, PAD, PALM_ACROSS, TIP_BELOW, pinch
+from ..robots.jaw import OPENING, PALM_ACROSS, TIP_BELOW, droop, pinch
 from ..robots.suction import PULL
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills import jaw, motion, suction
-from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over
+from ..skills.handover import LEFT, OVERLAP, SIDEWAYS, STAND_OFF, draw_back, hand_over, hold_out, parking
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing, facing_down, go_to, together, turn_to, with_arm
 
 TUMBLER = Cup(height=0.090, base=0.043, rim=0.055, friction=0.06, handle_friction=0.8, ribbed=True, smooth_outside=True)
@@ -63,7 +63,9 @@ LEFTWARDS: Mat3 = facing(math.pi / 2, 0.0)
 HANDOVER_POINT: Vec3 = np.array([-0.15, -0.05, TABLE_TOP + 0.25])
 """Position of the middle of the base during the handover [m]; the palm is then at least 0.09 m above the table."""
 PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.40])
-"""Position of the suction hand while it is out of the way [m]; the jaw's hand waits at its mirror image."""
+"""Position of the suction hand while it is out of the way [m]."""
+JAW_PARKED_HAND: Vec3 = PARKED_HAND * [1.0, -1.0, 1.0]
+"""Position of the jaw's hand while it is out of the way [m]."""
 CARRY_HEIGHT = 0.06  # height above the square at which the cup is brought there and put upright [m]
 MAX_REACH = 0.77
 """Level distance from its base up to which the jaw's hand sets the cup down [m]: to its side it fails from 0.774 on,
@@ -121,21 +123,18 @@ class CupInversion(Scenario):
         yield from alone(left, self.wait_beside(left))
         yield from alone(right, self.present(right))
         yield from hand_over(right, left, lambda: self.rim(world), SIDEWAYS)
-        yield from together(world, self.park(right), motion.hold(left, 0.0))
+        yield from together(world, draw_back(right, PARKED_HAND), motion.hold(left, 0.0))
         yield from alone(left, self.set_down(left))
 
     def present(self, arm: Arm) -> Plan:
         """Lift the cup, turn its opening to the other arm, and hold it out."""
         yield from self.lift(arm)
         yield from turn_to(arm, LEFTWARDS, 1.0)
-        level = shortest(arm.world.rot("cup")[:, 2], LEFT) @ arm.world.rot("cup")
-        yield from suction.carry_to(arm, "cup", HANDOVER_POINT, level, Pace(0.20, 0.004))
+        yield from hold_out(arm, "cup", HANDOVER_POINT, LEFT, Pace(0.20, 0.004))
 
     def lift(self, arm: Arm) -> Plan:
         """Suck the cup in the middle of its base and lift it."""
-        base, down = arm.world.pos("cup"), facing_down(math.pi / 2)
-        yield from go_to(arm, base + 0.03 * UP, down, STEADY, OPEN)
-        yield from suction.suck(arm, base, down)
+        yield from suction.take(arm, arm.world.pos("cup"), facing_down(math.pi / 2))
         yield from motion.retreat(arm, 0.15, Pace(0.15, 0.02))
 
     def rim(self, world: World) -> Vec3:
@@ -148,11 +147,6 @@ class CupInversion(Scenario):
         """Bring the open jaw beside the place where the rim is going to be, clear of the cup as it comes up."""
         y = max(HANDOVER_POINT[1] + self.cup.height, self.y + self.cup.rim) + STAND_OFF + 0.04
         yield from go_to(arm, [HANDOVER_POINT[0], y, HANDOVER_POINT[2] + self.grip_radius], SIDEWAYS, STEADY, OPEN)
-
-    def park(self, arm: Arm) -> Plan:
-        """Draw the suction hand back, and take it out of the way."""
-        yield from go_to(arm, arm.hand - 0.08 * arm.hand_rot[:, 2], pace=COARSE)
-        yield from go_to(arm, PARKED_HAND, pace=COARSE)
 
     def set_down(self, arm: Arm) -> Plan:
         """Tip the hand down, so that the cup hangs under it; turn the cup upright, put it on the square, let go."""
@@ -170,10 +164,10 @@ class CupInversion(Scenario):
     def shortcuts(self) -> Mapping[str, Shortcut]:
         return {
             "topple_it": Shortcut(self._topple, to_rest=True),
-            "put_down_as_it_is": Shortcut(lambda world: self._with_jaw_parked(world, self._put_down_inverted)),
+            "put_down_as_it_is": Shortcut(parking(1, JAW_PARKED_HAND, self._put_down_inverted)),
             "jaw_from_above": Shortcut(self._pinch_base),
             "let_go_without_partner": Shortcut(self._let_go),
-            "turn_it_up_and_drop_it": Shortcut(lambda world: self._with_jaw_parked(world, self._turn_up_and_drop)),
+            "turn_it_up_and_drop_it": Shortcut(parking(1, JAW_PARKED_HAND, self._turn_up_and_drop)),
             "squeeze_and_roll": Shortcut(self._squeeze),
             "suck_the_wall_and_roll": Shortcut(self._suck_wall),
         }
@@ -189,11 +183,6 @@ class CupInversion(Scenario):
         beside = world.pos("cup") - 0.01 * UP - (self.cup.rim + 0.03) * along
         pushed = jaw.poke(left, beside, 0.3 * along, lambda: float((left.hand - beside) @ along) > 0.16)
         yield from together(world, go_to(right, PARKED_HAND, pace=COARSE), pushed)
-
-    def _with_jaw_parked(self, world: World, plan: Callable[[Arm], Plan]) -> Plan:
-        """Run a plan of the suction hand's arm while the jaw's hand goes out of its way."""
-        right, left = world.arms
-        yield from together(world, plan(right), go_to(left, PARKED_HAND * [1.0, -1.0, 1.0], pace=COARSE))
 
     def _put_down_inverted(self, arm: Arm) -> Plan:
         """Put the cup on the square upside down."""
@@ -366,4 +355,4 @@ class CupInversion(Scenario):
     def droop(self) -> float:
         """Torque of the level cup's weight about the pads, over the torque that they resist: above 1 the cup turns."""
         lever = self.cup.height - OVERLAP - self.cup.inertial()[0][2]
-        return GRAVITY * self.cup.mass * lever / (pinch(self.cup.bead) * PAD / 2)
+        return droop(self.cup.mass, lever, self.cup.bead)

@@ -38,7 +38,7 @@ from ..assets.board import Board
 from ..assets.prop import BOX, TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, between, corners
+from ..geometry import AHEAD, UP, Mat3, Outline, Vec3, between, corners
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, held
@@ -342,7 +342,7 @@ class EdgeSlide(Scenario):
         there.
         """
         azimuth, tilt = math.radians(30.0), math.radians(15.0)
-        level = math.cos(azimuth) * np.array([1.0, 0.0, 0.0]) - math.sin(azimuth) * self.out
+        level = math.cos(azimuth) * AHEAD - math.sin(azimuth) * self.out
         ahead = math.cos(tilt) * level - math.sin(tilt) * UP
         closing = -self.side * (math.cos(tilt) * UP + math.sin(tilt) * level)  # else joint 5 is at its limit
         return np.stack([closing, np.cross(ahead, closing), ahead], axis=1)

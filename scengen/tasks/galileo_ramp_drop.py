@@ -41,7 +41,7 @@ from ..robots import jaw
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from ..skills.jaw import carry, grasp, lower, pick, release
+from ..skills.jaw import carry, grasp, let_go, lower, pick, release
 from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
 
 TRAY = Bin(width=0.08, length=0.15, depth=0.012, wall=0.005, floor=0.005)
@@ -135,8 +135,7 @@ class GalileoRampDrop(Scenario):
 
     def _leave(self, world: World) -> Plan:
         """Open the jaw and move away from the ball."""
-        yield from release(world.arm)
-        yield from retreat(world.arm, CARRY_HEIGHT)
+        yield from let_go(world.arm, CARRY_HEIGHT)
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
@@ -169,8 +168,7 @@ class GalileoRampDrop(Scenario):
         above = self.resting(s) + height * UP
         yield from carry(world.arm, "ball", above + 0.05 * UP, pace=COARSE)
         yield from carry(world.arm, "ball", above)
-        yield from release(world.arm)
-        yield from retreat(world.arm, CARRY_HEIGHT)
+        yield from let_go(world.arm, CARRY_HEIGHT)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Without the near incline the ball falls to the table; without the far one nothing brakes it."""

@@ -49,8 +49,9 @@ from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, St
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills import motion
-from ..skills.jaw import carry, come_down, grasp, pick, release
-from ..skills.motion import CLOSED, COARSE, Condition, go_to, hold, retreat, stay, steer, until, wait
+from ..skills.jaw import carry, come_down, grasp, let_go, pick, release
+from ..skills.motion import CLOSED, COARSE, go_to, hold, stay, steer, wait
+from ..skills.waiting import at_most
 
 MAX_RISE = 0.02  # height by which the ball's centre may rise [m]: more than on a kerb, less than over a wall
 STANDOFF_DISTANCE = 0.03
@@ -136,8 +137,7 @@ class GapFunnel(Scenario):
 
     def _leave(self, world: World) -> Plan:
         """Open the jaw and move up."""
-        yield from release(world.arm, 0.3)
-        yield from retreat(world.arm, APPROACH_HEIGHT)
+        yield from let_go(world.arm, APPROACH_HEIGHT, seconds=0.3)
 
     def send(self, world: World, spot: Vec3, factor: float) -> Plan:
         """Push the ball towards a spot, until the hand is in front of the wall.
@@ -157,7 +157,7 @@ class GapFunnel(Scenario):
         yield from go_to(arm, start + APPROACH_HEIGHT * UP, rot, COARSE, CLOSED)
         yield from go_to(arm, start, rot)
         precise = stay(arm, start, rot, lambda: math.dist(arm.hand, start) < 0.001)
-        yield from until(precise, self._after_a_second(world))  # the push corrects the remaining error
+        yield from at_most(world, 1.0, precise)  # the push corrects the remaining error
         stop, pace = self.stop_distance + PALM_ALONG * abs(float(along @ self.tangent)), CONTACT_SPEED
         while (arm.hand - self.gap_at) @ self.normal < -stop:
             if pace > CONTACT_SPEED or world.touching(ROBOT, "ball"):
@@ -168,11 +168,6 @@ class GapFunnel(Scenario):
             # The hand moves aside by 3 times the ball's error, and drags the ball along.
             yield steer(arm, on_line - 3.0 * off * side, pace * along, between(arm.hand_rot, rot), CLOSED)
         yield from go_to(arm, arm.hand + STANDOFF_DISTANCE * (UP - along), pace=COARSE)
-
-    def _after_a_second(self, world: World) -> Condition:
-        """A condition that holds from one second after this call."""
-        end = world.time + 1.0
-        return lambda: world.time > end
 
     def steps(self) -> Mapping[str, Planner]:
         return {

@@ -32,7 +32,6 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
 * Anything else may be done with the blocks. A block that is held in the jaw reaches less far than one that is pushed.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -44,8 +43,8 @@ from ..assets.box import Cube
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading
-from ..params import check_bounds, param
+from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading, least_gap
+from ..params import Bounded, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots import ik
@@ -54,8 +53,8 @@ from ..robots.panda import BASE, REACH, SHOULDER
 from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from ..skills.jaw import carry, pick, release
-from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, retreat, steer
+from ..skills.jaw import carry, let_go, pick
+from ..skills.motion import CLOSED, COARSE, STEADY, Pace, go_to, push, steer
 
 COLOURS: tuple[Rgba, ...] = ((0.20, 0.36, 0.66, 1.0), (0.25, 0.60, 0.35, 1.0), (0.90, 0.72, 0.20, 1.0))
 """Colours of the blocks; the target is red."""
@@ -77,15 +76,12 @@ END_MARGIN = 0.004  # distance inside the zone at which the push ends [m]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Spot(Bounded):
     """Pose of a block at the start."""
 
     x: float = param(-0.12, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     @property
     def pos(self) -> Vec3:
@@ -179,8 +175,7 @@ class IndirectPush(Scenario):
         yield from carry(arm, block, spot + held + 0.07 * UP, rot, COARSE)
         yield from carry(arm, block, spot + held + 0.008 * UP, rot, Pace(0.20, 0.003))
         yield from push(arm, -0.04 * UP, until=lambda: world.touching(block, "table"))
-        yield from release(arm)
-        yield from retreat(arm, 0.09)
+        yield from let_go(arm, 0.09)
 
     def push_out(self, world: World, block: str, speed: float = PUSH_SPEED, last: float = CONTACT_SPEED) -> Plan:
         """Push a block outwards with the leaning hand until the target is in the zone or the arm is stretched out.
@@ -265,7 +260,7 @@ class IndirectPush(Scenario):
         away = [math.dist(spot.pos[:2], BASE[:2]) for spot in self.spots]
         near, far = min(away), max(away)
         yield require(MIN_DISTANCE <= near and far <= MAX_DISTANCE, "a block is out of reach", away=far)
-        apart = min(gap(one, other) for one, other in itertools.combinations(outlines, 2))
+        apart = least_gap([each] for each in outlines)
         yield require(apart > 0.03, "there is no room for the fingers between two blocks", apart=apart)
         beside = min(gap(one, self.lane) for one in outlines)
         yield require(beside > 0.0, "a block lies where the chain is to stand", beside=beside)

@@ -37,32 +37,26 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from ..assets.glyph import write
-from ..assets.keyboard import LETTERS, PRINT_SIZE, Keyboard
-from ..assets.prop import TABLE_TOP, Rgba, place, shown, table
+from ..assets.display import place_with_display, show_typed
+from ..assets.keyboard import LETTERS, Keyboard, disable
+from ..assets.prop import TABLE_TOP, table
+from ..assets.words import WORDS
 from ..control.loop import Loop
-from ..geometry import UP, Vec3, about_z, between, quat
+from ..geometry import UP, Vec3, about_z
 from ..params import param
-from ..predicates import fallen
+from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
 from ..robots import panda
-from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, require
+from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, require
 from ..sim.arm import Arm
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills import motion
-from ..skills.motion import CLOSED, COARSE, FINE, OPEN, Pace, facing_down, go_to, until, wait
+from ..skills import keys, motion
+from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, until, wait
 
-TRAINING_WORDS = tuple("WORLD PLANT MUSIC FRUIT BREAD CHAIR HOUSE NIGHT QUICK JUMBO GHOST BLACK".split())
-UNSEEN_WORDS = tuple("TABLE STONE CLOUD OCEAN TIGER LEMON SUGAR VIDEO PIANO ZEBRA WALTZ FLAME".split())
-DOUBLED_WORDS = tuple("APPLE HELLO SWEET GRASS HAPPY LEVEL KAYAK RADAR".split())
-LONG_WORDS = tuple("PICTURE KITCHEN DOLPHIN TROUBLE PROBLEM MONKEYS JOURNAL HUSBAND".split())
-WORDS = TRAINING_WORDS + UNSEEN_WORDS + DOUBLED_WORDS + LONG_WORDS
-"""All words, by their number: five different letters (two lists), five with one twice, seven different ones."""
 MIN_CLEARANCE = 0.15
 """Distance beside the keyboard at which a hand is out of the other arm's way [m]: a palm is 0.10 m to each side."""
 PARKED_HAND: Vec3 = np.array([-0.20, -0.45, TABLE_TOP + 0.20])  # of the agent's hand, out of the partner's way [m]
 PARTNER_HOME: Vec3 = PARKED_HAND * [1.0, -1.0, 1.0]  # of the partner's hand, out of the agent's way [m]
-TRAVEL_HEIGHT = 0.10  # above the keys, of hands on their way [m]
 TURN_LIMIT = 2.5
 """Longest time that the agent's hand may stay beside the keyboard in its own turn, the partner being out of the way
 [s]; the oracle needs 0.3 to 0.6 s."""
@@ -71,19 +65,10 @@ TIME_MARGIN = 0.05  # beyond `hold`, for which shortcuts press a key [s]
 TIP_HALF_WIDTH = 0.013  # of the closed finger tips, along y [m]
 MAX_REACH = 0.70
 """Distance from an arm's first axis up to which a hand that points down goes exactly to its target [m]; measured."""
-LETTER_HEIGHT = 0.024  # on the display [m]
-LETTER_SPACING = 0.030  # between the middles of letters on the display [m]
-COLOURS: tuple[tuple[Rgba, Rgba, Rgba], ...] = (
-    ((1.0, 0.80, 0.55, 1.0), (0.96, 0.66, 0.38, 1.0), (0.70, 0.25, 0.0, 1.0)),
-    ((0.70, 0.82, 1.0, 1.0), (0.48, 0.66, 1.0, 1.0), (0.0, 0.10, 0.55, 1.0)),
-)
-"""Colours of a cap, of a faint and of a bold letter: the partner's, the agent's."""
-SEVERAL_KEYS = -1  # number that stands in memory for more than one key at once
 MISTAKES = ("", "several keys were held at once", "the letter was not next", "the letter was the other robot's")
-MEMORY = ("typed", "mistake", "key_0", "held_0", "key_1", "held_1", "waited")
-"""Number of letters typed; number of the mistake; for each arm the key that it touches, counted from 1, or
-`SEVERAL_KEYS`, and the time for which it has touched it without a break [s]; in the partner's turn the time since the
-agent was last in its way, in the agent's turn the time that it let go by [s]."""
+MEMORY = ("typed", "mistake", *KEY_MEMORY, "waited")
+"""Number of letters typed; number of the mistake; touches of keys; in the partner's turn the time since the agent was
+last in its way, in the agent's turn the time that it let go by [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,24 +94,8 @@ class KeyboardTyping(Scenario):
     def build(self) -> mujoco.MjSpec:
         scene = table()
         remember(scene, *MEMORY)
-        place(scene, self.keyboard, "keyboard", self.spot, math.radians(self.yaw))
-        turn, count = quat("z", math.radians(self.yaw)), len(self.letters)
-        body, half = scene.body("keyboard"), [LETTER_HEIGHT, LETTER_SPACING * count / 2, 0.0005]
-        shown(body, "display", (0.97, 0.97, 0.95, 1.0), size=half, pos=self._display_spot((count - 1) / 2))
-        hidden = self.spot - 0.03 * UP  # bold letters wait below the table top until they are shown
-        for k, letter in reversed(list(enumerate(self.letters))):  # a letter twice: its key shows the first owner
-            cap, faint, bold = COLOURS[self.owns(k)]
-            scene.geom(f"keyboard/cap_{letter}").rgba = np.array(cap, np.float32)
-            write(body, letter, self._display_spot(k), LETTER_HEIGHT, 0.0010, faint, f"faint_{k}")
-            typed = scene.worldbody.add_body(name=f"typed_{k}", mocap=True, pos=hidden.tolist(), quat=turn)
-            spots = (self._display_spot(k), LETTER_HEIGHT), (self.keyboard.at(letter), PRINT_SIZE * self.keyboard.cap)
-            for spot, height in spots:  # 0.3 mm before the faint letters, their strokes twice as wide
-                write(typed, letter, spot + 0.0003 * UP, height, 0.0020, bold, f"bold_{height:.3f}_{k}")
+        place_with_display(scene, self.keyboard, "keyboard", self.spot, math.radians(self.yaw), self.letters, self.owns)
         return scene
-
-    def _display_spot(self, k: float) -> Vec3:
-        """Position of a place of the word on the display, 35 mm behind the keyboard, in the keyboard's axes [m]."""
-        return np.array([self.keyboard.size[0] / 2 + 0.035, LETTER_SPACING * ((len(self.letters) - 1) / 2 - k), 0.001])
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -146,27 +115,14 @@ class KeyboardTyping(Scenario):
         """Count what is typed, show it, and move the partner."""
         (partner,) = world.partners
         for arm in (world.arm, partner):
-            self._watch_keys(world, arm)
+            if number := key_that_counts(world, arm, "keyboard", self.hold):
+                self._judge_press(world, number, arm)
         self._watch_turn(world)
-        keyboard = world.body("keyboard")
-        for k in range(int(world.memory["typed"])):
-            world.move(f"typed_{k}", world.data.xpos[keyboard], world.data.xquat[keyboard])
-        partner.tell(self._partner_action(world, partner))
-
-    def _watch_keys(self, world: World, arm: Arm) -> None:
-        """Watch which key an arm touches, and for how long."""
-        memory, key, held = world.memory, f"key_{arm.number}", f"held_{arm.number}"
-        touched = [name for name in world.touching_bodies(arm.label) if name.startswith("keyboard/key_")]
-        now = SEVERAL_KEYS if len(touched) > 1 else LETTERS.index(touched[0][-1]) + 1 if touched else 0
-        before = memory[held]
-        memory[held] = (before if now == memory[key] else 0.0) + Loop.PERIOD if now else 0.0
-        memory[key] = now
-        if self._long_enough(memory[held]) and not (self._long_enough(before) and memory[held] > before):
-            self._judge_press(world, now, arm)
-
-    def _long_enough(self, seconds: float) -> bool:
-        """Whether a key counts that has been touched for `seconds` [s]."""
-        return seconds > self.hold - 1e-9
+        k = int(world.memory["typed"])
+        show_typed(world, "keyboard", k)
+        key = self.key(world, k) if self.partner_next(world) and world.memory["waited"] > self.pause(k) else None
+        counts = long_enough(world.memory["held_1"], self.hold)
+        partner.tell(keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace))
 
     def _judge_press(self, world: World, key: int, arm: Arm) -> None:
         """Judge a key that counts: it is the next letter, and this arm's, or a mistake."""
@@ -184,7 +140,7 @@ class KeyboardTyping(Scenario):
         """Measure for how long the partner could have typed without a break, or the agent has let its turn go by."""
         memory, beside = world.memory, self.beside(world, world.arm)
         if self.partner_next(world):
-            memory["waited"] = memory["waited"] + Loop.PERIOD if beside else 0.0
+            count_time(world, "waited", beside)
         elif beside and self.beside(world, *world.partners):
             memory["waited"] += Loop.PERIOD
 
@@ -196,39 +152,6 @@ class KeyboardTyping(Scenario):
     def pending(self, world: World) -> bool:
         """Whether the partner has a letter to type, and goes there by itself after a pause."""
         return self.partner_next(world) and self.beside(world, world.arm)
-
-    def _partner_key(self, world: World) -> Vec3 | None:
-        """Position of the key that the partner is going for [m], or None."""
-        k = int(world.memory["typed"])
-        goes = self.partner_next(world) and world.memory["waited"] > self.pause(k)
-        return self.key(world, k) if goes else None
-
-    def _is_up(self, world: World, arm: Arm) -> bool:
-        """Whether a hand is at the height at which hands travel, or at most 20 mm below."""
-        return bool(arm.hand[2] > self._travel_z(world) - 0.02)
-
-    def _travel_z(self, world: World) -> float:
-        """World z at which hands travel over the keys [m]."""
-        return float(world.pos("keyboard")[2]) + self.keyboard.height + TRAVEL_HEIGHT
-
-    def _partner_action(self, world: World, arm: Arm) -> Action:
-        """Action of the partner, a law of where its hand is now: over the key, down until it counts, up, home."""
-        key, hand, up = self._partner_key(world), arm.hand, self._is_up(world, arm)
-        spot = PARTNER_HOME if key is None else key
-        travel_z, off = self._travel_z(world), math.hypot(*(spot - hand)[:2])
-        # It goes down within 4 mm of the key's middle. While down it may be 10 mm off: at 12 it touches the neighbour.
-        if off > (0.004 if up else 0.010):
-            goal = np.array([*(spot if up else hand)[:2], max(travel_z, PARTNER_HOME[2] if key is None else 0.0)])
-        elif key is None:
-            goal = PARTNER_HOME
-        else:
-            # It aims 10 mm below the cap's upper face, so it arrives at 0.04 m/s and presses with about 4 N: the
-            # controller of a hand that is stopped from below pushes it aside too, the more the harder it presses.
-            goal = key + TRAVEL_HEIGHT * UP if self._long_enough(world.memory["held_1"]) else key - 0.010 * UP
-        ahead = goal - hand
-        distance = math.sqrt(ahead @ ahead)
-        velocity = ahead * (min(self.pace, 4.0 * distance) / max(distance, 1e-9))
-        return motion.steer(arm, hand, velocity, between(arm.hand_rot, facing_down()), CLOSED)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -253,13 +176,8 @@ class KeyboardTyping(Scenario):
     def make_room(self, world: World) -> Plan:
         """Go beside the keyboard, if the hand is not there."""
         if not self.beside(world, world.arm):
-            yield from self._rise(world)
+            yield from keys.rise(world.arm, self.keyboard, "keyboard")
             yield from go_to(world.arm, PARKED_HAND, facing_down(), COARSE, CLOSED)
-
-    def _rise(self, world: World) -> Plan:
-        """Go straight up to the height at which hands travel."""
-        if not self._is_up(world, world.arm):
-            yield from go_to(world.arm, [*world.arm.hand[:2], self._travel_z(world)], facing_down(), COARSE)
 
     def press(self, world: World, k: int, aside: float = 0.0, seconds: float = math.inf, grip: float = CLOSED) -> Plan:
         """Type the letter of a place: over its key, down, stay there until a letter becomes bold, up.
@@ -269,17 +187,10 @@ class KeyboardTyping(Scenario):
             seconds: longest time on the key [s].
             grip: gripper command of the hand.
         """
-        arm, down, shift = world.arm, facing_down(), aside * world.rot("keyboard")[:, 1]
-        over = self.key(world, k) + shift
-        yield from self._rise(world)
-        yield from go_to(arm, [*over[:2], self._travel_z(world)], down, COARSE, grip)
-        over = self.key(world, k) + shift
-        yield from go_to(arm, over + 0.02 * UP, down, FINE, grip)
-        before, descent = world.memory["typed"], go_to(arm, over - 0.006 * UP, down, Pace(0.08, 0.0, 20.0), grip)
-        yield from until(descent, lambda: world.memory["typed"] > before or world.memory["held_0"] > seconds - 1e-9)
-        if world.memory["typed"] > before:  # stay longer than needed: a replay that does not look may be too short
-            yield from motion.hold(arm, 0.10, grip)
-        yield from self._rise(world)
+        shift = aside * world.rot("keyboard")[:, 1]
+        spot, count = lambda: self.key(world, k) + shift, lambda: world.memory["typed"]
+        late = lambda: world.memory["held_0"] > seconds - 1e-9  # noqa: E731
+        yield from keys.press(world.arm, self.keyboard, "keyboard", spot, count, late, grip)
 
     # --- what must not work ---------------------------------------------------------------
 
@@ -324,7 +235,7 @@ class KeyboardTyping(Scenario):
         """Wait for one's turn over the key for 4 s, and press when it does not come."""
         k = next(k for k in self.own if k > 0 and not self.owns(k - 1))
         yield from self.type_own(world, k)
-        yield from go_to(world.arm, self.key(world, k) + TRAVEL_HEIGHT * UP, facing_down(), COARSE, CLOSED)
+        yield from go_to(world.arm, self.key(world, k) + keys.TRAVEL_HEIGHT * UP, facing_down(), COARSE, CLOSED)
         yield from until(motion.hold(world.arm, 4.0), lambda: world.memory["typed"] >= k)
         yield from self.press(world, k, seconds=self.hold + TIME_MARGIN)
 
@@ -333,8 +244,7 @@ class KeyboardTyping(Scenario):
         scene = self.build()
         for k, letter in enumerate(self.letters):
             if not self.owns(k):
-                cap = scene.geom(f"keyboard/cap_{letter}")
-                cap.contype = cap.conaffinity = 0
+                disable(scene, "keyboard", letter)
         return {"dead_keys_of_the_partner": scene}
 
     # --- constraints ------------------------------------------------------------------------
@@ -347,7 +257,7 @@ class KeyboardTyping(Scenario):
         room = self.keyboard.pitch - self.keyboard.cap / 2 - TIP_HALF_WIDTH
         yield require(room >= 0.006, "a finger that presses a key touches its neighbour", room=room)
         axes = about_z(math.radians(self.yaw))
-        apart = min(self._outside(axes.T @ (hand - self.spot)) for hand in (PARKED_HAND, PARTNER_HOME))
+        apart = min(self.keyboard.outside(axes.T @ (hand - self.spot)) for hand in (PARKED_HAND, PARTNER_HOME))
         yield require(apart > MIN_CLEARANCE, "nowhere is a hand out of the way", apart=apart, least=MIN_CLEARANCE)
         right, left = panda.bases(2)
         for k, letter in enumerate(self.letters):
@@ -358,12 +268,12 @@ class KeyboardTyping(Scenario):
     def features(self) -> Mapping[str, float]:
         """Length of the word, the agent's share of it, and what a press needs: way [m], clearance [m], time [s];
         speed of the partner [m/s], its pauses [s], yaw [rad]."""
-        keys = [self.keyboard.at(self.letters[k]) for k in self.own]
+        spots = [self.keyboard.at(self.letters[k]) for k in self.own]
         return {
             "letters": float(len(self.letters)),
             "repeated_letters": float(len(self.letters) - len(set(self.letters))),
             "own_share": len(self.own) / len(self.letters),
-            "own_way": float(sum(math.dist(a, b) for a, b in pairwise(keys))),
+            "own_way": float(sum(math.dist(a, b) for a, b in pairwise(spots))),
             "room_beside_a_finger": self.keyboard.pitch - self.keyboard.cap / 2 - TIP_HALF_WIDTH,
             "time_on_a_key": self.hold,
             "partner_speed": self.pace,
@@ -417,8 +327,4 @@ class KeyboardTyping(Scenario):
 
     def beside(self, world: World, arm: Arm) -> bool:
         """Whether an arm's hand is out of the way."""
-        return self._outside(world.rot("keyboard").T @ (arm.hand - world.pos("keyboard"))) >= MIN_CLEARANCE
-
-    def _outside(self, offset: Vec3) -> float:
-        """Distance beyond the keyboard's outline of a place at `offset` from its middle, in its axes [m]."""
-        return float((np.abs(offset) - self.keyboard.size / 2)[:2].max())
+        return self.keyboard.outside(world.rot("keyboard").T @ (arm.hand - world.pos("keyboard"))) >= MIN_CLEARANCE

@@ -33,8 +33,8 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.zone import Zone
-from ..geometry import UP, Outline, Vec3, corners, gap
-from ..params import check_bounds, param
+from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
+from ..params import Bounded, param
 from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
 from ..scenario import (
@@ -53,7 +53,7 @@ from ..scenario import (
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.jaw import pick, put, release, weigh
+from ..skills.jaw import let_go, pick, put, weigh
 from ..skills.motion import STEADY, push, retreat
 
 CUBE_COUNT = 3
@@ -72,15 +72,12 @@ CARRY_HEIGHT = 0.015  # height above other cubes at which a cube is carried [m]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Spot(Bounded):
     """Pose of a cube at the start."""
 
     x: float = param(-0.16, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,8 +181,7 @@ class MassSort(Scenario):
     def _put_back(self, world: World, cube: str) -> Plan:
         """Lower the held cube to the table, release it and move up."""
         yield from push(world.arm, -0.1 * UP, lambda: world.touching(cube, "table"))
-        yield from release(world.arm)
-        yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
+        yield from let_go(world.arm, self.edge + APPROACH_HEIGHT)
 
     def sort_held(self, world: World, ranks: Sequence[int]) -> Plan:
         """Put the last cube, which is held, and then the others into the zones of the given ranks."""
@@ -283,9 +279,9 @@ class MassSort(Scenario):
         yield require(self.edge + 0.008 <= OPEN_GAP, "the jaw cannot take a cube", edge=self.edge, opening=OPEN_GAP)
         squares = [corners(self.zone_at(rank), 0.0, [self.zone.size] * 2) for rank in range(CUBE_COUNT)]
         yield on_table("a cube or a zone", [*self.outlines, *squares])
-        room = min(gap(one, other) for one, other in combinations(squares, 2)) + self.zone.size - self.edge
+        room = least_gap([square] for square in squares) + self.zone.size - self.edge
         yield require(room >= self.hand_beside, "the hand has no room between the zones", room=room)
-        clear = min(gap(one, other) for one, other in combinations(self.outlines, 2))
+        clear = least_gap([cube] for cube in self.outlines)
         yield require(clear >= self.hand_beside, "the hand has no room between the cubes", room=clear)
         away = min(gap(cube, square) for cube in self.outlines for square in squares)
         yield require(away >= MIN_CLEARANCE, "a cube lies in a zone, or too near to one", away=away)

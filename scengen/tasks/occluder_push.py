@@ -38,8 +38,8 @@ import numpy as np
 from ..assets.box import Cube, Lid
 from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
-from ..geometry import UP, Outline, Vec3, about_z, corners, gap
-from ..params import check_bounds, param
+from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
+from ..params import Bounded, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
@@ -68,15 +68,12 @@ CARRY_HEIGHT = 0.08
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Spot(Bounded):
     """Place of a cube, and yaw of the cube and its lids."""
 
     x: float = param(-0.01, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,7 +261,7 @@ class OccluderPush(Scenario):
         drag, hold = max(self.lid.friction, under) * load, under * (load + self.cube.mass)
         yield require(drag < hold, "a cube goes along with its lids", drag=drag, hold=hold)
         yield on_table("a lid or the patch", [*self.lid_outlines, self.patch_outline])
-        apart = min(gap(one, other) for one, other in combinations([*self.lid_outlines, self.patch_outline], 2))
+        apart = least_gap([each] for each in (*self.lid_outlines, self.patch_outline))
         yield require(apart >= MIN_CLEARANCE, "lids or the patch lie too near to each other", apart=apart)
         ways = len(self.directions)
         yield require(ways == CUBE_COUNT, "there is no room to push the lids off", ways=ways)

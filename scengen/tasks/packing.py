@@ -31,34 +31,31 @@ Decisions, where the paper (App. B, T33) says no more than "L-shaped pieces", "b
   a piece between two others. It is suction here.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
 
 from ..assets import guillotine
 from ..assets.bin import Bin
-from ..assets.guillotine import Ell, Rect
+from ..assets.guillotine import Ell
 from ..assets.l_piece import LPiece
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..errors import GaveUp
-from ..geometry import UP, Vec3, about_z, between, corners, gap, way_to, yaw_of
-from ..params import check_bounds, param
+from ..geometry import UP, Vec3, about_z, corners, least_gap, way_to, yaw_of
+from ..params import Bounded, param
 from ..physics import GRAVITY
-from ..predicates import fallen, inside
-from ..robots.panda import WRIST_MIDDLE
+from ..predicates import fallen, inside, off_first_pose, remember_first_pose
 from ..robots.suction import CUP_HALF_WIDTH, PULL
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.motion import COARSE, OPEN, STEADY, Pace, facing_down, go_to, retreat, until
-from ..skills.suction import carry, let_go, suck
+from ..skills import fitting
+from ..skills.suction import let_go
 
 FLAT_TOLERANCE = math.radians(2.0)
 """Largest tilt of a piece that lies flat [rad]. The thinnest piece with a side on a neighbour tilts by 4 deg."""
@@ -69,26 +66,18 @@ MAX_TURN = math.radians(45.0)
 neighbours shift a piece by more than 0.75 units. Another slot is farther away, or a quarter turn."""
 MIN_CLEARANCE = 0.008
 """Least distance of two bodies on the table at the start [m]: a cup may be a little off, a piece a little turned."""
-CARRY_HEIGHT = 0.05  # height above the table at which pieces are carried [m], twice the height of bin and pieces
-AIM_PACE = Pace(0.25, 0.0015)
-"""Pace of the move above a slot; it ends within half the radius of the pieces' lower edges, which guide them from
-there."""
-LOWER_PACE = Pace(0.04, 0.0, give_up=2.0)  # pace at which a piece is lowered, which takes one second
 USUAL_LENGTHS = {"left": 2, "right": 2, "low": 2, "rise": 1}
 """Lengths that a plan assumes which does not look at the pieces [units]."""
 COLOURS = ((0.86, 0.46, 0.20, 1.0), (0.25, 0.58, 0.44, 1.0), (0.85, 0.70, 0.28, 1.0), (0.55, 0.40, 0.66, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Spot(Bounded):
     """Place of a piece at the start, and the counterclockwise turn from its yaw to that of its slot."""
 
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     turn: float = param(60.0, "deg", -180.0, 180.0, period=360.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,31 +129,28 @@ class Packing(Scenario):
 
     def lies(self, world: World, i: int) -> bool:
         """Whether piece `i` lies flat on the bin's floor."""
-        name, box = f"piece_{i}", np.array([self.bin.width / 2, self.bin.length / 2, FLOOR_TOLERANCE])
-        floor = self.bin.floor * UP
-        return inside(world, name, "bin", floor - box, floor + box) and world.tilt(name) < FLAT_TOLERANCE
+        name, (low, high) = f"piece_{i}", self.bin.floor_region(FLOOR_TOLERANCE)
+        return inside(world, name, "bin", low, high) and world.tilt(name) < FLAT_TOLERANCE
 
     def failure(self, world: World) -> str | None:
         if fallen(world, *world.free_bodies):
             return "a piece fell off the table"
-        moved = any(world.memory[f"tried_{i}"] and self._elsewhere(world, i) for i in range(self.count))
+        moved = any(self._elsewhere(world, i) for i in range(self.count))
         return Strict("a piece was tried in a second place") if moved else None
 
     def _elsewhere(self, world: World, i: int) -> bool:
         """Whether piece `i` is in another place than at its first touch in the bin."""
-        x, y, yaw = (world.memory[f"{value}_{i}"] for value in ("x", "y", "yaw"))
-        pos, turn = world.pos(f"piece_{i}"), math.remainder(yaw_of(world.rot(f"piece_{i}")) - yaw, math.tau)
-        return math.hypot(pos[0] - x, pos[1] - y) > self.unit or abs(turn) > MAX_TURN
+        shift, turn = off_first_pose(world, f"piece_{i}", i)
+        return shift > self.unit or turn > MAX_TURN
 
     def events(self, world: World) -> None:
         """Remember where each piece first touches the bin, or another piece over the bin."""
         half = np.array([self.bin.width / 2, self.bin.length / 2, math.inf])
         for i in range(self.count):
-            name, memory = f"piece_{i}", world.memory
+            name = f"piece_{i}"
             met = world.touching_bodies(name).difference({ROBOT, "table"})
-            if met and not memory[f"tried_{i}"] and inside(world, name, "bin", -half, half):
-                (x, y, _), yaw = world.pos(name), yaw_of(world.rot(name))
-                memory[f"tried_{i}"], memory[f"x_{i}"], memory[f"y_{i}"], memory[f"yaw_{i}"] = 1.0, x, y, yaw
+            if met and inside(world, name, "bin", -half, half):
+                remember_first_pose(world, name, i)
 
     def pending(self, world: World) -> bool:
         return False
@@ -176,49 +162,15 @@ class Packing(Scenario):
         yield from self.pack(world, self.count)
 
     def pack(self, world: World, count: int) -> Plan:
-        """Bring the first `count` pieces into their slots, and release each once it lies there.
-
-        A piece that stands on an edge is raised and lowered again. A piece that came off the cup is taken up again.
-        """
+        """Bring the first `count` pieces into their slots, and release each once it lies there."""
         for i in range(count):
-            while not self.lies(world, i):
-                if not world.arm.sealed:
-                    yield from self.fetch(world, i, *self.goal(i))
-                yield from self.insert(world, i, *self.goal(i))
-            yield from let_go(world.arm)
+            lies = partial(self.lies, world, i)
+            yield from fitting.fit(world.arm, f"piece_{i}", self.face(i), *self.goal(i), self.thickness, lies)
 
     def insert(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
-        """Aim with piece `i` 3 mm above the neighbours of a place, then lower it softly to 2 mm below the floor.
-
-        The move ends when the piece lies, came off the cup or does not go on. The hand lags by at most 1.5 mm: a piece
-        that is caught on an edge then presses with about 1.5 N and slides in, or is raised and lowered again; 2.5 N
-        at 0.1 m from the cup would peel it off.
-        """
-        arm, name = world.arm, f"piece_{i}"
-        yield from until(carry(arm, name, pos + (self.thickness + 0.003) * UP, yaw, AIM_PACE), lambda: not arm.sealed)
-        lower = carry(arm, name, pos - 0.002 * UP, yaw, LOWER_PACE, 0.0015)
-        with suppress(GaveUp):
-            yield from until(lower, lambda: self.lies(world, i) or not arm.sealed)
-
-    def fetch(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
-        """Take piece `i` up by suction and bring it above a place at a yaw [rad], or lose it on the way."""
-        yield from self._take(world, i, yaw)
-        yield from self._bring(world, i, pos, yaw)
-
-    def _take(self, world: World, i: int, yaw: float) -> Plan:
-        """Take piece `i` up by suction; the wrist first turns back by half of the turn to its final yaw [rad]."""
-        arm, name = world.arm, f"piece_{i}"
-        spot, rot = world.pos(name) + world.rot(name) @ self.face(i), world.rot(name)
-        down = facing_down(WRIST_MIDDLE - float(between(rot, about_z(yaw))[2]) / 2)
-        yield from go_to(arm, spot + 0.03 * UP, down, STEADY, OPEN)
-        yield from suck(arm, spot, down)
-        yield from retreat(arm, CARRY_HEIGHT)
-
-    def _bring(self, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
-        """Bring the held piece `i` above a place at a yaw [rad], or lose it on the way."""
-        arm, name = world.arm, f"piece_{i}"
-        above = np.array([*pos[:2], TABLE_TOP + CARRY_HEIGHT])
-        yield from until(carry(arm, name, above, yaw, COARSE), lambda: not arm.sealed)
+        """Lower the held piece `i` into a place at a yaw [rad]; see `fitting.insert`."""
+        lies = partial(self.lies, world, i)
+        yield from fitting.insert(world.arm, f"piece_{i}", pos, yaw, self.thickness, lies)
 
     def steps(self) -> Mapping[str, Planner]:
         turned = set[int]()
@@ -233,12 +185,12 @@ class Packing(Scenario):
 
         def take(world: World) -> Plan:
             if (i := piece(world)) is not None and not world.arm.sealed:
-                yield from self._take(world, i, self.goal(i)[1])
+                yield from fitting.take(world.arm, f"piece_{i}", self.face(i), self.goal(i)[1])
 
         def turn(world: World) -> Plan:
             if (i := held(world)) is not None:
                 turned.add(i)
-                yield from self._bring(world, i, *self.goal(i))
+                yield from fitting.bring(world.arm, f"piece_{i}", *self.goal(i))
 
         def lower(world: World) -> Plan:
             if (i := held(world)) is not None:
@@ -262,11 +214,8 @@ class Packing(Scenario):
     def _place_all(self, world: World, pose: Callable[[int], tuple[Vec3, float]]) -> Plan:
         """Press each piece down softly at a pose and let go, wherever it comes to lie."""
         for i in range(self.count):
-            where = pose(i)
-            with suppress(GaveUp):
-                yield from self.fetch(world, i, *where)
-                yield from self.insert(world, i, *where)
-            yield from let_go(world.arm)
+            lies = partial(self.lies, world, i)
+            yield from fitting.lay(world.arm, f"piece_{i}", self.face(i), *pose(i), self.thickness, lies)
 
     def _unturned(self, world: World, i: int) -> tuple[Vec3, float]:
         """Position of the slot of piece `i`, and the piece's present yaw [rad]."""
@@ -286,51 +235,34 @@ class Packing(Scenario):
         def supposed(value: float, lengths: Mapping[str, int]) -> "Packing":
             return replace(self, **lengths, deal=int(value) % 6, mirror=int(value) // 6)
 
-        def right(value: float) -> bool:
-            return all(mine.sides == its.sides for mine, its in zip(self.slots, supposed(value, {}).slots, strict=True))
-
-        return Answer(
-            tuple(map(float, range(12))),
-            lambda world, v: self._place_all(world, supposed(v, USUAL_LENGTHS).goal),
-            right,
-            tries=1,
-        )
+        numbers, right = tuple(map(float, range(12))), lambda v: self.cut.like(supposed(v, {}).cut)
+        return Answer(numbers, lambda w, v: self._place_all(w, supposed(v, USUAL_LENGTHS).goal), right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Replace one piece by another L of the same area, so that the set no longer fills the bin."""
-        i, other = guillotine.misfit(self.slots, self.footprint)
+        i, other = guillotine.misfit(*self.cut)
         pieces = [*self.pieces[:i], self.shape(other, COLOURS[i]), *self.pieces[i + 1 :]]
         return {"a_piece_that_does_not_fit": self._scene(pieces)}
 
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        closes = guillotine.closes(self.slots, self.footprint)
-        area, floor = float(sum(slot.area for slot in self.slots)), float(self.footprint.area)
+        area, floor = float(sum(slot.area for slot in self.cut.pieces)), float(self.cut.rect.area)
+        closes = guillotine.closes(*self.cut)
         yield require(closes, "the pieces do not close the bin's footprint", pieces=area, bin=floor)
-        narrow = min(min(piece.upright, piece.lying) for piece in self.pieces)
-        yield require(
-            narrow >= 2 * CUP_HALF_WIDTH, "an arm is too narrow for the cup", arm=narrow, cup=2 * CUP_HALF_WIDTH
-        )
+        narrow, cup = min(min(piece.upright, piece.lying) for piece in self.pieces), 2 * CUP_HALF_WIDTH
+        yield require(narrow >= cup, "an arm is too narrow for the cup", arm=narrow, cup=cup)
         weight = GRAVITY * max(piece.mass for piece in self.pieces)
         yield require(weight <= PULL / 2, "a piece is too heavy for the cup", weight=weight, most=PULL / 2)
-        near = self._least_clearance()
-        yield require(
-            near >= MIN_CLEARANCE, "the pieces or the bin overlap at the start", distance=near, least=MIN_CLEARANCE
-        )
+        bodies = [[corners([self.x, self.y], math.radians(self.heading), self.bin.outer)]]
+        bodies += [piece.outlines(*self.start(i)) for i, piece in enumerate(self.pieces)]
+        near, least = least_gap(bodies), MIN_CLEARANCE
+        yield require(near >= least, "the pieces or the bin overlap at the start", distance=near, least=least)
         poses = [(i, *pose) for i in range(self.count) for pose in (self.start(i), self.goal(i))]
-        tops = [pos + about_z(yaw) @ self.face(i) + CARRY_HEIGHT * UP for i, pos, yaw in poses]
+        tops = [pos + about_z(yaw) @ self.face(i) + fitting.CARRY_HEIGHT * UP for i, pos, yaw in poses]
         yield within_reach("a piece", *tops)
         most = max(abs(spot.turn) for spot in self.spots)
         yield require(most > 45.0, "every piece already lies within 45 deg of its slot", turn=most)
-
-    def _least_clearance(self) -> float:
-        """Least distance between the outlines of two bodies on the table [m]; negative if they overlap."""
-        bodies = [[corners([self.x, self.y], math.radians(self.heading), self.bin.outer)]]
-        for i, piece in enumerate(self.pieces):
-            bodies.append([corners(*self.start(i), part[2:], part[:2]) for part in piece.parts])
-        pairs = itertools.combinations(bodies, 2)
-        return min(gap(a, b) for one, other in pairs for a in one for b in other)
 
     def features(self) -> Mapping[str, float]:
         """Relative clearance, mass per area of a piece [kg/m^2], largest turn [rad], number of packings."""
@@ -338,54 +270,37 @@ class Packing(Scenario):
             "clearance_over_unit": self.clearance / self.unit,
             "weight_over_area": self.density * self.thickness,
             "largest_turn": math.radians(max(abs(spot.turn) for spot in self.spots)),
-            "solutions": guillotine.solutions(self.slots, self.footprint),
+            "solutions": guillotine.solutions(*self.cut),
         }
 
     def facts(self) -> Mapping[str, float | str]:
+        spot = max(zip(self.pieces, self.spots, strict=False), key=lambda each: each[0].mass)[1]  # of equal densities
         return {
             "pieces": self.count,
             "left": sum(spot.y > 0.0 for spot in self.spots),
             "thickness": self.thickness,
-            "largest": self._largest(),
+            "largest": way_to(np.array([spot.x, spot.y]), np.array([self.x, self.y])),
             "turned": sum(abs(math.remainder(spot.turn, 360.0)) > 5.0 for spot in self.spots),
         }
-
-    def _largest(self) -> str:
-        """Where the piece with the most area lies, seen from the bin, in words. Densities are equal."""
-        spot = max(zip(self.pieces, self.spots, strict=False), key=lambda each: each[0].mass)[1]
-        return way_to(np.array([spot.x, spot.y]), np.array([self.x, self.y]))
 
     # --- geometry -------------------------------------------------------------------------
 
     @cached_property
-    def footprint(self) -> Rect:
-        """Floor of the bin in units, lower left corner at the origin."""
-        inner, rows = self.left + self.right, self.low + self.rise + self.top
-        return Rect.sized(self.frame + inner, self.frame + rows) if self.count == 3 else Rect.sized(2 * inner, rows)
-
-    @cached_property
-    def slots(self) -> tuple[Ell, ...]:
-        """Slots of the pieces as they were cut, in units: they prove that a packing without gaps exists."""
-        low, high = self.low, self.low + self.rise
-        if self.count == 3:
-            first, rest = guillotine.framed(self.footprint, self.frame, self.frame)
-            cut = (first, *guillotine.stairs(rest, self.left, low, high))
-        else:
-            one, two = self.footprint.cut_x(self.left + self.right)
-            cut = (*guillotine.stairs(one, self.left, low, high), *guillotine.stairs(two, self.left, high, low))
-        cut = guillotine.mirrored(cut, self.footprint) if self.mirror else cut
-        dealt = list(itertools.permutations(cut[:3]))[self.deal]
-        return *dealt, *cut[3:]
+    def cut(self) -> guillotine.Cut:
+        """The bin's floor as it was cut into the slots of the pieces, in units."""
+        strips = self.left, self.right, self.low, self.rise, self.top
+        cut = guillotine.three(self.frame, *strips) if self.count == 3 else guillotine.four(*strips)
+        return (cut.mirrored() if self.mirror else cut).dealt(self.deal)
 
     @cached_property
     def bin(self) -> Bin:
-        width, length = (self.unit * float(side) for side in (self.footprint.width, self.footprint.height))
+        width, length = (self.unit * float(side) for side in (self.cut.rect.width, self.cut.rect.height))
         return Bin(width=width, length=length, depth=0.6 * self.thickness)  # lower than the pieces
 
     @cached_property
     def pieces(self) -> tuple[LPiece, ...]:
         """Pieces with the slots' shapes, smaller by the clearance on all sides."""
-        return tuple(self.shape(slot, COLOURS[i]) for i, slot in enumerate(self.slots))
+        return tuple(self.shape(slot, COLOURS[i]) for i, slot in enumerate(self.cut.pieces))
 
     def shape(self, slot: Ell, rgba: Rgba) -> LPiece:
         """Piece that fills a slot up to the clearance."""
@@ -402,10 +317,10 @@ class Packing(Scenario):
 
     def goal(self, i: int) -> tuple[Vec3, float]:
         """Position of piece `i` in its slot [m], and its yaw [rad]."""
-        (across, along), whole, turn = self.slots[i].middle, self.footprint, math.radians(self.heading)
+        (across, along), whole, turn = self.cut.pieces[i].middle, self.cut.rect, math.radians(self.heading)
         away = self.unit * np.array([float(across - whole.width / 2), float(along - whole.height / 2), 0.0])
         floor = np.array([self.x, self.y, TABLE_TOP + self.bin.floor])
-        return floor + about_z(turn) @ away, turn + self.slots[i].quarter * math.pi / 2
+        return floor + about_z(turn) @ away, turn + self.cut.pieces[i].quarter * math.pi / 2
 
     def start(self, i: int) -> tuple[Vec3, float]:
         """Position of piece `i` at the start [m], and its yaw [rad]."""

@@ -43,7 +43,7 @@ from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, 
 from ..sim.memory import remember
 from ..sim.world import World
 from ..skills.grip import take
-from ..skills.jaw import carry, put, release
+from ..skills.jaw import carry, let_go, put
 from ..skills.motion import Condition, Pace, retreat
 
 MIN_LIFT = 0.03  # height of the object's centre of mass above its stand from which the object counts as lifted [m]
@@ -203,8 +203,7 @@ class PickPlaceYcb(Scenario):
         """Drag the object over the table to the square, which does not jump before the object is lifted."""
         yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, self.spots[0], height=0.0)
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.06)
+        yield from let_go(world.arm, 0.06)
 
     def _drag_and_lift(self, world: World) -> Plan:
         """Drag the object to the square, then lift it and put it down."""

@@ -194,8 +194,7 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
         for pace in (STEADY, Pace(0.10, 0.008)):  # twice: the plate swings in the pinch
             yield from self.bring(arm, pace)
         yield from self.lower(arm, self.seat(arm.world))
-        yield from jaw.release(arm)
-        yield from retreat(arm)
+        yield from jaw.let_go(arm)
 
     def lower(self, arm: Arm, seat: Vec3) -> Plan:
         """Lower the held plate until its rim is on the floor, square with the slot.

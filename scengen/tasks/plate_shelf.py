@@ -43,14 +43,15 @@ from ..geometry import UP, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import PAD, PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, pinch
+from ..robots.jaw import PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TUBE
 from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.arm import Arm
 from ..sim.world import World
 from ..skills import jaw, motion, suction
 from ..skills.handover import FORWARDS, LEFT, OVERLAP, SIDEWAYS, STAND_OFF, hand_over, steepness
-from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, together, until, with_arm
+from ..skills.motion import COARSE, OPEN, STEADY, Pace, alone, facing_down, go_to, push, together, with_arm
+from ..skills.waiting import at_most, elapsed
 from .plate_and_slot import ALONG_TOLERANCE, CARRY_HEIGHT, EDGE_MARGIN, FLOOR_TOLERANCE, FOOT_CLEARANCE, PlateAndSlot
 
 HANDOVER_POINT: Vec3 = np.array([-0.15, 0.0, TABLE_TOP + 0.22])
@@ -100,9 +101,7 @@ class PlateShelf(PlateAndSlot[Plate]):
     def lift(self, arm: Arm) -> Plan:
         """Suck the plate in its middle and lift it."""
         face = arm.world.pos("plate") + self.plate.thickness * UP
-        down = facing_down()
-        yield from go_to(arm, face + 0.03 * UP, down, STEADY, OPEN)
-        yield from suction.suck(arm, face, down)
+        yield from suction.take(arm, face, facing_down())
         yield from suction.carry(arm, "plate", arm.world.pos("plate") + 0.12 * UP, 0.0, Pace(0.15, 0.01))
 
     def wait_beside(self, arm: Arm) -> Plan:
@@ -149,10 +148,10 @@ class PlateShelf(PlateAndSlot[Plate]):
         """
         world = arm.world
         yield from self._hold_on_edge(arm, beside * UP, above, self.foot)
-        yield from push(arm, -0.05 * UP, _elapsed(world, 4.0), give_up=5.0)
+        yield from push(arm, -0.05 * UP, elapsed(world, 4.0), give_up=5.0)
         yield from suction.let_go(arm)
         yield from go_to(arm, world.com("plate") + (self.plate.radius + 0.05) * UP, facing_down(), COARSE)
-        yield from push(arm, -0.05 * UP, _elapsed(world, 2.0), give_up=3.0)
+        yield from push(arm, -0.05 * UP, elapsed(world, 2.0), give_up=3.0)
 
     def _insert_at_end(self, world: World) -> Plan:
         """Hold the plate on edge with the cup on its left side, stand it half in the slot's left end, roll it in."""
@@ -190,14 +189,13 @@ class PlateShelf(PlateAndSlot[Plate]):
         world, rot = arm.world, about_z(math.radians(self.shelf_yaw)) @ FORWARDS
         over = foot + (self.shelf.top + self.plate.radius + CARRY_HEIGHT) * UP
         face = world.pos("plate") + facing_down() @ rot.T @ beside + (self.plate.thickness + above) * UP
-        yield from go_to(arm, face + 0.03 * UP, facing_down(), STEADY, OPEN)
-        yield from suction.suck(arm, face, facing_down(), 0.04)
+        yield from suction.take(arm, face, facing_down(), 0.04)
         yield from go_to(arm, arm.hand + (self.shelf.top + 2 * self.plate.radius) * UP, pace=Pace(0.15, 0.01))
         before = over + beside - 0.08 * rot[:, 2]
         yield from go_to(arm, [before[0], before[1], arm.hand[2]], pace=Pace(0.10, 0.02))
-        yield from until(motion.turn_to(arm, rot, 0.5, give_up=9.0), _elapsed(world, 6.0))
+        yield from at_most(world, 6.0, motion.turn_to(arm, rot, 0.5, give_up=9.0))
         for pace in (Pace(0.10, 0.01), Pace(0.05, 0.004)):
-            yield from until(go_to(arm, arm.hand + over - self.middle(world), pace=pace), _elapsed(world, 4.0))
+            yield from at_most(world, 4.0, go_to(arm, arm.hand + over - self.middle(world), pace=pace))
 
     @with_arm(0)
     def _lay_flat(self, arm: Arm) -> Plan:
@@ -283,10 +281,9 @@ class PlateShelf(PlateAndSlot[Plate]):
 
     def features(self) -> Mapping[str, float]:
         plate = self.plate
-        lever = plate.radius - OVERLAP
         return {
             "slack": self.slack,
-            "droop": GRAVITY * plate.mass * lever / (pinch(plate.thickness) * PAD / 2),
+            "droop": droop(plate.mass, plate.radius - OVERLAP, plate.thickness),
             "radius": plate.radius,
             "carried": float(np.linalg.norm(self.foot - self.start)),
             "slot_yaw": math.radians(self.shelf_yaw),
@@ -299,9 +296,3 @@ class PlateShelf(PlateAndSlot[Plate]):
             "radius": self.plate.radius,
             "gap": self.gap,
         }
-
-
-def _elapsed(world: World, seconds: float) -> motion.Condition:
-    """Condition that holds once `seconds` [s] have passed, for moves that may not reach their end."""
-    end = world.time + seconds
-    return lambda: world.time > end

@@ -44,7 +44,7 @@ from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, sh
 from ..params import param
 from ..physics import GRAVITY
 from ..robots import panda
-from ..robots.jaw import FINGER_ACROSS, PAD, PALM_ABOVE, TIP_BELOW, pinch
+from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW, droop, pinch
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
@@ -277,7 +277,7 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
             "pressed_tilt": plate.slope,
             "raised": plate.raised,
             "askew": self.raised_tilt - 2 * plate.slope,
-            "droop": GRAVITY * plate.mass * (plate.radius - OVERLAP) / (pinch(plate.thickness) * PAD / 2),
+            "droop": droop(plate.mass, plate.radius - OVERLAP, plate.thickness),
             "slack": self.slack,
             "radius": plate.radius,
             "carried": float(np.linalg.norm(self.foot - self.start)),

@@ -37,7 +37,7 @@ line. This corrects a peg that sits askew in the jaw, a board that has turned, a
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -46,21 +46,23 @@ import numpy as np
 from ..assets.peg import Peg, Plinth
 from ..assets.prop import TABLE_TOP, place, servo, table
 from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
-from ..control.loop import Loop
-from ..errors import GaveUp
-from ..geometry import UP, Mat3, Outline, Vec3, about_z, axes, between, corners, gap, heading, polar, rotation, way_to
+from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, polar, way_to
 from ..params import param
-from ..predicates import fallen, still
+from ..predicates import fallen
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.jaw import grasp, release
-from ..skills.motion import CLOSED, COARSE, FINE, OPEN, STEADY, Condition, facing, go_to, push, retreat, steer, turn_to
+from ..skills import insertion
+from ..skills.insertion import Aim, Line
+from ..skills.jaw import let_go
+from ..skills.motion import COARSE, Condition, facing, go_to, turn_to
+from ..skills.waiting import elapsed
 
 HINGE = "board/hinge"
 ALIGN_ANGLE = math.radians(6.0)  # largest angle between peg and slot for the peg to be in line [rad]
 SIDE_TOLERANCE = 0.010  # largest distance of the nose from the slot's axis for the peg to be in line [m]
+TURN_MARGIN = math.radians(3.0)  # angle by which the turn exceeds the steepest one that passes the slot [rad]
 INSERTED_SHARE = 0.95  # share of the peg's length beyond the mouth to which the oracle pushes (paper)
 MIN_INSERTED_SHARE = 0.93  # least such share that counts
 MAX_INSERTED_SHARE = 1.03  # largest such share that counts: a flush peg
@@ -69,8 +71,6 @@ GRIP_HEIGHT = 0.024
 BOARD_CLEARANCE = 0.006  # clearance of the fingers from the board when they release the peg [m]
 WAITING_DISTANCE = 0.02  # distance before the mouth at which the nose is aligned again after the turn [m]
 ENTER_SPEED = 0.08  # speed at which the held peg enters the slot [m/s]
-
-Line = tuple[Mat3, Vec3]  # axes of a slot, x leading in, and the middle of its mouth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +169,6 @@ class RecoverPegInsert(Scenario):
 
     def oracle(self, world: World) -> Plan:
         """Take the peg, align it before and after the turn, insert it as far as the fingers allow, push the rest."""
-        yield from self.take(world)
         yield from self.present(world)
         yield from self.guide(world, lambda: self.slot(world), -WAITING_DISTANCE)
         yield from self.enter(world, lambda: self.slot(world))
@@ -177,71 +176,33 @@ class RecoverPegInsert(Scenario):
 
     def take(self, world: World) -> Plan:
         """Grasp the peg near its foot from the side with a level hand, lift it."""
-        arm, rot = world.arm, facing(self.side * math.pi / 2 + self._peg_yaw, 0.0)
-        at = self.foot + GRIP_HEIGHT * UP
-        yield from go_to(arm, at - 0.12 * rot[:, 2] + (self.peg.length + 0.03) * UP, pace=COARSE, grip=OPEN)
-        yield from turn_to(arm, rot, 1.5)
-        yield from go_to(arm, at - 0.09 * rot[:, 2] + 0.01 * UP, rot, STEADY)
-        yield from go_to(arm, at, rot, FINE)
-        yield from grasp(arm)
-        yield from retreat(arm)
+        rot, at = facing(self.side * math.pi / 2 + self._peg_yaw, 0.0), self.foot + GRIP_HEIGHT * UP
+        yield from insertion.take_upright(world.arm, at, rot, self.peg.length + 0.03)
 
     def present(self, world: World) -> Plan:
-        """Lay the peg level by turning the hand down, and bring it to the mouth until the board turns."""
+        """Take the peg, lay it level by turning the hand down, and bring it to the mouth until the board turns."""
+        yield from self.take(world)
         yield from turn_to(world.arm, facing(self._azimuth, math.pi / 2), 1.2)
         yield from self.guide(world, lambda: self.slot(world), -0.08, 0.25)  # 5 mm outside of the largest `distance`
         yield from self.guide(world, lambda: self.slot(world), 0.0, ENTER_SPEED, lambda: world.memory["turned"] > 0)
 
-    def guide(
-        self, world: World, line: Callable[[], Line], depth: float, speed: float = 0.15, ends: Condition | None = None
-    ) -> Plan:
-        """Steer the nose of the held peg to a place on a line, with the peg along the line and one side level.
+    def guide(self, world: World, aim: Aim, depth: float, speed: float = 0.15, ends: Condition | None = None) -> Plan:
+        """Steer the peg's nose to a place on a line; see `insertion.guide`."""
+        yield from insertion.guide(world.arm, "peg", lambda: self.top(world), aim, depth, speed, ends)
 
-        Args:
-            line: the line's present pose.
-            depth: distance of the place behind the mouth [m].
-            speed: speed of the approach while the nose is on the line [m/s].
-            ends: condition that ends the move; by default the peg is at the place, in line and at rest.
-
-        Raises:
-            GaveUp: the move took more than 6 s.
-        """
-        arm, nose, end = world.arm, self.top(world), world.time + 6.0
-        setpoint = nose
-        while ends is None or not ends():
-            (rot, mouth), nose = line(), self.top(world)
-            goal = mouth + depth * rot[:, 0]
-            turn, left = between(world.rot("peg"), _level_sides(world.rot("peg"), rot[:, 0])), goal - nose
-            arrived = math.sqrt(left @ left) < 0.002 and math.sqrt(turn @ turn) < 0.015  # [m], [rad]
-            if ends is None and arrived and still(world, "peg", 0.010):
-                return
-            if world.time > end:
-                raise GaveUp(f"the peg's nose stayed {1000 * math.sqrt(left @ left):.0f} mm short of its place for 6 s")
-            x, *off = rot.T @ (nose - mouth)
-            waits = math.hypot(*off) / 0.006 if depth > 0.0 > x else 0.0  # a nose 6 mm off the line stops at the mouth
-            ahead = goal - setpoint
-            distance = math.sqrt(ahead @ ahead)
-            velocity = ahead * (max(0.0, 1.0 - waits) * min(speed, 4.0 * distance) / max(distance, 1e-9))
-            setpoint = setpoint + velocity * Loop.PERIOD
-            yield steer(arm, setpoint + rotation(turn) @ (arm.hand - nose), velocity, turn, CLOSED)
-
-    def enter(self, world: World, line: Callable[[], Line], seconds: float = math.inf) -> Plan:
+    def enter(self, world: World, aim: Aim, seconds: float = math.inf) -> Plan:
         """Insert the peg along a line until the fingers are near the board or the time is over [s], and let go."""
-        end = world.time + seconds
-        ends = lambda: self._near_board(world, BOARD_CLEARANCE) or world.time > end  # noqa: E731
-        yield from self.guide(world, line, self.peg.length, ENTER_SPEED, ends)
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.05)
+        over = elapsed(world, seconds)
+        ends = lambda: self._near_board(world, BOARD_CLEARANCE) or over()  # noqa: E731
+        yield from self.guide(world, aim, self.peg.length, ENTER_SPEED, ends)
+        yield from let_go(world.arm, 0.05)
 
     def push_home(self, world: World) -> Plan:
         """Come down behind the peg with closed fingers and push it in, at most until they are near the board."""
-        arm, foot, (rot, mouth) = world.arm, world.pos("peg"), self.slot(world)
+        foot, (rot, mouth) = world.pos("peg"), self.slot(world)
         behind = np.array([*foot[:2], mouth[2]]) - (FINGER_ACROSS + 0.020) * rot[:, 0]  # 20 mm behind the peg
-        yield from go_to(arm, behind + 0.06 * UP, pace=COARSE, grip=CLOSED)
-        yield from go_to(arm, behind, pace=FINE)
         done = lambda: self.inserted_share(world) > INSERTED_SHARE or self._near_board(world, 0.002)  # noqa: E731
-        yield from push(arm, 0.06 * rot[:, 0], done)
-        yield from go_to(arm, arm.hand - 0.03 * rot[:, 0])
+        yield from insertion.push_in(world.arm, behind, rot[:, 0], done)
 
     def _near_board(self, world: World, clearance: float) -> bool:
         """Whether the fingers are nearer than a clearance to the plane of the mouth [m]."""
@@ -262,24 +223,19 @@ class RecoverPegInsert(Scenario):
     def _aim(self, world: World, shifted: float, turned: float) -> Plan:
         """Insert along a line that follows the board by a share of its shift and a share of its turn."""
         rot, mouth = self.slot(world)
-        yield from self.take(world)
         yield from self.present(world)
-        angle = math.radians(self.turn)
-        pin = mouth + self.board.pivot * rot[:, 0]
+        angle, pin = math.radians(self.turn), mouth + self.board.pivot * rot[:, 0]
         aim = about_z(turned * angle) @ rot, pin + about_z(shifted * angle) @ (mouth - pin)
         yield from self.guide(world, lambda: aim, -WAITING_DISTANCE)
         yield from self.enter(world, lambda: aim, 4.0)  # a peg that is not blocked takes half of that
 
     def _let_go(self, world: World) -> Plan:
         """As the oracle, but release the peg when half of it is in."""
-        yield from self.take(world)
         yield from self.present(world)
         yield from self.guide(world, lambda: self.slot(world), -WAITING_DISTANCE)
-        half = self.peg.length / 2
-        ends = lambda: self.inserted_share(world) > 0.48  # noqa: E731
-        yield from self.guide(world, lambda: self.slot(world), half, ENTER_SPEED, ends)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        half_in = lambda: self.inserted_share(world) > 0.48  # noqa: E731
+        yield from self.guide(world, lambda: self.slot(world), self.peg.length / 2, ENTER_SPEED, half_in)
+        yield from let_go(world.arm)
 
     def _upright(self, world: World) -> Plan:
         """Put the upright peg against the mouth, let go."""
@@ -287,8 +243,7 @@ class RecoverPegInsert(Scenario):
         rot, mouth = self.slot(world)
         held = world.arm.hand - world.com("peg")
         yield from go_to(world.arm, mouth + held - 0.02 * rot[:, 0] + 0.03 * UP, pace=COARSE)
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.05)
+        yield from let_go(world.arm, 0.05)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_slot": self._scene(replace(self.board, plugged=True))}
@@ -300,8 +255,7 @@ class RecoverPegInsert(Scenario):
         yield require(self.side != 0, "the board stands neither left nor right", side=self.side)
         yield require(board.slot > peg.width, "the peg is wider than the slot", slot=board.slot, width=peg.width)
         steepest, turn = board.steepest(peg.width), abs(math.radians(self.turn))
-        margin = math.radians(3.0)
-        yield require(turn > steepest + margin, "the turn leaves the way in open", turn=turn, passes=steepest)
+        yield require(turn > steepest + TURN_MARGIN, "the turn leaves the way in open", turn=turn, passes=steepest)
         yield require(steepest < ALIGN_ANGLE, "a peg gets in that is not in line", passes=steepest, aligned=ALIGN_ANGLE)
         wall = board.chamfer + board.slot / 2
         yield require(wall < board.width / 2, "the board is narrower than its mouth", wall=wall, half=board.width / 2)
@@ -360,11 +314,9 @@ class RecoverPegInsert(Scenario):
     @property
     def outlines(self) -> list[Outline]:
         """Outlines of the peg, and of the board before and after the turn."""
-        board, pin = self.board, self.mouth + self.board.pivot * self.u
-        middle = [board.depth / 2 - board.pivot, 0.0]
-        yaws = (self._azimuth, self._azimuth + math.radians(self.turn))
-        turned = [corners(pin, yaw, [board.depth, board.width], middle) for yaw in yaws]
-        return [corners(self.foot, self._peg_yaw, self.peg.size), *turned]
+        pin, turned = self.mouth + self.board.pivot * self.u, self._azimuth + math.radians(self.turn)
+        boards = [self.board.outline(pin, yaw) for yaw in (self._azimuth, turned)]
+        return [corners(self.foot, self._peg_yaw, self.peg.size), *boards]
 
     @property
     def _azimuth(self) -> float:
@@ -375,9 +327,3 @@ class RecoverPegInsert(Scenario):
     def _peg_yaw(self) -> float:
         """Yaw of the peg in the scene, mirrored or not [rad]."""
         return math.radians(self.side * self.peg_yaw)
-
-
-def _level_sides(here: Mat3, u: Vec3) -> Mat3:
-    """Orientation nearest to `here` in which a square bar points along `u` with level sides."""
-    beside = np.cross(UP, u)
-    return max((axes(x, u) for x in (UP, -UP, beside, -beside)), key=lambda rot: float(np.sum(rot * here)))

@@ -37,7 +37,7 @@ from ..robots.panda import WRIST_MIDDLE
 from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from ..skills.jaw import pick, release, weigh
+from ..skills.jaw import let_go, pick, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
@@ -115,8 +115,7 @@ class RodAcross(RodAndRidge[Rod]):
 
     def _leave(self, world: World) -> Plan:
         """Open the jaw and go straight up, slowly while the fingers are beside the rod."""
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.03, Pace(0.05, 0.003))
+        yield from let_go(world.arm, 0.03, pace=Pace(0.05, 0.003))
         yield from retreat(world.arm, 0.05)
 
     def bring(self, world: World, along: float, yaw: float = 0.0) -> Plan:

@@ -34,7 +34,7 @@ import numpy as np
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, TRIANGLE, Shape
 from ..geometry import UP, Vec3, about_z
-from ..params import check_bounds, param
+from ..params import Bounded, param
 from ..predicates import fallen, still
 from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE
@@ -59,15 +59,12 @@ CARRY_PACE = Pace(0.30, 0.008)  # pace of the move above the pile to the next sh
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class Place(Bounded):
     """A place for a shape at the start."""
 
     x: float = param(-0.16, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
     @property
     def spot(self) -> Vec3:

@@ -55,8 +55,8 @@ from ..robots.panda import BASE, ROBOTVIEW
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from ..skills.jaw import grasp, pick, release
-from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, facing, facing_down, go_to, retreat
+from ..skills.jaw import grasp, let_go, pick
+from ..skills.motion import COARSE, FINE, OPEN, STEADY, Pace, facing, facing_down, go_to
 
 TRAY = Bin(width=0.15, length=0.15, depth=0.025, wall=0.006)
 """A tray wide enough for a cube that rolls over an edge, and for a box that topples."""
@@ -191,8 +191,7 @@ class ShelteredGrasp(Scenario):
         above = self.tray + (TRAY.floor + RELEASE_HEIGHT) * UP
         yield from go_to(arm, [above[0], above[1], max(above[2], arm.hand[2])], rot, STEADY)
         yield from go_to(arm, above - self.lever * rot[:, 2], rot, STEADY)
-        yield from release(arm)
-        yield from retreat(arm, 0.05)
+        yield from let_go(arm, 0.05)
 
     def steps(self) -> Mapping[str, Planner]:
         spot, steep = self.spot(self.storey, self.along), facing(self._azimuth, math.radians(60.0))

@@ -38,17 +38,16 @@ import numpy as np
 
 from ..assets.box import Cube
 from ..assets.catch_bin import CatchBin
-from ..assets.incline import Incline, driven
-from ..assets.prop import TABLE_TOP, Rgba, place, table
+from ..assets.incline import Incline, Load, LoadedIncline, driven
+from ..assets.prop import TABLE_TOP, place, table
 from ..geometry import UP, Vec3, about_z, yaw_of
-from ..params import check_bounds, param
-from ..physics import slid, slip_angle
+from ..params import param
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from ..skills.jaw import pick, release
-from ..skills.motion import Condition, Pace, facing_down, go_to, retreat, stay
+from ..skills.jaw import let_go, pick, release
+from ..skills.motion import Condition, Pace, facing_down, go_to, stay
 
 BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
@@ -60,23 +59,6 @@ FALL_TIME = 0.16  # time from a block's middle over the lip to in the bin [s]; i
 VISIBLE_SLIDE = 0.002  # distance after which a block is seen to slide [m]
 MAX_BIN_TURN = math.radians(5.0)  # angle of the bin to the lip; the oracle, jittered too, turns it by 2.3 deg at most
 DRAW_PACE = Pace(0.30, 0.004)  # pace of the bin
-
-
-@dataclass(frozen=True, kw_only=True)
-class Load:
-    """A block on the ramp."""
-
-    friction: float = param(0.6, "1", 0.15, 1.0, hidden=True)
-    away: float = param(0.04, "m", 0.02, 0.12)  # distance of its middle from the lip
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
-
-    @property
-    def colour(self) -> Rgba:
-        """Colour that shows the friction, in proportion: pale at 0, dark at 1."""
-        pale, dark = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
-        return *(pale + self.friction * (dark - pale)).tolist(), 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,25 +92,21 @@ class SlideCatch(Scenario):
     def _scene(self, loads: Sequence[Load]) -> mujoco.MjSpec:
         """The scene with other blocks in the lanes, which have the colours of the right ones."""
         scene = table()
-        place(scene, self.incline, "incline", [self.x, self.y, TABLE_TOP], free=False)
+        place(scene, self.incline, "incline", self.ramp.foot, free=False)
         driven(scene, "incline")
         for lane, (load, shown) in enumerate(zip(loads, self.loads, strict=True)):
             block = Cube(edge=self.edge, mass=0.02, friction=load.friction, rgba=shown.colour)
-            place(scene, block, f"block_{lane}", self.spot(lane))
-            turn = np.empty(4)
-            mujoco.mju_mat2Quat(turn, self.incline.axes().ravel())
-            scene.body(f"block_{lane}").quat = turn
+            place(scene, block, f"block_{lane}", self.ramp.spot(lane), turn=self.incline.resting)
         place(scene, self.bin, "bin", [self.bin_x, self.bin_y, TABLE_TOP])
         return scene
 
     def events(self, world: World) -> None:
         """Tilt the ramp."""
-        tilted = math.radians(self.rate) * max(0.0, world.time - self.start)
-        world.drive("incline/hinge", min(tilted, self.incline.turns))
+        world.drive("incline/hinge", self.ramp.turned(world.time))
 
     def pending(self, world: World) -> bool:
         """Whether the ramp still tilts, or stopped less than a second ago, so that blocks may still slide."""
-        return world.time < self.start + self.incline.turns / math.radians(self.rate) + 1.0
+        return world.time < self.ramp.end + 1.0
 
     # --- goal -----------------------------------------------------------------------------
 
@@ -143,7 +121,7 @@ class SlideCatch(Scenario):
         for block in self.blocks:
             if world.touching(ROBOT, block):
                 return Strict("the robot touched a block")
-            if world.touching("bin", block) and self.on_ramp(world, block):
+            if world.touching("bin", block) and self.ramp.under(world.com(block)):
                 return Strict("the bin touched a block on the ramp")
         if world.touching(ROBOT, "incline/slab"):
             return Strict("the robot touched the ramp")
@@ -157,13 +135,7 @@ class SlideCatch(Scenario):
 
     def caught(self, world: World, block: str, depth: float = 0.0) -> bool:
         """Whether the middle of a block is inside the bin, at least `depth` below its rim [m]."""
-        x, y, z = np.abs(world.rot("bin").T @ (world.com(block) - world.pos("bin")))
-        return bool(x < self.bin.width / 2 and y < self.bin.length / 2 and z < self.bin.rim - depth)
-
-    def on_ramp(self, world: World, block: str) -> bool:
-        """Whether the middle of a block is over the ramp."""
-        x, _, z = world.com(block) - self.lip
-        return bool(x > 0.0 and z > 0.0)
+        return self.bin.holds(world.rot("bin").T @ (world.com(block) - world.pos("bin")), depth)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -182,8 +154,7 @@ class SlideCatch(Scenario):
         """Wait for one block after the other, then let go of the bin."""
         for block in blocks:
             yield from self.wait_at(world, world.pos(block)[1], lambda block=block: self.caught(world, block))
-        yield from release(world.arm)
-        yield from retreat(world.arm, 0.05)
+        yield from let_go(world.arm, 0.05)
 
     def wait_at(self, world: World, y: float, until: Condition) -> Plan:
         """Draw the bin to a place at the lip, square to it, and keep it there until a condition holds."""
@@ -193,19 +164,19 @@ class SlideCatch(Scenario):
 
     def distance_up(self, world: World, block: str) -> float:
         """Distance of a block's middle from the lip, up the ramp [m]."""
-        return float((world.rot("incline/slab").T @ (world.com(block) - self.lip))[0])
+        return float((world.rot("incline/slab").T @ (world.com(block) - self.ramp.lip))[0])
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
     def shortcuts(self) -> Mapping[str, Shortcut]:
         plans = {
             "park_in_the_middle": Shortcut(self._park),
-            "the_other_way_round": Shortcut(lambda world: self._in_order(world, self.sequence[::-1])),
+            "the_other_way_round": Shortcut(lambda world: self._in_order(world, self.ramp.sequence[::-1])),
             "wait_for_the_slide": Shortcut(self._react),
             "herd_them_together": Shortcut(self._herd),
             "take_them_by_hand": Shortcut(self._by_hand),
         }
-        if ORDERS[self.order] != self.sequence:
+        if ORDERS[self.order] != self.ramp.sequence:
             plans["the_lowest_first"] = Shortcut(lambda world: self._in_order(world, ORDERS[self.order]))
         return plans
 
@@ -241,8 +212,7 @@ class SlideCatch(Scenario):
         yield from self.take(world)
         above = world.arm.hand - world.pos("bin") + (self.incline.lip + 0.03) * UP
         for side in (1, -1):
-            beside = self.lip + np.array([0.0, side * (self.lane + self.bin.outer[1]), 0.0])
-            beside[2] = TABLE_TOP
+            beside = np.array([self.x, self.y + side * (self.lane + self.bin.outer[1]), TABLE_TOP])
             pushed = beside + above - side * self.lane * np.array([0, 1, 0])
             for hand in (beside + above + 0.05 * UP, beside + above, pushed):
                 yield from go_to(world.arm, hand, facing_down(), DRAW_PACE)
@@ -250,14 +220,14 @@ class SlideCatch(Scenario):
 
     def _by_hand(self, world: World) -> Plan:
         """Pick a block off the ramp and release it over the bin."""
-        block = self.blocks[self.sequence[0]]
+        block = self.blocks[self.ramp.sequence[0]]
         yield from pick(world.arm, world.com(block), [0.0, 1.0, 0.0])
         yield from go_to(world.arm, world.pos("bin") + 0.15 * UP, pace=DRAW_PACE)
         yield from release(world.arm, 0.3)
 
     def answer(self) -> Answer:
         """The sequence of the lanes. One try: a block that is not caught is lost."""
-        numbers, right = tuple(float(k) for k in range(len(ORDERS))), ORDERS.index(self.sequence)
+        numbers, right = tuple(float(k) for k in range(len(ORDERS))), ORDERS.index(self.ramp.sequence)
         return Answer(numbers, lambda w, k: self._in_order(w, ORDERS[round(k)]), lambda k: k == right, tries=1)
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
@@ -270,8 +240,8 @@ class SlideCatch(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        first, *_, last = self.sequence
-        slick, rough = self.slips(first, -FRICTION_TOLERANCE), self.slips(last, FRICTION_TOLERANCE)
+        ramp, (first, *_, last) = self.ramp, self.ramp.sequence
+        slick, rough = ramp.slips(first, -FRICTION_TOLERANCE), ramp.slips(last, FRICTION_TOLERANCE)
         least, most = (math.radians(angle) for angle in (self.incline.least, self.incline.most))
         yield require(slick > least + 0.02, "a block slides before the ramp moves", slips=slick, least=least)
         yield require(rough < most - 0.02, "a block never slides", slips=rough, most=most)
@@ -281,19 +251,19 @@ class SlideCatch(Scenario):
         yield require(apart > width, "one place of the bin serves two lanes", apart=apart, width=width)
         room, needs = self.bin.length - self.edge, 0.02
         yield require(room >= needs, "the bin is too narrow", room=room, needs=needs)
-        comes, fetched = self.lip_time(first, -FRICTION_TOLERANCE), 2.4  # [s]; measured until the bin is at a lane
+        comes, fetched = ramp.lip_time(first, -FRICTION_TOLERANCE), 2.4  # [s]; measured until the bin is at a lane
         yield require(comes > fetched, "the first block comes before the bin", comes=comes, fetched=fetched)
-        margin = min(self.time_margin(one, other) for one, other in pairwise(self.sequence))
+        margin = min(self.time_margin(one, other) for one, other in pairwise(ramp.sequence))
         yield require(margin > 0.0, "two blocks come so soon after each other that the bin serves one", spare=margin)
         out = max(load.away for load in self.loads) + self.edge / 2
         yield require(out < self.incline.length, "a block stands out over the ramp", out=out)
-        wide, ramp = BLOCK_COUNT * self.lane - self.lane + self.edge, self.incline.width
-        yield require(wide < ramp, "a lane is beside the ramp", wide=wide, ramp=ramp)
+        wide, across = BLOCK_COUNT * self.lane - self.lane + self.edge, self.incline.width
+        yield require(wide < across, "a lane is beside the ramp", wide=wide, ramp=across)
         end = self.bin_x + self.bin.outer[0] / 2
         yield require(end < self.x - 0.01, "the bin stands under the ramp", reaches=end, lip=self.x)
         half = self.incline.width / 2
-        yield on_table("the ramp", self.lip + np.array([[self.incline.length, side * half, 0] for side in (-1, 1)]))
-        hands = [self.bin_at(self.spot(lane)[1]) + self.bin.handle for lane in range(BLOCK_COUNT)]
+        yield on_table("the ramp", ramp.lip + np.array([[self.incline.length, side * half, 0] for side in (-1, 1)]))
+        hands = [self.bin_at(ramp.spot(lane)[1]) + self.bin.handle for lane in range(BLOCK_COUNT)]
         yield within_reach("the bin", *hands, np.array([self.bin_x, self.bin_y, TABLE_TOP]) + self.bin.handle)
         comes = max(self.reach_after_slide(lane) for lane in range(BLOCK_COUNT))
         needs = self.lane - room / 2
@@ -302,54 +272,41 @@ class SlideCatch(Scenario):
     def features(self) -> Mapping[str, float]:
         """Time margin between two slides [s], slope at which the first block slides [rad], increase of the slope until
         the last one slides [rad], and number of pairs that do not slide in the order in which they lie."""
-        first, *_, last = self.sequence
-        ranks = [self.sequence.index(lane) for lane in ORDERS[self.order]]
+        first, *_, last = self.ramp.sequence
+        ranks = [self.ramp.sequence.index(lane) for lane in ORDERS[self.order]]
         return {
-            "spare_time": min(self.time_margin(one, other) for one, other in pairwise(self.sequence)),
-            "first_slope": self.slips(first),
-            "slopes": self.slips(last) - self.slips(first),
-            "last_slide": self.lip_time(last),
+            "spare_time": min(self.time_margin(one, other) for one, other in pairwise(self.ramp.sequence)),
+            "first_slope": self.ramp.slips(first),
+            "slopes": self.ramp.slips(last) - self.ramp.slips(first),
+            "last_slide": self.ramp.lip_time(last),
             "inversions": sum(a > b for a, b in combinations(ranks, 2)),
         }
 
     def facts(self) -> Mapping[str, float | str]:
         return {
             "lowest": LANE_NAMES[ORDERS[self.order][0]],
-            "first": LANE_NAMES[self.sequence[0]],
-            "last": LANE_NAMES[self.sequence[-1]],
+            "first": LANE_NAMES[self.ramp.sequence[0]],
+            "last": LANE_NAMES[self.ramp.sequence[-1]],
             "lane": self.lane,
             "bin": abs(self.bin_y - self.y),
         }
 
     # --- mechanics ------------------------------------------------------------------------
 
-    def slips(self, lane: int, error: float = 0.0) -> float:
-        """Slope at which the block of a lane begins to slide [rad], its friction being larger by a share `error`."""
-        return slip_angle(self.loads[lane].friction * (1.0 + error))
-
-    def slide_start(self, lane: int, error: float = 0.0) -> float:
-        """Time at which it begins to slide [s]."""
-        turned = self.slips(lane, error) - math.radians(self.incline.least)
-        return self.start + turned / math.radians(self.rate)
-
-    def slide_time(self, lane: int, way: float) -> float:
-        """Time that it takes to slide a distance [s]."""
-        load, rate = self.loads[lane], math.radians(self.rate)
-        # A cube leans on its lower edge and tips early. Measured: 0.86 to 0.93 of the time by the law of sliding.
-        return 0.9 * (way / slid(load.friction, rate, 1.0)[0]) ** (1 / 3)
-
-    def lip_time(self, lane: int, error: float = 0.0) -> float:
-        """Time at which its middle is over the lip [s]."""
-        return self.slide_start(lane, error) + self.slide_time(lane, self.loads[lane].away)
+    @property
+    def ramp(self) -> LoadedIncline:
+        """The ramp in its place, the blocks in its lanes, and its tilt."""
+        foot, rate = np.array([self.x, self.y, TABLE_TOP]), math.radians(self.rate)
+        return LoadedIncline(self.incline, foot, self.lane, self.loads, self.start, rate)
 
     def time_margin(self, one: int, other: int) -> float:
         """Least time margin between two slides besides the time that the bin takes from lane to lane [s]."""
-        between = self.lip_time(other, -FRICTION_TOLERANCE) - self.lip_time(one, FRICTION_TOLERANCE) - FALL_TIME
+        between = self.ramp.time_between(one, other, FRICTION_TOLERANCE) - FALL_TIME
         return between - abs(one - other) * self.lane / 0.27 - 0.12  # measured: speed [m/s] of a drawn bin, delay [s]
 
     def reach_after_slide(self, lane: int) -> float:
         """Distance that the bin moves from when a block is seen to slide until the block is below the rim [m]."""
-        seconds = self.slide_time(lane, self.loads[lane].away) - self.slide_time(lane, VISIBLE_SLIDE) + FALL_TIME
+        seconds = self.ramp.time_left(lane, VISIBLE_SLIDE) + FALL_TIME
         return 0.29 * (seconds - 0.08)  # measured: peak hand speed [m/s], and the tracking lag at that speed [s]
 
     # --- geometry -------------------------------------------------------------------------
@@ -364,21 +321,6 @@ class SlideCatch(Scenario):
     def blocks(self) -> tuple[str, ...]:
         """Names of the blocks by lane; they reveal no friction."""
         return tuple(f"block_{lane}" for lane in range(BLOCK_COUNT))
-
-    @property
-    def sequence(self) -> tuple[int, ...]:
-        """Lanes in the order in which their blocks slide."""
-        return tuple(sorted(range(BLOCK_COUNT), key=lambda lane: self.loads[lane].friction))
-
-    @property
-    def lip(self) -> Vec3:
-        """Middle of the lip [m]."""
-        return np.array([self.x, self.y, TABLE_TOP + self.incline.lip])
-
-    def spot(self, lane: int) -> Vec3:
-        """Place of the block of a lane at the start [m]."""
-        foot, along = np.array([self.x, self.y, TABLE_TOP]), (BLOCK_COUNT // 2 - lane) * self.lane
-        return foot + self.incline.on_slab(self.loads[lane].away, along)
 
     def bin_at(self, y: float) -> Vec3:
         """Place of a bin that catches blocks at `y` [m]; the lip covers 14 mm of it, so that none falls behind."""

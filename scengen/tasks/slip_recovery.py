@@ -42,7 +42,6 @@ import numpy as np
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
-from ..control.loop import Loop
 from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -54,8 +53,9 @@ from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
 from ..skills.grip import extent, take
-from ..skills.jaw import carry, grasp, poke, put, release
+from ..skills.jaw import carry, grasp, let_go, poke, put, release
 from ..skills.motion import Pace, go_to, retreat
+from ..skills.waiting import settle
 
 MIN_LIFT = 0.05
 """Height above its stand to which an object must be lifted to count as carried [m]: more than `PALM_ABOVE` +
@@ -178,15 +178,8 @@ class SlipRecovery(Scenario):
             if world.touching(ROBOT, "thing"):
                 break
             yield from release(world.arm)
-            yield from self.settle(world)
+            yield from settle(world, "thing", below=REST_SPEED)
         yield from self.set_down(world)
-
-    def settle(self, world: World) -> Plan:
-        """Wait until the object has been at rest for 0.2 s: a can that rocks is slow at the end of every swing."""
-        quiet = 0.0
-        while quiet < 0.2:
-            yield world.idle
-            quiet = quiet + Loop.PERIOD if still(world, "thing", REST_SPEED) else 0.0
 
     def bring(self, world: World, height: float = CARRY_HEIGHT) -> Plan:
         """Carry the object above the goal, as long as it is in the hand."""
@@ -203,7 +196,7 @@ class SlipRecovery(Scenario):
         def find(world: World) -> Plan:
             if not world.touching(ROBOT, "thing"):
                 yield from release(world.arm)
-                yield from self.settle(world)
+                yield from settle(world, "thing", below=REST_SPEED)
 
         def take_again(world: World) -> Plan:
             if not world.touching(ROBOT, "thing"):
@@ -241,8 +234,7 @@ class SlipRecovery(Scenario):
         held_at = world.arm.hand[2] - TABLE_TOP
         yield from self._move_to_goal(world, held_at)
         yield from self._move_to_goal(world, held_at - CARRY_HEIGHT)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        yield from let_go(world.arm)
 
     def _grip_harder(self, world: World) -> Plan:
         """When the object slips, stop and squeeze for longer than slips last, then continue."""
@@ -252,8 +244,7 @@ class SlipRecovery(Scenario):
         yield from grasp(world.arm, 0.6)
         yield from self._move_to_goal(world, held_at)
         yield from self._move_to_goal(world, held_at - CARRY_HEIGHT)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        yield from let_go(world.arm)
 
     def _carry_low(self, world: World) -> Plan:
         """Carry the object 1 cm above the table, where it stays between the fingers when it slips."""
@@ -265,14 +256,13 @@ class SlipRecovery(Scenario):
         """Grasp the object and drag it over the table, which no slip can prevent."""
         yield from take(world.arm, "thing", lift=0.0)
         yield from self.bring(world, 0.0)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        yield from let_go(world.arm)
 
     def _push_rest(self, world: World) -> Plan:
         """After the fall, push the object to the goal with closed fingers."""
         yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         yield from self.bring(world)
-        yield from self.settle(world)
+        yield from settle(world, "thing", below=REST_SPEED)
         at, offset = world.com("thing"), (self.goal - world.com("thing")) * [1.0, 1.0, 0.0]
         along = offset / np.linalg.norm(offset)
         low, high = extent(world, "thing", -along)

@@ -40,24 +40,23 @@ import numpy as np
 from ..assets.box import Cube, LoadedCube
 from ..assets.prop import TABLE_TOP, place, table
 from ..control.loop import Loop
-from ..geometry import UP, Outline, Vec3, corners, gap, heading
-from ..params import check_bounds, param
-from ..physics import GRAVITY
-from ..predicates import fallen, still
-from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, SPAN, TIP_BELOW
+from ..geometry import UP, Vec3, heading
+from ..params import Bounded, param
+from ..physics import stopping_speed, thrown_off
+from ..predicates import count_time, fallen, still
+from ..robots.jaw import PALM_ABOVE, PALM_ALONG, SPAN, TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
 from ..sim.world import World
-from ..skills.grip import Grip, directions, extent, grips
-from ..skills.jaw import carry, pick, put, release
-from ..skills.motion import FINE, OPEN, Pace, facing_down, go_to, hand_yaw, retreat, wait
+from ..skills import waiting
+from ..skills.cubes import CARRY_HEIGHT, CARRY_PACE, centre, stack, supports, take
+from ..skills.grip import extent
+from ..skills.jaw import carry, let_go, pick
+from ..skills.motion import wait
 
 NAMES = ("bottom", "middle", "top")
 REST_SPEED = 0.01  # speed below which a cube counts as at rest [m/s]
-CARRY_HEIGHT = 0.03
-"""Height above the tower at which a cube is carried, and above a released cube to which the hand rises [m]."""
-CARRY_PACE = Pace(0.30, 0.008)  # pace of moves above the cubes
 GUARD_CLEARANCE = 0.02  # least clearance over the tower of a hand beside it that does not delay the blow [m]
 MIN_EDGE_DIFFERENCE = 0.004  # least difference between the edges of two cubes [m]
 MIN_DISTANCE = 0.30  # least distance from the robot's first axis at which a hand takes a cube [m]: measured
@@ -68,7 +67,7 @@ cube has lain on the table since the last blow."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Blow:
+class Blow(Bounded):
     """An impulse through the middle of the top cube, and possibly one through that of the middle cube."""
 
     when: float = param(0.7, "s", 0.1, 10.0, hidden=True)
@@ -80,9 +79,6 @@ class Blow:
     """Direction in which the middle cube is thrown."""
     speed: float = param(0.88, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the top cube
     speed_middle: float = param(0.92, "m/s", 0.1, 2.5, hidden=True)  # speed that the impulse gives to the middle cube
-
-    def __post_init__(self) -> None:
-        check_bounds(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +128,7 @@ class StackCollapseRecovery(Scenario):
         memory = world.memory
         memory["fell"] = max(memory["fell"], float(world.touching("top", "table")))
         stands = self.stands(world) and not self.guarded(world)
-        memory["stood"] = memory["stood"] + Loop.PERIOD if stands else 0.0
+        count_time(world, "stood", stands)
         number = int(memory["blows"])
         if number < self.blows and memory["stood"] >= self.planned[number].when - 1e-9:
             memory["blows"], memory["stood"], memory["fell"] = number + 1, 0.0, 0.0
@@ -158,8 +154,8 @@ class StackCollapseRecovery(Scenario):
         """Wait for the blow; then, each time all cubes are at rest, stack the lowest one that is out of place."""
         yield from self.wait_for_collapse(world)
         while True:
-            missing = [pair for pair in pairwise(NAMES) if not self.supports(world, *pair)]
-            yield from self.stack(world, *missing[0]) if missing else (world.idle,)
+            missing = [pair for pair in pairwise(NAMES) if not supports(world, *pair)]
+            yield from stack(world.arm, self.edges, *missing[0]) if missing else (world.idle,)
             yield from self.settle(world)
 
     def wait_for_collapse(self, world: World) -> Plan:
@@ -168,81 +164,8 @@ class StackCollapseRecovery(Scenario):
         yield from self.settle(world)
 
     def settle(self, world: World) -> Plan:
-        """Wait until all cubes have been at rest for 0.2 s."""
-        quiet = 0.0
-        while quiet < 0.2:
-            yield world.idle
-            quiet = quiet + Loop.PERIOD if all(still(world, name, REST_SPEED) for name in NAMES) else 0.0
-
-    def supports(self, world: World, below: str, name: str) -> bool:
-        """Whether a cube lies on top of another one, `below`."""
-        return world.touching(below, name) and world.com(name)[2] > extent(world, below, UP)[1]
-
-    def stack(self, world: World, below: str, name: str, offset: float = 0.0, by_mass: bool = True) -> Plan:
-        """Take a cube, put it down on the cube `below`, move up.
-
-        Args:
-            offset: distance from the lower cube's middle, towards the robot [m].
-            by_mass: whether the cube's centre of mass is brought there, or else its middle.
-        """
-        yield from self.take(world, name)
-        foot = np.array([*self.centre(world, below)[:2], extent(world, below, UP)[1]]) - [offset, 0.0, 0.0]
-        at = foot + (world.com(name)[2] - extent(world, name, UP)[0]) * UP
-        if not by_mass:
-            at[:2] += (world.com(name) - self.centre(world, name))[:2]
-        yield from put(world.arm, name, at, on=below, hover=CARRY_HEIGHT)
-        yield from retreat(world.arm, self.cubes[name].edge / 2 + 2 * CARRY_HEIGHT)  # ends up to 2 cm short
-
-    def take(self, world: World, name: str) -> Plan:
-        """Grasp a cube by two of its sides and lift it above the tower."""
-        arm, half, at = world.arm, self.cubes[name].edge / 2, grips(world, name)[0].at
-        height = max(extent(world, other, UP)[1] for other in NAMES) + half + CARRY_HEIGHT - at[2]
-        above = half + TIP_BELOW + 0.008  # the finger tips pass 8 mm above the cube
-        yield from go_to(arm, at + height * UP, pace=CARRY_PACE, grip=OPEN)  # the range of the wrist is read there
-        closing, turn = self.choose_sides(world, name)
-        rot = facing_down(hand_yaw(arm) + turn)
-        yield from go_to(arm, at + height * UP, rot)  # a turn drags the hand along
-        yield from go_to(arm, at + above * UP, rot, FINE)  # the arm overshoots when it comes near the robot
-        yield from pick(arm, at, closing, above=above, lift=height)
-
-    def choose_sides(self, world: World, name: str) -> tuple[Vec3, float]:
-        """Direction in which to close the jaw on a cube, and the turn of the hand that this takes [rad].
-
-        The smallest turn that keeps the wrist away from its limits, among the sides that have enough clearance for the
-        jaw. If none has enough, those with the most clearance are used.
-        """
-        clearances = {tuple(grip.closing): self.clearance(world, name, grip) for grip in grips(world, name)}
-        least = min(0.010, max(clearances.values()))  # 10 mm are enough: moves are exact to 3 mm
-        enough = [np.array(closing) for closing, clearance in clearances.items() if clearance >= least]
-        yaw, wrist = hand_yaw(world.arm), float(world.arm.joint_pos[6])
-        turns = [
-            (math.remainder(math.atan2(-x, y) + flip - yaw, 2 * math.pi), np.array([x, y, 0.0]))
-            for x, y, _ in enough
-            for flip in (0.0, math.pi)
-        ]
-        # joint 7 ends at 2.9 rad; up to 1.7 rad it can be turned on the way to any place
-        turn, closing = min(turns, key=lambda one: (abs(wrist - one[0]) > 1.7, abs(one[0])))
-        return closing, turn
-
-    def clearance(self, world: World, name: str, grip: Grip) -> float:
-        """Clearance between the open jaw around a cube and the other cubes, as seen from above [m]."""
-        least, yaw = math.inf, math.atan2(grip.closing[1], grip.closing[0])
-        for other in NAMES:
-            top = extent(world, other, UP)[1]
-            fingers, palm = (SPAN, 2 * FINGER_ACROSS), (2 * PALM_ALONG, 2 * PALM_ACROSS)
-            for bottom, size in ((-TIP_BELOW, fingers), (PALM_ABOVE, palm)):
-                if other != name and top > grip.at[2] + bottom:
-                    least = min(least, gap(corners(grip.at, yaw, size), self.outline(world, other)))
-        return least
-
-    def outline(self, world: World, name: str) -> Outline:
-        """Outline of a cube that lies on one of its faces, as seen from above."""
-        x, y, _ = directions(world, name)[0]
-        return corners(self.centre(world, name), math.atan2(y, x), [self.cubes[name].edge] * 2)
-
-    def centre(self, world: World, name: str) -> Vec3:
-        """Middle of a cube in its present pose [m]."""
-        return world.pos(name) + self.cubes[name].edge / 2 * world.rot(name)[:, 2]
+        """Wait until all cubes are at rest."""
+        yield from waiting.settle(world, *NAMES, below=REST_SPEED)
 
     # --- shortcuts ------------------------------------------------------------------------
 
@@ -261,41 +184,38 @@ class StackCollapseRecovery(Scenario):
 
     def _hold(self, world: World) -> Plan:
         """Grasp the top cube where it stands as fast as possible, hold it there for one second, let go."""
-        at, side = self.centre(world, "top"), world.rot("top")[:, 1]
+        at, side = centre(world, "top", self.top.edge), world.rot("top")[:, 1]
         yield from pick(world.arm, at, side, above=self.top.edge + CARRY_HEIGHT, lift=0.0, squeeze=1.0, pace=CARRY_PACE)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        yield from let_go(world.arm)
 
     def _upside_down(self, world: World) -> Plan:
         """Stack the middle cube on the smallest, and the largest on both, all centred."""
         yield from self.wait_for_collapse(world)
         for below, name in pairwise(reversed(NAMES)):
-            yield from self.stack(world, below, name)
+            yield from stack(world.arm, self.edges, below, name)
 
     def _restack(self, world: World, beyond_edge: bool = False, by_mass: bool = True) -> Plan:
         """Stack in the right order, but release cubes beyond the edge of the one below, or with middle over middle."""
         yield from self.wait_for_collapse(world)
         for below, name in pairwise(NAMES):
-            if not self.supports(world, below, name):
+            if not supports(world, below, name):
                 over_edge = self.cubes[below].edge / math.sqrt(2) + 0.004  # the middle is 4 mm over the edge
-                yield from self.stack(world, below, name, over_edge if beyond_edge else 0.0, by_mass)
+                yield from stack(world.arm, self.edges, below, name, over_edge if beyond_edge else 0.0, by_mass)
                 yield from self.settle(world)
 
     def _top_alone(self, world: World) -> Plan:
         """Put the top cube back where it stood, without looking whether a cube is there to support it."""
         yield from self.wait_for_collapse(world)
-        yield from self.take(world, "top")
+        yield from take(world.arm, self.edges, "top")
         at = self.feet[2] + self.top.edge / 2 * UP
         yield from carry(world.arm, "top", at + CARRY_HEIGHT * UP, pace=CARRY_PACE)
         yield from carry(world.arm, "top", at)
-        yield from release(world.arm)
-        yield from retreat(world.arm)
+        yield from let_go(world.arm)
 
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        edges = [cube.edge for cube in self.cubes.values()]
-        apart = min(abs(a - b) for a, b in combinations(edges, 2))
+        apart = min(abs(a - b) for a, b in combinations(self.edges.values(), 2))
         yield require(apart >= MIN_EDGE_DIFFERENCE, "two cubes are alike", difference=apart, least=MIN_EDGE_DIFFERENCE)
         steep = self.top.steepest
         yield require(self.top.lean <= steep, "the slug does not fit in", lean=self.top.lean, steepest=steep)
@@ -339,6 +259,11 @@ class StackCollapseRecovery(Scenario):
         return dict(zip(NAMES, (self.bottom, self.middle, self.top), strict=True))
 
     @property
+    def edges(self) -> dict[str, float]:
+        """Edges of the cubes by name [m]."""
+        return {name: cube.edge for name, cube in self.cubes.items()}
+
+    @property
     def feet(self) -> list[Vec3]:
         """Initial position of each cube's foot [m]."""
         heights = np.cumsum([0.0, self.bottom.edge, self.middle.edge])
@@ -357,18 +282,12 @@ class StackCollapseRecovery(Scenario):
         return found
 
     def spots(self, blow: Blow) -> list[Vec3]:
-        """Farthest places on the table that the middles of the cubes that a blow strikes can reach [m].
-
-        A cube is slowed by sliding friction up to the edge of the cube below, falls freely, and slides on. Tumbling
-        shortens the distance: measured are 0.6 to 1.0 of it.
-        """
+        """Farthest places on the table that the middles of the cubes that a blow strikes can reach [m]."""
         found = []
         for name, velocity in self.velocities(blow).items():
             below, foot = self.cubes[NAMES[NAMES.index(name) - 1]], self.feet[NAMES.index(name)]
-            brake = 2 * self.cubes[name].friction * GRAVITY
             speed = math.hypot(*velocity[:2])
-            at_edge = math.sqrt(max(0.0, speed**2 - brake * below.edge / 2))
-            distance = below.edge / 2 + at_edge * math.sqrt(2 * (foot[2] - TABLE_TOP) / GRAVITY) + at_edge**2 / brake
+            distance = thrown_off(speed, self.cubes[name].friction, below.edge / 2, foot[2] - TABLE_TOP)
             found.append(self.feet[0] + distance / speed * velocity)
         return found
 
@@ -380,4 +299,4 @@ class StackCollapseRecovery(Scenario):
         way, load = self.cubes[NAMES[NAMES.index(name) - 1]].edge / math.sqrt(2), 0.0
         if name == "middle":
             load = self.top.mass / self.middle.mass * self.middle.edge / 2
-        return math.sqrt(2 * self.cubes[name].friction * GRAVITY * (way + load))
+        return stopping_speed(self.cubes[name].friction, way + load)

@@ -21,19 +21,15 @@ from scengen import load_task
 from scengen.assets.glyph import STROKES
 from scengen.assets.keyboard import LETTERS, Keyboard
 from scengen.assets.prop import TABLE_TOP
+from scengen.assets.words import DOUBLED_WORDS, LONG_WORDS, TRAINING_WORDS, UNSEEN_WORDS, WORDS
 from scengen.control.loop import Loop
 from scengen.episode import Episode
 from scengen.geometry import UP
 from scengen.tasks.keyboard_typing import (
-    DOUBLED_WORDS,
-    LONG_WORDS,
     MIN_CLEARANCE,
     MISTAKES,
     PARTNER_HOME,
-    TRAINING_WORDS,
     TURN_LIMIT,
-    UNSEEN_WORDS,
-    WORDS,
     KeyboardTyping,
 )
 
@@ -290,10 +286,10 @@ def test_with_dead_keys_for_the_partner_its_turn_never_ends():
 
 @dataclass(frozen=True, kw_only=True)
 class Parked(KeyboardTyping):
-    """The partner stays where it is."""
+    """The partner pauses for ever, and stays at home."""
 
-    def _partner_action(self, world, arm):
-        return arm.idle
+    def pause(self, k):
+        return math.inf
 
 
 def test_with_the_partner_parked_the_witness_fails(world):

@@ -57,7 +57,7 @@ def free(scenario, world):
 
 def joints(scenario):
     """Area that stays free [m^2]: pieces are smaller by the clearance along their outlines, 4 c^2 counted too often."""
-    outline = sum(2 * (slot.bounds.width + slot.bounds.height) for slot in scenario.slots)
+    outline = sum(2 * (slot.bounds.width + slot.bounds.height) for slot in scenario.cut.pieces)
     c = scenario.clearance
     return c * scenario.unit * float(outline) - 4 * c * c * scenario.count
 
@@ -68,8 +68,8 @@ def joints(scenario):
 @given(cuts)
 @settings(deadline=None, max_examples=40)
 def test_every_cut_closes_exactly_and_a_few_arrangements_do(scenario):
-    assert guillotine.closes(scenario.slots, scenario.footprint)
-    assert sum(slot.area for slot in scenario.slots) == scenario.footprint.area
+    assert guillotine.closes(scenario.cut.pieces, scenario.cut.rect)
+    assert sum(slot.area for slot in scenario.cut.pieces) == scenario.cut.rect.area
     assert 1 <= scenario.features()["solutions"] <= 100
 
 
@@ -89,7 +89,7 @@ def test_the_number_of_solutions_of_the_training_scenarios_lies_between_2_and_32
 
 
 def test_whole_units_are_exact():
-    for slot in Packing(count=4, left=3, rise=3).slots:
+    for slot in Packing(count=4, left=3, rise=3).cut.pieces:
         assert all(type(side) is Fraction and side.denominator == 1 for side in slot.sides)
 
 
@@ -184,9 +184,9 @@ class Forged(Packing):
     """One piece is the mirror image of what was cut."""
 
     @cached_property
-    def slots(self):
-        whole = super().slots
-        return (guillotine.mirrored(whole[:1], whole[0].bounds)[0], *whole[1:])
+    def cut(self):
+        (first, *others), rect = super().cut
+        return guillotine.Cut((guillotine.mirrored([first], first.bounds)[0], *others), rect)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,7 +48,7 @@ def idle():
     while NOMINAL.pending(world):
         episode.step(world.idle.astype(np.float32))
         times.append(world.time)
-        places.append([world.com(block) - NOMINAL.lip for block in NOMINAL.blocks])
+        places.append([world.com(block) - NOMINAL.ramp.lip for block in NOMINAL.blocks])
         velocities.append([world.velocity(block)[3:] for block in NOMINAL.blocks])
     return np.array(times), np.array(places), np.array(velocities)
 
@@ -60,8 +60,8 @@ RATTLES = other_under_mujoco_4("a block that rattles crosses the lip at 0.23 ins
 def test_a_block_is_over_the_lip_when_its_friction_and_its_place_say(idle, lane):
     times, places, velocities = idle
     row = int(np.argmax(places[:, lane, 0] < 0.0))
-    assert times[row] == pytest.approx(NOMINAL.lip_time(lane), abs=0.05)
-    since = times[row] - NOMINAL.slide_start(lane)
+    assert times[row] == pytest.approx(NOMINAL.ramp.lip_time(lane), abs=0.05)
+    since = times[row] - NOMINAL.ramp.slide_start(lane)
     _, speed = slid(NOMINAL.loads[lane].friction, math.radians(NOMINAL.rate), since)
     assert np.linalg.norm(velocities[row, lane]) == pytest.approx(speed, rel=0.25)
 
@@ -129,7 +129,7 @@ def test_a_memorised_motion_serves_no_other_order_and_no_other_time(moved):
 def test_one_of_six_sequences_is_right():
     answer = SLIDING.answer()
     right = [number for number in answer.candidates if answer.right(number)]
-    assert [ORDERS[round(number)] for number in right] == [SLIDING.sequence]
+    assert [ORDERS[round(number)] for number in right] == [SLIDING.ramp.sequence]
     wrong = next(number for number in answer.candidates if number not in right)
     assert not play(TASK, SLIDING, lambda world: answer.act(world, wrong)).solved
 

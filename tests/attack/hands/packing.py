@@ -13,9 +13,10 @@ from scengen.geometry import UP, Vec3, yaw_of
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
+from scengen.skills.fitting import AIM_PACE, bring, take
 from scengen.skills.motion import COARSE, Pace, retreat, until
 from scengen.skills.suction import carry, let_go
-from scengen.tasks.packing import AIM_PACE, Packing
+from scengen.tasks.packing import Packing
 
 OVERLAP = 0.45
 """Overlap of two pieces that a compliant hand pushes apart [units]."""
@@ -89,13 +90,13 @@ def try_places(scenario: Scenario, world: World) -> Plan:
     arm, lying, held = world.arm, dict[int, Ell](), None
     cuts = [replace(scenario, deal=deal, mirror=mirror) for mirror in (1, 0) for deal in range(6)]
     while cuts:
-        cut = max(cuts, key=lambda c: sum(c.slots[i] == slot for i, slot in lying.items()))
-        todo = [i for i in range(scenario.count) if lying.get(i) != cut.slots[i]]
+        arrangement = max(cuts, key=lambda c: sum(c.cut.pieces[i] == slot for i, slot in lying.items()))
+        todo = [i for i in range(scenario.count) if lying.get(i) != arrangement.cut.pieces[i]]
         if not todo:
             return
         astray = [i for i in todo if i in lying]  # they are in the way of the others
-        i = min(astray or ([held] if held in todo else todo), key=lambda i: cut.slots[i].area)
-        place, (pos, yaw) = cut.slots[i], cut.goal(i)
+        i = min(astray or ([held] if held in todo else todo), key=lambda i: arrangement.cut.pieces[i].area)
+        place, (pos, yaw) = arrangement.cut.pieces[i], arrangement.goal(i)
         if held is not None and (
             held != i or abs(math.remainder(yaw - yaw_of(world.rot(f"piece_{i}")), math.tau)) > 1.9
         ):
@@ -104,13 +105,13 @@ def try_places(scenario: Scenario, world: World) -> Plan:
         lying.pop(i, None)
         with suppress(GaveUp):
             if not arm.sealed:
-                yield from scenario._take(world, i, yaw)
-            yield from scenario._bring(world, i, pos, yaw)
+                yield from take(arm, f"piece_{i}", scenario.face(i), yaw)
+            yield from bring(arm, f"piece_{i}", pos, yaw)
             yield from scenario.insert(world, i, pos, yaw) if len(cuts) == 1 else feel(scenario, world, i, pos, yaw)
         went = scenario.lies(world, i)
 
         def expected(c: Packing, i=i, place=place) -> bool:
-            return goes_in(c.slots[i], place, {j: (c.slots[j], at) for j, at in lying.items()}, c.footprint)
+            return goes_in(c.cut.pieces[i], place, {j: (c.cut.pieces[j], at) for j, at in lying.items()}, c.cut.rect)
 
         cuts = [c for c in cuts if expected(c) == went]
         if went:

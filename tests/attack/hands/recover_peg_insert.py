@@ -9,9 +9,10 @@ from scengen.geometry import about_z
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
+from scengen.skills.insertion import Line
 from scengen.skills.jaw import release
 from scengen.skills.motion import facing, retreat, turn_to
-from scengen.tasks.recover_peg_insert import BOARD_CLEARANCE, Line, RecoverPegInsert
+from scengen.tasks.recover_peg_insert import BOARD_CLEARANCE, RecoverPegInsert
 
 
 class TurnsAroundPeg(RecoverPegInsert):

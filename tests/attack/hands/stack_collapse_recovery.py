@@ -7,9 +7,10 @@ from scengen.geometry import UP
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
+from scengen.skills.cubes import CARRY_HEIGHT, CARRY_PACE, centre
 from scengen.skills.jaw import carry, grasp, pick, put, release
 from scengen.skills.motion import OPEN, hold, retreat
-from scengen.tasks.stack_collapse_recovery import CARRY_HEIGHT, CARRY_PACE, StackCollapseRecovery
+from scengen.tasks.stack_collapse_recovery import StackCollapseRecovery
 
 
 class Guardable(StackCollapseRecovery):
@@ -27,7 +28,7 @@ def guard(scenario: Scenario, world: World) -> Plan:
     """Open the jaw around the top cube until the blow is over, lay the cube on the table and put it back, blindly."""
     assert isinstance(scenario, StackCollapseRecovery)
     arm, half, end = world.arm, scenario.top.edge / 2, 4.0
-    middle, side = scenario.centre(world, "top"), world.rot("top")[:, 1]
+    middle, side = centre(world, "top", scenario.top.edge), world.rot("top")[:, 1]
     above = scenario.top.edge + CARRY_HEIGHT
     yield from pick(arm, middle, side, above=above, lift=0.0, squeeze=0.3, pace=CARRY_PACE)
     yield from release(arm, 0.1)
