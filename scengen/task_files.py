@@ -203,9 +203,12 @@ def _declared(source: str, family: str) -> int:
     if "VERSION" not in source:  # parsing takes milliseconds, and most families have no second version
         return 1
     own = (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef) and node.name == family)
-    lines = (line for node in own for line in node.body if isinstance(line, ast.AnnAssign))
-    found = (line.value for line in lines if isinstance(line.target, ast.Name) and line.target.id == "VERSION")
-    return next((int(value.value) for value in found if isinstance(value, ast.Constant)), 1)  # type: ignore[arg-type]
+    lines = [line for node in own for line in node.body if isinstance(line, ast.Assign | ast.AnnAssign)]
+    for line in lines:
+        targets = line.targets if isinstance(line, ast.Assign) else [line.target]
+        if any(isinstance(target, ast.Name) and target.id == "VERSION" for target in targets) and line.value:
+            return int(ast.literal_eval(line.value))
+    return 1
 
 
 def paper_lengths() -> dict[str, float]:

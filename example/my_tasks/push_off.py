@@ -39,6 +39,7 @@ ZONE_MARGIN = 0.015
 class PushOff(Scenario):
     """A block, a cube in front of it, and a zone beyond the cube, in one line."""
 
+    VERSION = 1
     HOLD = 0.5  # time for which the goal must hold before it counts [s]
 
     # Every number of a scene is a parameter, with a nominal value, a unit and bounds. The task file says how it is drawn;

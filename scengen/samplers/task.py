@@ -355,6 +355,9 @@ def _family(name: str, path: Any) -> type[Scenario]:
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")
+    version: object = family.VERSION
+    if type(version) is not int or version < 1:
+        raise BadConfig(f"{path}.VERSION = {cut(repr(version))}; it must be a whole number, 1 or more")
     return family
 
 

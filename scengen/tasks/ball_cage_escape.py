@@ -71,6 +71,8 @@ CARRY_PACE = Pace(0.15, 0.01)  # pace with the cage in the hand: slow enough for
 class BallCageEscape(Scenario):
     """A cage on a stool, with a ball in it. Lengths are along the cage's axes."""
 
+    VERSION = 1
+
     HOLD: ClassVar[float] = 0.3
 
     x: float = param(-0.08, "m", -0.4, 0.4)

@@ -73,6 +73,8 @@ CATCHABLE_DISTANCE = 0.06  # distance of the ball's centre from the walls from w
 class BounceIntercept(LaunchedBall):
     """A ball that is launched between three walls."""
 
+    VERSION = 1
+
     side: int = param(1, "1 to the left, -1 to the right", -1, 1)
     """Side to which the ball is launched; `y`, `aim` and `turn` are mirrored with it."""
     x: float = param(-0.12, "m", -0.36, 0.36)

@@ -70,6 +70,8 @@ CARRY_TOLERANCE = 0.01
 class DominoSelect(Scenario):
     """Five parallel chains, one intact, four with a defect, and two slabs; first tiles may differ from the others."""
 
+    VERSION = 1
+
     count: int = param(4, "tiles", 3, 8)
     gap_ratio: float = param(1.25, "tile widths", 0.2, 2.5)
     lane: float = param(0.09, "m", 0.05, 0.15)  # distance between neighbouring chains

@@ -46,6 +46,8 @@ SLAB_DISPLACEMENT = 0.05
 class DominoSingle(Scenario):
     """A straight chain of tiles with a red slab at its end; the first tile, the starter, may differ from the others."""
 
+    VERSION = 1
+
     count: int = param(5, "tiles", 2, 15)  # number of tiles; the slab does not count
     gap_ratio: float = param(0.9, "tile widths", 0.2, 2.5)  # free space between neighbouring faces
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)

@@ -72,6 +72,8 @@ LOW_SETTLING_TIME = 0.6  # time that a low hand needs besides its way, to stand 
 class LinearIntercept(LaunchedBall):
     """A ball that is launched over the table."""
 
+    VERSION = 1
+
     x: float = param(0.0, "m", -0.36, 0.36)
     y: float = param(0.32, "m", -0.36, 0.36)
     heading: float = param(255.0, "deg", -180.0, 360.0, period=360.0)

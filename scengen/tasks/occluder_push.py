@@ -80,6 +80,7 @@ class Spot(Bounded):
 class OccluderPush(Scenario):
     """Three covered cubes and a green patch."""
 
+    VERSION = 1
     HOLD = 0.3
 
     red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True)

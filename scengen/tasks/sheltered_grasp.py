@@ -89,6 +89,7 @@ RELEASE_HEIGHT = 0.072
 class ShelteredGrasp(Scenario):
     """An object in a rack that is open on one side, and a tray on the table before it."""
 
+    VERSION = 1
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)

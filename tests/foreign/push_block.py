@@ -26,6 +26,8 @@ from scengen.skills.jaw import poke
 class PushBlock(Scenario):
     """A block on the table, and a line across it."""
 
+    VERSION = 1
+
     y: float = param(-0.10, "m", -0.4, 0.4)
     distance: float = param(0.12, "m", 0.0, 0.6)
     """From the block to the line, along y."""

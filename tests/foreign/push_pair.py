@@ -32,6 +32,8 @@ ABREAST = 0.04
 class PushPair(Scenario):
     """Two blocks on the table, and a line across it."""
 
+    VERSION = 1
+
     x: float = param(-0.10, "m", -0.3, 0.3)
     distance: float = param(0.10, "m", 0.0, 0.4)
     """From the blocks to the line, along x."""
