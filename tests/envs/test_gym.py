@@ -24,7 +24,7 @@ EVERYTHING = (*observations.streams_of("panda_jaw"),)
 
 @pytest.fixture
 def env():
-    with gymnasium.make("scengen/domino_single-v0", pool=REFERENCE) as made:
+    with gymnasium.make("scengen/domino_single-v1", pool=REFERENCE) as made:
         yield made
 
 
@@ -40,7 +40,7 @@ def test_gymnasiums_own_checker_has_nothing_to_say():
 
 
 def test_every_task_is_registered():
-    assert {f"scengen/{name}-v0" for name in list_tasks()} <= set(gymnasium.registry)
+    assert {f"scengen/{name}-v1" for name in list_tasks()} <= set(gymnasium.registry)
 
 
 def test_witnesses_reach_the_goal_and_end_in_the_certified_seconds(env):
@@ -75,7 +75,7 @@ def test_a_step_before_the_first_reset_is_refused():
 
 
 def test_a_specification_with_a_path_is_json():
-    made = gymnasium.make("scengen/domino_single-v0", pool=REFERENCE)
+    made = gymnasium.make("scengen/domino_single-v1", pool=REFERENCE)
     assert str(REFERENCE) in made.spec.to_json()
 
 
@@ -192,7 +192,7 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
         (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
         (lambda: PoolEnv("domino_single", []), PoolError, "no pool was given; give pool=FOLDER"),
-        (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was given; give pool=FOLDER"),
+        (lambda: gymnasium.make("scengen/domino_single-v1"), PoolError, "no pool was given; give pool=FOLDER"),
         (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
         (
             lambda: PoolEnv("domino_single", REFERENCE, scenario="z"),
@@ -277,7 +277,7 @@ def test_the_fingers_feel_what_they_press_and_nothing_else():
 
 
 def test_vectors_of_environments_step_together():
-    envs = gymnasium.make_vec("scengen/domino_single-v0", num_envs=2, vectorization_mode="sync", pool=REFERENCE)
+    envs = gymnasium.make_vec("scengen/domino_single-v1", num_envs=2, vectorization_mode="sync", pool=REFERENCE)
     _, info = envs.reset(seed=[1, 3], options={"labels": True})
     assert info["scenario"][0] != info["scenario"][1]
     seen, reward, *_ = envs.step(np.zeros((2, 7), np.float32))
