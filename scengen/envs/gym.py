@@ -1,7 +1,7 @@
 """Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v1", pool="generated/id")`.
 
 Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself. The
-number in a name is the version of the task (`Scenario.VERSION`). `-v0` names the installed version, too; Gymnasium warns of it.
+number in an id is the version of the task (`Scenario.VERSION`). `-v0` names the installed version, too, with a warning.
 An environment plays the certified scenarios of a pool, with the scene text, the physics and the controller of the
 certificate. Reset samples nothing: the seed selects one of the stored scenarios, and `info` holds its id.
 """

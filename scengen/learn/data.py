@@ -142,12 +142,9 @@ def _task_version(recording: Recording, task: str) -> int | None:
     Raises:
         PoolError: the episodes tell several versions, or something else.
     """
-    told = {row.get(TASK_VERSION) for row in recording.episodes if row["scengen/task"] == task}
-    match [*told]:
-        case [None]:
-            return None
-        case [int(version)] if version >= 1:
-            return version
+    first, *others = (row.get(TASK_VERSION) for row in recording.episodes if row["scengen/task"] == task)
+    if all(other == first for other in others) and (first is None or (isinstance(first, int) and first >= 1)):
+        return first
     raise PoolError(f"{recording.folder}: {TASK_VERSION} of {task} is not one number; record one version alone")
 
 
